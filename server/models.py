@@ -1,0 +1,143 @@
+"""The tables. Times are seconds since the epoch, UTC; the server is the only process that opens the database."""
+
+import time
+from typing import Any, Literal
+
+from sqlalchemy import JSON, BigInteger, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+
+RunState = Literal["queued", "running", "stopping", "stopped", "completed", "failed"]
+
+
+class Base(DeclarativeBase):
+    """Declarative base of every table."""
+
+
+class Experiment(Base):
+    """One configuration x several seeds, launched together."""
+
+    __tablename__ = "experiments"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    name: Mapped[str] = mapped_column(String(120))
+    training: Mapped[dict[str, Any]] = mapped_column(JSON)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+
+    runs: Mapped[list["Run"]] = relationship(
+        back_populates="experiment", cascade="all, delete-orphan", passive_deletes=True, order_by="Run.seed"
+    )
+
+
+class Run(Base):
+    """One seed's training. (state, attempt, lease_until) is what a worker's claim compares and sets.
+
+    `attempt` is the fencing token: it grows by one with every claim, and a message of an older attempt is refused.
+    """
+
+    __tablename__ = "runs"
+    __table_args__ = (Index("runs_by_state", "state", "lease_until"),)
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), index=True)
+    seed: Mapped[int] = mapped_column(BigInteger)
+    state: Mapped[str] = mapped_column(String(12), default="queued")
+    attempt: Mapped[int] = mapped_column(Integer, default=0)
+    lease_until: Mapped[float | None] = mapped_column(Float)
+    worker: Mapped[str | None] = mapped_column(String(120))
+    # Attempts lost since the last new checkpoint; the run fails after three.
+    losses: Mapped[int] = mapped_column(Integer, default=0)
+    step: Mapped[int] = mapped_column(BigInteger, default=0)
+    last_seq: Mapped[int] = mapped_column(BigInteger, default=0)
+    error: Mapped[str | None] = mapped_column(Text)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    queued_at: Mapped[float] = mapped_column(Float, default=time.time)
+    started_at: Mapped[float | None] = mapped_column(Float)
+    finished_at: Mapped[float | None] = mapped_column(Float)
+
+    experiment: Mapped[Experiment] = relationship(back_populates="runs")
+
+
+class RunEvent(Base):
+    """One line of a run's event log."""
+
+    __tablename__ = "run_events"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), index=True)
+    at: Mapped[float] = mapped_column(Float, default=time.time)
+    step: Mapped[int] = mapped_column(BigInteger, default=0)
+    level: Mapped[str] = mapped_column(String(8))
+    message: Mapped[str] = mapped_column(Text)
+
+
+class MetricRow(Base):
+    """A numbered message of metrics as it came, until it is compacted into chunks."""
+
+    __tablename__ = "metric_rows"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    seq: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    step: Mapped[int] = mapped_column(BigInteger)
+    wall_time: Mapped[float] = mapped_column(Float)
+    values: Mapped[dict[str, float]] = mapped_column(JSON)
+
+
+class MetricChunk(Base):
+    """Compacted points of one series: zlib over int64 step deltas, float64 wall times and float32 values."""
+
+    __tablename__ = "metric_chunks"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    first_step: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    last_step: Mapped[int] = mapped_column(BigInteger)
+    count: Mapped[int] = mapped_column(Integer)
+    points: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class LatestMetric(Base):
+    """The newest value of each series, for lists."""
+
+    __tablename__ = "latest_metrics"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    step: Mapped[int] = mapped_column(BigInteger)
+    value: Mapped[float] = mapped_column(Float)
+
+
+class Checkpoint(Base):
+    """A policy at a step of a run, with the state to resume it; its archive lies in the file store under its id."""
+
+    __tablename__ = "checkpoints"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), index=True)
+    step: Mapped[int] = mapped_column(BigInteger)
+    size: Mapped[int] = mapped_column(BigInteger)
+    sha256: Mapped[str] = mapped_column(String(64))
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+
+
+class Evaluation(Base):
+    """A checkpoint on a suite; `episodes` is zlib-compressed JSON, one object per episode in the suite's order."""
+
+    __tablename__ = "evaluations"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    checkpoint_id: Mapped[str] = mapped_column(ForeignKey("checkpoints.id", ondelete="CASCADE"), index=True)
+    suite: Mapped[str] = mapped_column(String(64))
+    suite_hash: Mapped[str] = mapped_column(String(64))
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    episode_count: Mapped[int] = mapped_column(Integer)
+    arrivals: Mapped[int] = mapped_column(Integer)
+    episodes: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class Worker(Base):
+    """A worker process that has been heard of."""
+
+    __tablename__ = "workers"
+
+    name: Mapped[str] = mapped_column(String(120), primary_key=True)
+    last_seen: Mapped[float] = mapped_column(Float)

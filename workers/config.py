@@ -1,0 +1,117 @@
+"""What a training is: algorithm, network and budget, from the form to the file inside a checkpoint (pydantic only)."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from sim.config import ADVANCED, Frozen, TaskConfig
+
+
+class ResBlockNetwork(Frozen):
+    """The paper's network (tables 'PPO Critic network structure details'): two residual concatenations, 512 wide."""
+
+    name: Literal["resblock"] = Field("resblock", title="ResBlock")
+
+
+class MlpNetwork(Frozen):
+    """A plain multi-layer perceptron."""
+
+    name: Literal["mlp"] = Field("mlp", title="MLP")
+    hidden_sizes: tuple[int, ...] = Field(
+        (64, 64),
+        min_length=1,
+        max_length=4,
+        title="Hidden layers",
+        description="Units of each hidden layer, 4 to 1024.",
+        json_schema_extra=ADVANCED,
+    )
+    activation: Literal["relu", "tanh"] = Field("relu", title="Activation", json_schema_extra=ADVANCED)
+
+    @model_validator(mode="after")
+    def _sizes_in_range(self) -> "MlpNetwork":
+        if any(not 4 <= size <= 1024 for size in self.hidden_sizes):
+            raise ValueError("every hidden layer needs between 4 and 1024 units")
+        return self
+
+
+Network = Annotated[ResBlockNetwork | MlpNetwork, Field(discriminator="name")]
+
+
+class PpoConfig(Frozen):
+    """Proximal Policy Optimization (Schulman et al. 2017) with a Gaussian policy of bounded mean."""
+
+    name: Literal["ppo"] = Field("ppo", title="PPO")
+    network: Network = Field(default_factory=MlpNetwork, title="Network")
+    robots: int = Field(
+        128,
+        ge=1,
+        le=4096,
+        title="Robots",
+        description="Robots that collect experience side by side.",
+        json_schema_extra=ADVANCED,
+    )
+    rollout_steps: int = Field(
+        32, ge=4, le=4096, title="Rollout", description="Steps of each robot between two updates.", json_schema_extra=ADVANCED
+    )
+    epochs: int = Field(6, ge=1, le=50, title="Epochs", description="Passes over each rollout.", json_schema_extra=ADVANCED)
+    minibatch_size: int = Field(512, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)
+    learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Learning rate", json_schema_extra=ADVANCED)
+    learning_rate_schedule: Literal["linear", "constant"] = Field(
+        "linear", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
+    )
+    gamma: float = Field(0.99, gt=0.0, le=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
+    gae_lambda: float = Field(0.95, ge=0.0, le=1.0, title="GAE lambda", json_schema_extra=ADVANCED)
+    clip_range: float = Field(0.2, gt=0.0, le=1.0, title="Clip range (epsilon)", json_schema_extra=ADVANCED)
+    entropy_coefficient: float = Field(0.0, ge=0.0, le=1.0, title="Entropy coefficient", json_schema_extra=ADVANCED)
+    max_grad_norm: float = Field(0.5, gt=0.0, le=100.0, title="Gradient clipping", json_schema_extra=ADVANCED)
+    initial_std_linear: float = Field(
+        0.2, gt=0.01, le=2.0, title="Initial std, linear", description="Exploration noise.", json_schema_extra=ADVANCED
+    )
+    initial_std_angular: float = Field(
+        0.4, gt=0.01, le=2.0, title="Initial std, angular", description="Exploration noise.", json_schema_extra=ADVANCED
+    )
+    scale_returns: bool = Field(
+        True,
+        title="Scale returns",
+        description="Divide rewards by a running standard deviation of the return.",
+        json_schema_extra=ADVANCED,
+    )
+
+    @model_validator(mode="after")
+    def _minibatch_fits(self) -> "PpoConfig":
+        if self.minibatch_size > self.robots * self.rollout_steps:
+            raise ValueError(
+                f"minibatch_size {self.minibatch_size} is larger than a rollout of {self.robots} robots x "
+                f"{self.rollout_steps} steps"
+            )
+        return self
+
+
+class EvaluationConfig(Frozen):
+    """How often a training is measured on its frozen suite, and how often a checkpoint is kept."""
+
+    every_steps: int = Field(
+        50_000,
+        ge=1_000,
+        title="Evaluate and save every",
+        description="Environment steps between two evaluations; each keeps a checkpoint.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class TrainingConfig(Frozen):
+    """One training, complete but for its seed: the message to a worker and the file in a checkpoint."""
+
+    task: TaskConfig = Field(default_factory=TaskConfig, title="Task")
+    algorithm: PpoConfig = Field(default_factory=PpoConfig, title="Algorithm")
+    steps: int = Field(
+        300_000,
+        ge=1_000,
+        le=1_000_000_000,
+        title="Steps",
+        description="Environment steps of all robots together.",
+    )
+    evaluation: EvaluationConfig = Field(default_factory=EvaluationConfig, title="Evaluation")
+    device: Literal["auto", "cpu", "cuda"] = Field(
+        "cpu", title="Device", description="Small networks train fastest on a CPU core.", json_schema_extra=ADVANCED
+    )

@@ -1,0 +1,84 @@
+"""One moment of the robots that somebody watches, and its bytes on the link (NumPy only: the server decodes them)."""
+
+import struct
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+ViewMode = Literal["training", "policy"]
+
+# version, mode, robots, rays, step, seconds of simulated time, seconds of simulated time per wall second
+_HEADER = struct.Struct("<BBHHQdf")
+_VERSION = 1
+_MODES: tuple[ViewMode, ...] = ("training", "policy")
+
+
+class FrameError(ValueError):
+    """The bytes are not a frame of this version."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What the live view draws; all lengths are metres, all angles radians, in the arena's own coordinates.
+
+    Attributes:
+        mode: whether these are the training robots or the newest policy on its own.
+        step: environment steps of the training when the frame was made.
+        sim_time: simulated seconds since the view started; grows monotonically within a mode.
+        speed: simulated seconds per wall second.
+        poses: (robots, 3) float32: x, y, heading.
+        targets: (robots, 2) float32.
+        ranges: (robots, rays) float32, at most the LiDAR's range.
+        rewards: (robots,) float32, reward since the last target.
+        outcomes: (robots,) uint8: how the attempt that ended last ended (0 none yet, 1 arrival, 2 collision, 3 time-out).
+    """
+
+    mode: ViewMode
+    step: int
+    sim_time: float
+    speed: float
+    poses: NDArray[np.float32]
+    targets: NDArray[np.float32]
+    ranges: NDArray[np.float32]
+    rewards: NDArray[np.float32]
+    outcomes: NDArray[np.uint8]
+
+    def encode(self) -> bytes:
+        """The frame as bytes: a fixed header, then the arrays one after another, little-endian."""
+        robots, rays = self.ranges.shape
+        header = _HEADER.pack(_VERSION, _MODES.index(self.mode), robots, rays, self.step, self.sim_time, self.speed)
+        floats = np.concatenate(
+            [np.ravel(a).astype("<f4") for a in (self.poses, self.targets, self.ranges, self.rewards)], dtype="<f4"
+        )
+        return header + floats.tobytes() + self.outcomes.astype(np.uint8).tobytes()
+
+    @classmethod
+    def decode(cls, data: bytes) -> Self:
+        """The frame that `encode` wrote.
+
+        Raises:
+            FrameError: `data` is no frame of this version, or is cut short.
+        """
+        if len(data) < _HEADER.size:
+            raise FrameError("shorter than a frame's header")
+        version, mode, robots, rays, step, sim_time, speed = _HEADER.unpack_from(data)
+        if version != _VERSION or mode >= len(_MODES):
+            raise FrameError(f"frame version {version}, mode {mode}: not known here")
+        sizes = (3 * robots, 2 * robots, rays * robots, robots)
+        if len(data) != _HEADER.size + 4 * sum(sizes) + robots:
+            raise FrameError("length does not match the header")
+        floats = np.frombuffer(data, "<f4", sum(sizes), _HEADER.size)
+        poses, targets, ranges, rewards = np.split(floats, np.cumsum(sizes)[:-1])
+        return cls(
+            mode=_MODES[mode],
+            step=step,
+            sim_time=sim_time,
+            speed=speed,
+            poses=poses.reshape(robots, 3),
+            targets=targets.reshape(robots, 2),
+            ranges=ranges.reshape(robots, rays),
+            rewards=rewards,
+            outcomes=np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes)),
+        )

@@ -1,0 +1,82 @@
+"""The one way out of a training: what the trainer tells, and what it is told, whoever listens."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal, Protocol
+
+from sim.config import Frozen
+from workers.frames import Frame, ViewMode
+
+EventLevel = Literal["info", "warning", "error"]
+Outcome = Literal["arrival", "collision", "timeout"]
+
+
+class WatchRequest(Frozen):
+    """What somebody wants to see of a training.
+
+    Attributes:
+        mode: the training robots, or the newest policy on its own.
+        robots: how many, 1 to 64.
+        speed: simulated seconds per wall second in policy mode: 1, 2, 5 or 10.
+    """
+
+    mode: ViewMode = "policy"
+    robots: int = 8
+    speed: float = 1.0
+
+
+class EpisodeResult(Frozen):
+    """One scenario of an evaluation: one target attempt.
+
+    Attributes:
+        outcome: arrival, collision or time-out.
+        steps: control steps driven.
+        reward: summed reward.
+        path_length: metres driven.
+        shortest_path: metres from start to target as the crow flies, or around obstacles where that is known.
+        min_clearance: smallest distance between the robot's body and anything else, metres.
+    """
+
+    outcome: Outcome
+    steps: int
+    reward: float
+    path_length: float
+    shortest_path: float
+    min_clearance: float
+
+
+class EvaluationResult(Frozen):
+    """A policy on a suite: one row per episode, in the suite's order."""
+
+    suite: str
+    suite_hash: str
+    episodes: tuple[EpisodeResult, ...]
+
+    @property
+    def success_rate(self) -> float:
+        """Arrivals over episodes, 0 to 1."""
+        return sum(episode.outcome == "arrival" for episode in self.episodes) / len(self.episodes)
+
+
+class Reporter(Protocol):
+    """Where a training reports. Calls return at once; what they carry is kept until it has arrived."""
+
+    def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        """Numbers at an environment step, under their standard names; steps only grow."""
+
+    def event(self, step: int, level: EventLevel, message: str) -> None:
+        """One line for the run's event log."""
+
+    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
+        """A checkpoint archive that is complete on disk; `evaluation` belongs to exactly these weights."""
+
+    def frames(self, frames: Sequence[Frame]) -> None:
+        """Moments for whoever watches, oldest first; only what is newest need arrive, and nothing is kept."""
+
+    @property
+    def watch(self) -> WatchRequest | None:
+        """What somebody wants to see now; None while nobody watches, and then no frame is made."""
+
+    @property
+    def stop_requested(self) -> bool:
+        """True once the training should write a checkpoint and return."""
