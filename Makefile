@@ -1,0 +1,81 @@
+# Two commands matter: `make run` and `make test`. Everything they need goes into .venv and web/node_modules.
+
+PYTHON ?= python3
+BIN := .venv/bin
+# Everything that decides how the pages look; web/build.py knows the rest.
+.DEFAULT_GOAL := help
+.PHONY: help run test check format lock pages types
+
+help:
+	@echo "make run     set up, start the server and its workers, print the address"
+	@echo "make test    all tests (browser tests where Chromium is installed)"
+	@echo "make check   linters, types, architecture"
+	@echo "make format  format everything"
+	@echo "make lock    compile the hash-pinned requirements anew"
+	@echo "make types   generate the pages' types from the server's OpenAPI"
+
+# --- set up --------------------------------------------------------------------------------------------------------
+
+.venv/bin/uv: requirements-uv.txt
+	@command -v $(PYTHON) >/dev/null || { echo "mapless: $(PYTHON) not found: install Python 3.11 or newer."; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "mapless: Python 3.11 or newer is needed, this is $$($(PYTHON) -V). Try: make run PYTHON=python3.12"; exit 1; }
+	@[ -w . ] || { echo "mapless: no write access to $$(pwd): copy it to a folder of your own."; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
+	  echo "mapless: Python's venv module is missing: install it (Debian, Ubuntu: apt install python3-venv)."; exit 1; }
+	@echo "Setting up .venv ..."
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-uv.txt || { \
+	  rm -f $@; echo "mapless: the first package could not be downloaded: is there a network? Then run make again."; exit 1; }
+	@touch $@
+
+define install
+	@echo "Installing packages (PyTorch is large: a few minutes the first time) ..."
+	@$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r $(1) || { \
+	  echo "mapless: packages could not be installed: is there a network? Then run make again."; exit 1; }
+	@$(BIN)/uv pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	@touch $@
+endef
+
+.venv/.run: requirements.txt pyproject.toml .venv/bin/uv
+	$(call install,requirements.txt)
+
+.venv/.dev: requirements-dev.txt .venv/.run
+	$(call install,requirements-dev.txt)
+
+pages: .venv/.run
+	@$(BIN)/python web/build.py
+
+# --- use -----------------------------------------------------------------------------------------------------------
+
+run: pages
+	@exec $(BIN)/mapless up $(ARGS)
+
+test: .venv/.dev pages
+	$(BIN)/python web/build.py run test
+	$(BIN)/python -m pytest $(ARGS)
+
+check: .venv/.dev pages
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python web/build.py run check
+
+# --- change --------------------------------------------------------------------------------------------------------
+
+format: .venv/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/python web/build.py run format
+
+types: .venv/.dev
+	$(BIN)/python -m server.openapi
+	$(BIN)/python web/build.py run generate
+
+# The header that uv writes names the command, and nothing in these files names a host.
+LOCK := $(BIN)/uv pip compile -q --universal --generate-hashes --python-version 3.11 --custom-compile-command 'make lock'
+lock: .venv/bin/uv
+	$(LOCK) pyproject.toml --extra build -o requirements.txt
+	$(LOCK) pyproject.toml --extra build --extra dev -o requirements-dev.txt -c requirements.txt
+	echo 'uv==0.13.8' | $(LOCK) - -o requirements-uv.txt
