@@ -2,7 +2,6 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-# Everything that decides how the pages look; web/build.py knows the rest.
 .DEFAULT_GOAL := help
 .PHONY: help run test check format lock pages types
 
@@ -25,15 +24,17 @@ help:
 	  echo "mapless: Python's venv module is missing: install it (Debian, Ubuntu: apt install python3-venv)."; exit 1; }
 	@echo "Setting up .venv ..."
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-uv.txt || { \
-	  rm -f $@; echo "mapless: the first package could not be downloaded: is there a network? Then run make again."; exit 1; }
+	@$(BIN)/python -m pip install --disable-pip-version-check --require-hashes -r requirements-uv.txt >.venv/install.log 2>&1 || { \
+	  echo "mapless: packages could not be downloaded (.venv/install.log says why): is there a network? Then run make again."; \
+	  exit 1; }
 	@touch $@
 
 define install
 	@echo "Installing packages (PyTorch is large: a few minutes the first time) ..."
-	@$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r $(1) || { \
-	  echo "mapless: packages could not be installed: is there a network? Then run make again."; exit 1; }
-	@$(BIN)/uv pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	@{ $(BIN)/uv pip install --python $(BIN)/python --require-hashes -r $(1) && \
+	   $(BIN)/uv pip install --python $(BIN)/python --no-build-isolation --no-deps -e .; } >.venv/install.log 2>&1 || { \
+	  echo "mapless: packages could not be installed (.venv/install.log says why): is there a network? Then run make again."; \
+	  exit 1; }
 	@touch $@
 endef
 
