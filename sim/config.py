@@ -8,8 +8,9 @@ field under *Advanced*.
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.config import JsonDict
 
-ADVANCED = {"x-advanced": True}
+ADVANCED: JsonDict = {"x-advanced": True}
 
 ArenaName = Literal["simple", "complex"]
 ObservationName = Literal["paper", "improved"]

@@ -51,7 +51,12 @@ class PpoConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     rollout_steps: int = Field(
-        32, ge=4, le=4096, title="Rollout", description="Steps of each robot between two updates.", json_schema_extra=ADVANCED
+        32,
+        ge=4,
+        le=4096,
+        title="Rollout",
+        description="Steps of each robot between two updates.",
+        json_schema_extra=ADVANCED,
     )
     epochs: int = Field(6, ge=1, le=50, title="Epochs", description="Passes over each rollout.", json_schema_extra=ADVANCED)
     minibatch_size: int = Field(512, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)

@@ -1,0 +1,38 @@
+"""The errors of this package, one tree; every message says what to do next.
+
+WorkerError
+├── TrainingError          a training cannot go on
+│   └── NonFiniteError     its weights are no longer numbers
+└── ArchiveError           a checkpoint archive is refused
+    ├── ArchiveFormatError       not an archive of this project, or of a newer version
+    ├── ArchiveIntegrityError    its content is not what its manifest says
+    └── ArchiveMismatchError     it belongs to another training
+"""
+
+
+class WorkerError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class TrainingError(WorkerError):
+    """A training cannot go on."""
+
+
+class NonFiniteError(TrainingError):
+    """The weights of a training are no longer finite numbers."""
+
+
+class ArchiveError(WorkerError):
+    """A checkpoint archive is refused."""
+
+
+class ArchiveFormatError(ArchiveError):
+    """Not a checkpoint archive, or one of a version that this release does not know."""
+
+
+class ArchiveIntegrityError(ArchiveError):
+    """The content of an archive is not what its manifest promises."""
+
+
+class ArchiveMismatchError(ArchiveError):
+    """An archive belongs to another training than the one that it should resume."""
