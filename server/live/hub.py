@@ -1,0 +1,229 @@
+"""Who watches which run: brings the frames of a worker's link to the browsers, and their wishes back to the worker.
+
+The hub lives on the server's event loop, and every method is called from there. For the worker's link:
+
+    hub: LiveHub = app.state.live
+    detach = hub.attach(run_id, on_watch)    # `on_watch(WatchRequest | None)`: now, and again whenever it changes
+    hub.frames(run_id, data)                 # for every binary message, in order; returns at once
+    detach()                                 # when the link ends
+
+Nobody watches: `on_watch(None)`, and frames that still come are dropped unread.
+"""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncGenerator, Callable, Coroutine
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from server.live.settings import LiveSettings, LiveStatus
+from sim.config import TaskConfig
+from workers.frames import Frame
+from workers.reporting import WatchRequest
+
+_T = TypeVar("_T")
+
+WatchCallback = Callable[[WatchRequest | None], None]
+
+# A link that has sent nothing for this long has nothing to show; frames come 30 times a second.
+RECEIVING_SECONDS = 2.0
+
+
+class LiveError(Exception):
+    """The live view cannot be shown; the message says why."""
+
+
+class TooManyViewsError(LiveError):
+    """So many runs are being watched that another view would harm them all."""
+
+
+class View(Protocol):
+    """The scene of one run, in a thread and on a port of its own."""
+
+    @property
+    def port(self) -> int:
+        """Port of the scene's WebSocket on 127.0.0.1."""
+
+    def show(self, frame: Frame) -> None:
+        """Queues a frame; returns at once, and drops what cannot be shown in time."""
+
+    def apply(self, settings: LiveSettings, connected: bool) -> None:
+        """Changes what is shown; `connected` tells whether a worker is there to send frames."""
+
+    def close(self) -> None:
+        """Stops the thread and the port; blocks until both are gone."""
+
+
+ViewFactory = Callable[[str, TaskConfig, LiveSettings], View]
+
+
+@dataclass
+class _Channel:
+    """All that is known about one run's live view."""
+
+    settings: LiveSettings = field(default_factory=LiveSettings)
+    callbacks: list[WatchCallback] = field(default_factory=list)
+    told: WatchRequest | None = None
+    view: View | None = None
+    watchers: int = 0
+    last_frame: float = float("-inf")
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def request(self) -> WatchRequest | None:
+        return self.settings.watch_request() if self.watchers and self.view is not None else None
+
+
+class LiveHub:
+    """The live views of all runs.
+
+    Args:
+        view_factory: builds the scene of a run; called in a thread, at the first watcher.
+        linger: seconds that a scene outlives its last watcher, so that a reload finds it again.
+        capacity: scenes at the same time; each is a thread and about a megabyte.
+    """
+
+    def __init__(self, view_factory: ViewFactory, *, linger: float = 10.0, capacity: int = 32) -> None:
+        self._view_factory = view_factory
+        self._linger = linger
+        self._capacity = capacity
+        self._channels: dict[str, _Channel] = {}
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    # -- the worker's side ------------------------------------------------------------------------------------------------
+
+    def attach(self, run_id: str, on_watch: WatchCallback) -> Callable[[], None]:
+        """A worker is linked for this run.
+
+        Args:
+            run_id: the run that it trains.
+            on_watch: called before this returns and at every change with what somebody wants to see, None for nothing.
+
+        Returns:
+            What to call when the link has ended; calling it twice does no harm.
+        """
+        channel = self._channel(run_id)
+        channel.callbacks.append(on_watch)
+        on_watch(channel.request())
+        self._apply(channel)
+
+        def detach() -> None:
+            if on_watch in channel.callbacks:
+                channel.callbacks.remove(on_watch)
+                self._apply(channel)
+
+        return detach
+
+    def frames(self, run_id: str, data: bytes | Frame) -> None:
+        """A frame has arrived; dropped where nobody watches.
+
+        Raises:
+            FrameError: `data` is no frame of this version (checked only while somebody watches).
+        """
+        channel = self._channels.get(run_id)
+        if channel is None or channel.view is None or not channel.watchers:
+            return
+        channel.view.show(data if isinstance(data, Frame) else Frame.decode(data))
+        channel.last_frame = time.monotonic()
+
+    def watch_request(self, run_id: str) -> WatchRequest | None:
+        """What somebody wants to see of this run now; None where nobody watches."""
+        channel = self._channels.get(run_id)
+        return channel.request() if channel else None
+
+    # -- the pages' side --------------------------------------------------------------------------------------------------
+
+    def settings(self, run_id: str) -> LiveSettings:
+        """What the live view of this run shows, or would show."""
+        channel = self._channels.get(run_id)
+        return channel.settings if channel else LiveSettings()
+
+    def configure(self, run_id: str, settings: LiveSettings) -> None:
+        """Changes what the live view of this run shows, for everyone who watches it."""
+        channel = self._channel(run_id)
+        channel.settings = settings
+        self._apply(channel)
+
+    def status(self, run_id: str) -> LiveStatus:
+        """Whether the live view of this run has anything to show."""
+        channel = self._channels.get(run_id, _NOBODY)
+        return LiveStatus(
+            connected=bool(channel.callbacks),
+            receiving=time.monotonic() - channel.last_frame < RECEIVING_SECONDS,
+            watchers=channel.watchers,
+        )
+
+    @contextlib.asynccontextmanager
+    async def watch(self, run_id: str, task: TaskConfig) -> AsyncGenerator[View]:
+        """Counts a watcher of this run for as long as the context lasts.
+
+        Raises:
+            TooManyViewsError: the cap on scenes is reached.
+        """
+        channel = self._channel(run_id)
+        channel.watchers += 1
+        try:
+            # Shielded: a browser that leaves meanwhile must not leave a scene behind that nobody knows of.
+            yield await asyncio.shield(self._start(self._open(run_id, task, channel)))
+        finally:
+            channel.watchers -= 1
+            self._apply(channel)
+            if not channel.watchers:
+                asyncio.get_running_loop().call_later(self._linger, self._close_if_unwatched, channel)
+
+    def forget(self, run_id: str) -> None:
+        """The run is gone: its scene goes with it."""
+        if channel := self._channels.pop(run_id, None):
+            self._start(self._close(channel))
+
+    async def close(self) -> None:
+        """Closes every scene; the hub is of no use afterwards."""
+        for run_id in tuple(self._channels):
+            self.forget(run_id)
+        while self._tasks:
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    # ---------------------------------------------------------------------------------------------------------------------
+
+    def _channel(self, run_id: str) -> _Channel:
+        return self._channels.setdefault(run_id, _Channel())
+
+    def _apply(self, channel: _Channel) -> None:
+        """Tells the scene and the worker's link where they stand, the latter only what is new to it."""
+        if channel.view is not None:
+            channel.view.apply(channel.settings, bool(channel.callbacks))
+        request = channel.request()
+        if request != channel.told:
+            channel.told = request
+            for on_watch in tuple(channel.callbacks):
+                on_watch(request)
+
+    def _start(self, work: Coroutine[Any, Any, _T]) -> asyncio.Task[_T]:
+        """A task of the hub's own, which outlives whoever waits for it."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def _open(self, run_id: str, task: TaskConfig, channel: _Channel) -> View:
+        async with channel.lock:
+            if channel.view is None:
+                if sum(other.view is not None for other in self._channels.values()) >= self._capacity:
+                    raise TooManyViewsError(f"{self._capacity} runs are being watched already: close one of their pages")
+                channel.view = await asyncio.to_thread(self._view_factory, run_id, task, channel.settings)
+            self._apply(channel)
+            return channel.view
+
+    def _close_if_unwatched(self, channel: _Channel) -> None:
+        if not channel.watchers and channel.view is not None:
+            self._start(self._close(channel, unless_watched=True))
+
+    async def _close(self, channel: _Channel, *, unless_watched: bool = False) -> None:
+        async with channel.lock:
+            if channel.view is None or (unless_watched and channel.watchers):
+                return
+            view, channel.view = channel.view, None
+            await asyncio.to_thread(view.close)
+
+
+_NOBODY = _Channel()
