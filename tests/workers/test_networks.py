@@ -1,0 +1,78 @@
+"""The networks are those of the paper's tables, and their written-out backward passes equal autograd's."""
+
+import pytest
+import torch
+from torch import nn
+
+from workers.algorithms.flat_adam import FlatAdam
+from workers.backward import backward_of
+from workers.config import MlpNetwork, Network, ResBlockNetwork
+from workers.networks import GaussianActor, build_network
+
+NETWORKS: list[Network] = [
+    ResBlockNetwork(),
+    MlpNetwork(hidden_sizes=(64, 64), activation="relu"),
+    MlpNetwork(hidden_sizes=(32,), activation="tanh"),
+    MlpNetwork(hidden_sizes=(16, 24, 8), activation="tanh"),
+]
+
+
+def count(module: nn.Module) -> int:
+    return sum(parameter.numel() for parameter in module.parameters())
+
+
+def test_resblock_has_the_papers_parameter_counts() -> None:
+    assert count(build_network(ResBlockNetwork(), 16, 1)) == 50_289
+    actor = GaussianActor(build_network(ResBlockNetwork(), 16, 2), (0.2, 0.4))
+    assert count(actor.network) == 50_354
+    assert count(actor) == 50_354 + 2  # the two deviations
+
+
+def test_mlp_has_the_parameters_of_its_layers() -> None:
+    assert count(build_network(MlpNetwork(hidden_sizes=(64, 32)), 16, 2)) == (16 * 64 + 64) + (64 * 32 + 32) + (32 * 2 + 2)
+
+
+def test_resblock_passes_its_input_to_the_head() -> None:
+    """With every layer but the head silenced, what is left is the two shortcuts, through LeakyReLU twice."""
+    network = build_network(ResBlockNetwork(), 2, 1)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.zero_()
+        # second concatenation: layer 4 (4), then the first one: layer 2 (2), then the input (2)
+        network.head.weight[0, -2:] = torch.tensor([1.0, 1.0])
+        output = network(torch.tensor([[3.0, -2.0]]))
+    assert output.item() == pytest.approx(3.0 - 2.0 * 0.01 * 0.01)
+
+
+@pytest.mark.parametrize("config", NETWORKS, ids=repr)
+def test_mean_actions_are_bounded_and_start_in_the_middle(config: Network) -> None:
+    actor = GaussianActor(build_network(config, 16, 2), (0.2, 0.4))
+    observations = torch.randn(256, 16)
+    assert torch.allclose(actor(observations), torch.tensor([0.5, 0.0]), atol=0.05)
+    with torch.no_grad():
+        actor.network.head.weight.mul_(1e4)
+        mean = actor(observations)
+    assert mean[:, 0].min() >= 0.0
+    assert mean[:, 0].max() <= 1.0
+    assert mean[:, 1].min() >= -1.0
+    assert mean[:, 1].max() <= 1.0
+
+
+@pytest.mark.parametrize("rows", [48, 7])
+@pytest.mark.parametrize("config", NETWORKS, ids=repr)
+def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> None:
+    torch.manual_seed(0)
+    network = build_network(config, 16, 3).double()
+    flat = FlatAdam([network], 1e-3)
+    inputs, by_output = torch.randn(rows, 16).double(), torch.randn(rows, 3).double()
+
+    outputs = network(inputs)
+    outputs.backward(by_output)
+    expected = flat.gradients.clone()
+
+    flat.gradients.fill_(float("nan"))  # whatever was there is overwritten
+    passes = backward_of(network, 48)
+    with torch.no_grad():
+        assert torch.allclose(passes.forward(inputs), outputs, rtol=0, atol=1e-13)
+        passes.backward(by_output)
+    assert torch.allclose(flat.gradients, expected, rtol=0, atol=1e-12)

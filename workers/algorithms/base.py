@@ -1,0 +1,75 @@
+"""What every algorithm offers the training loop."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray[np.generic]]
+
+
+class Algorithm(Protocol):
+    """Acts, remembers, updates; `workers.trainer` is the loop around it.
+
+    Attributes:
+        robots: how many it drives side by side.
+        steps_per_update: steps of each robot between two updates.
+    """
+
+    robots: int
+    steps_per_update: int
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Exploring actions (robots, 2) for observations (robots, size)."""
+
+    def record(
+        self,
+        observations: NDArray[np.float32],
+        rewards: NDArray[np.float32],
+        terminations: NDArray[np.bool_],
+        truncations: NDArray[np.bool_],
+        final_observations: NDArray[np.float32],
+    ) -> None:
+        """What followed the actions of the last `act`.
+
+        Args:
+            observations: (robots, size), of the next episode where one ended in this step.
+            rewards: (robots,).
+            terminations: (robots,), ended for good: nothing followed.
+            truncations: (robots,), cut by the step limit: the value of what would have followed counts.
+            final_observations: (robots, size), valid where an episode ended: the last observation of that episode.
+        """
+
+    def update(self, progress: float) -> dict[str, float]:
+        """Learns from what was recorded.
+
+        Args:
+            progress: part of the training that is done, 0 to 1, for schedules.
+
+        Returns:
+            Diagnostics under the project's metric names.
+        """
+
+    @property
+    def finite(self) -> bool:
+        """Whether every weight is a finite number."""
+
+    def policy_weights(self) -> dict[str, NDArray[np.float32]]:
+        """A copy of the deterministic policy's weights, under the names that the archive documents."""
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """Everything that `load_state` needs to continue bit for bit."""
+
+    def load_state(self, state: Arrays) -> None:
+        """Continues where `state` was taken."""
+
+
+def with_prefix(prefix: str, arrays: Arrays) -> dict[str, NDArray[np.generic]]:
+    """The arrays under 'prefix/name'."""
+    return {f"{prefix}/{name}": array for name, array in arrays.items()}
+
+
+def without_prefix(prefix: str, arrays: Arrays) -> dict[str, NDArray[np.generic]]:
+    """Those arrays that stand under 'prefix/', without it: undoes `with_prefix`."""
+    return {name.removeprefix(f"{prefix}/"): array for name, array in arrays.items() if name.startswith(f"{prefix}/")}

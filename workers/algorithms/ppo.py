@@ -1,0 +1,170 @@
+"""Proximal Policy Optimization (Schulman et al. 2017), with the actor-critic losses of its section 5.
+
+Implementation details that matter (Huang et al. 2022, 'The 37 implementation details of PPO', by their numbers there):
+vectorised collection (1), Adam's learning rate annealed (4), generalised advantages (5), minibatches from a shuffled rollout
+(6), advantages normalised (7; here over the rollout), the clipped surrogate (8), gradient clipping (11; here for actor and
+critic each), returns scaled (continuous control, 3), state-independent deviation (2). Not used: value clipping (9), shared
+layers (14), orthogonal initialisation (2).
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from workers.algorithms.base import Arrays, with_prefix, without_prefix
+from workers.algorithms.flat_adam import FlatAdam
+from workers.algorithms.ppo_gradients import PpoGradients, WrittenPpo, entropy, log_prob
+from workers.algorithms.return_scaler import ReturnScaler
+from workers.algorithms.rollout import RolloutStorage, generalized_advantages
+from workers.config import PpoConfig
+from workers.layout import ACTION_SIZE
+from workers.networks import Body, GaussianActor, build_network
+
+# A deviation between 1.8 % and 270 % of the action's unit: beyond either, exploration is none or all.
+LOG_STD_RANGE = (-4.0, 1.0)
+
+_EPSILON = 1e-8
+
+
+class Ppo:
+    """PPO with a Gaussian actor and a separate critic.
+
+    Args:
+        config: hyperparameters.
+        actor: the policy, on `storage.device`.
+        critic: observations (n, size) to values (n, 1), on the same device.
+        storage: for one rollout of `config.rollout_steps` steps of `config.robots` robots.
+        generator: of exploration and of the order of minibatches, on the same device.
+        gradients: how a minibatch's gradients are computed; None is the fastest way that there is.
+    """
+
+    def __init__(
+        self,
+        config: PpoConfig,
+        actor: GaussianActor,
+        critic: Body,
+        storage: RolloutStorage,
+        generator: torch.Generator,
+        gradients: PpoGradients | None = None,
+    ) -> None:
+        self.config = config
+        self.actor, self.critic, self.storage = actor, critic, storage
+        self.robots, self.steps_per_update = config.robots, config.rollout_steps
+        self._generator = generator
+        self._optimizer = FlatAdam((actor, critic), config.learning_rate)
+        self._gradients = gradients or WrittenPpo(
+            actor, critic, config.clip_range, config.entropy_coefficient, config.minibatch_size
+        )
+        self._scaler = ReturnScaler(config.robots, config.gamma)
+
+    @torch.no_grad()
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """See `Algorithm.act`."""
+        storage, step = self.storage, self.storage.step
+        storage.observations[step] = torch.from_numpy(observations)
+        storage.noise[step].normal_(generator=self._generator)
+        mean = self.actor(storage.observations[step])
+        torch.addcmul(mean, storage.noise[step], torch.exp(self.actor.log_std), out=storage.actions[step])
+        actions: NDArray[np.float32] = storage.actions[step].cpu().numpy()
+        return actions
+
+    def record(
+        self,
+        observations: NDArray[np.float32],
+        rewards: NDArray[np.float32],
+        terminations: NDArray[np.bool_],
+        truncations: NDArray[np.bool_],
+        final_observations: NDArray[np.float32],
+    ) -> None:
+        """See `Algorithm.record`."""
+        self.storage.add_outcome(rewards, terminations, truncations, final_observations)
+        if self.storage.full:
+            self.storage.observations[-1] = torch.from_numpy(observations)
+
+    @torch.no_grad()
+    def update(self, progress: float) -> dict[str, float]:
+        """See `Algorithm.update`; needs a full rollout."""
+        config, storage = self.config, self.storage
+        if config.learning_rate_schedule == "linear":
+            self._optimizer.learning_rate = config.learning_rate * (1.0 - progress)
+
+        values, advantages = self._estimate()
+        returns = advantages + values[:-1]
+        explained_variance = 1.0 - (advantages.var() / (returns.var() + _EPSILON)).item()
+        normalised = (advantages - advantages.mean()) / (advantages.std() + _EPSILON)
+        log_probs = log_prob(storage.noise, self.actor.log_std)
+
+        totals, minibatches = torch.zeros(4, device=storage.device), 0
+        for _ in range(config.epochs):
+            for batch in storage.minibatches(log_probs, normalised, returns, config.minibatch_size, self._generator):
+                totals += self._gradients(batch)
+                self._optimizer.clip_gradients(config.max_grad_norm)
+                self._optimizer.step()
+                self.actor.log_std.clamp_(*LOG_STD_RANGE)
+                minibatches += 1
+        storage.clear()
+
+        policy_loss, value_loss, kl, clip_fraction = (totals / minibatches).tolist()
+        std_linear, std_angular = self.actor.log_std.exp().tolist()
+        return {
+            "loss/policy": policy_loss,
+            "loss/value": value_loss,
+            "policy/kl": kl,
+            "policy/entropy": entropy(self.actor.log_std).item(),
+            "policy/clip_fraction": clip_fraction,
+            "policy/std_linear": std_linear,
+            "policy/std_angular": std_angular,
+            "value/explained_variance": explained_variance,
+            "optim/learning_rate": self._optimizer.learning_rate,
+        }
+
+    def _estimate(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Values (steps + 1, robots) and advantages (steps, robots) of the rollout, in scaled rewards."""
+        config, storage = self.config, self.storage
+        if config.scale_returns:
+            self._scaler.update(storage.rewards, storage.ends)
+        scale = self._scaler.scale if config.scale_returns else 1.0
+        rewards = storage.rewards * np.float32(scale)
+        steps, robots, final_observations = storage.truncations()
+        if steps.size:
+            rewards[steps, robots] += np.float32(config.gamma) * self.critic(final_observations)[:, 0].cpu().numpy()
+        values = self.critic(storage.observations.flatten(0, 1)).view(storage.steps + 1, storage.robots)
+        advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.ends, config.gamma, config.gae_lambda)
+        return values, torch.from_numpy(advantages).to(storage.device)
+
+    @property
+    def finite(self) -> bool:
+        """See `Algorithm.finite`."""
+        return self._optimizer.finite
+
+    def policy_weights(self) -> dict[str, NDArray[np.float32]]:
+        """See `Algorithm.policy_weights`."""
+        return {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.network.state_dict().items()}
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """See `Algorithm.state`; only between an update and the next `act`."""
+        return {
+            **with_prefix("optimizer", self._optimizer.state()),
+            **with_prefix("scaler", self._scaler.state()),
+            "generator": self._generator.get_state().numpy().copy(),
+        }
+
+    def load_state(self, state: Arrays) -> None:
+        """See `Algorithm.load_state`."""
+        self._optimizer.load_state(without_prefix("optimizer", state))
+        self._scaler.load_state(without_prefix("scaler", state))
+        self._generator.set_state(torch.from_numpy(np.array(state["generator"], np.uint8)))
+        self.storage.clear()
+
+
+def build_ppo(config: PpoConfig, observation_size: int, seed: int, device: torch.device) -> Ppo:
+    """PPO with freshly initialised networks; the same seed gives the same weights on every device."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        actor = GaussianActor(
+            build_network(config.network, observation_size, ACTION_SIZE),
+            (config.initial_std_linear, config.initial_std_angular),
+        ).to(device)
+        critic = build_network(config.network, observation_size, 1).to(device)
+    storage = RolloutStorage(config.rollout_steps, config.robots, observation_size, device)
+    return Ppo(config, actor, critic, storage, torch.Generator(device).manual_seed(seed))

@@ -1,0 +1,86 @@
+"""The manifest of a checkpoint archive: all that a stranger needs to run the policy (pydantic only)."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from sim.config import Frozen
+from workers.config import TrainingConfig
+
+MANIFEST = "manifest.json"
+POLICY = "policy.safetensors"
+STATE_ARRAYS = "state.safetensors"
+STATE_COUNTERS = "state.json"
+
+
+class Number(Frozen):
+    """One number of an observation or an action.
+
+    Attributes:
+        index: its place in the vector.
+        name: short and unique in the vector.
+        meaning: how it is computed from physical quantities, or what it commands.
+        low, high: its range.
+    """
+
+    index: int
+    name: str
+    meaning: str
+    low: float
+    high: float
+
+
+class NetworkLayout(Frozen):
+    """How the policy's arrays make actions.
+
+    Attributes:
+        name: `mlp` or `resblock`.
+        layers: prefixes of the arrays 'prefix.weight' (outputs, inputs) and 'prefix.bias' (outputs,), in order.
+        activation: applied to hidden layers.
+        formula: the whole computation, with x the observation, 'layer(x)' = weight @ x + bias.
+    """
+
+    name: Literal["mlp", "resblock"]
+    layers: tuple[str, ...]
+    activation: Literal["relu", "tanh", "leaky_relu"]
+    formula: tuple[str, ...]
+
+
+class FileEntry(Frozen):
+    """A file of the archive."""
+
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    size: int = Field(ge=0)
+
+
+class EvaluationSummary(Frozen):
+    """How this policy did on its suite."""
+
+    suite: str
+    suite_hash: str
+    episodes: int
+    arrivals: int
+
+
+class Manifest(Frozen):
+    """`manifest.json`."""
+
+    format: Literal["mapless-policy"] = "mapless-policy"
+    version: Literal[1] = 1
+    training: TrainingConfig
+    seed: int
+    step: int = Field(ge=0)
+    observation: tuple[Number, ...]
+    action: tuple[Number, ...]
+    network: NetworkLayout
+    evaluation: EvaluationSummary | None
+    versions: dict[str, str]
+    files: dict[str, FileEntry]
+
+
+class TrainingCounters(Frozen):
+    """`state.json`: where a training stands, beside its arrays."""
+
+    step: int = Field(ge=0)
+    updates: int = Field(ge=0)
+    evaluations: int = Field(ge=0)
