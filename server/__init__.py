@@ -1,0 +1,1 @@
+"""The service: API, database, scheduling of runs, live view, statistics."""

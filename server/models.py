@@ -6,6 +6,8 @@ from typing import Any, Literal
 from sqlalchemy import JSON, BigInteger, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
+from workers.reporting import EventLevel
+
 RunState = Literal["queued", "running", "stopping", "stopped", "completed", "failed"]
 
 
@@ -40,7 +42,7 @@ class Run(Base):
     id: Mapped[str] = mapped_column(String(16), primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), index=True)
     seed: Mapped[int] = mapped_column(BigInteger)
-    state: Mapped[str] = mapped_column(String(12), default="queued")
+    state: Mapped[RunState] = mapped_column(String(12), default="queued")
     attempt: Mapped[int] = mapped_column(Integer, default=0)
     lease_until: Mapped[float | None] = mapped_column(Float)
     worker: Mapped[str | None] = mapped_column(String(120))
@@ -66,7 +68,7 @@ class RunEvent(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), index=True)
     at: Mapped[float] = mapped_column(Float, default=time.time)
     step: Mapped[int] = mapped_column(BigInteger, default=0)
-    level: Mapped[str] = mapped_column(String(8))
+    level: Mapped[EventLevel] = mapped_column(String(8))
     message: Mapped[str] = mapped_column(Text)
 
 
@@ -79,7 +81,7 @@ class MetricRow(Base):
     seq: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
     step: Mapped[int] = mapped_column(BigInteger)
     wall_time: Mapped[float] = mapped_column(Float)
-    values: Mapped[dict[str, float]] = mapped_column(JSON)
+    values: Mapped[dict[str, float | None]] = mapped_column(JSON)
 
 
 class MetricChunk(Base):
@@ -131,6 +133,9 @@ class Evaluation(Base):
     created_at: Mapped[float] = mapped_column(Float, default=time.time)
     episode_count: Mapped[int] = mapped_column(Integer)
     arrivals: Mapped[int] = mapped_column(Integer)
+    # Of the episodes that arrived; null where none did.
+    steps_mean: Mapped[float | None] = mapped_column(Float)
+    reward_mean: Mapped[float] = mapped_column(Float)
     episodes: Mapped[bytes] = mapped_column(LargeBinary)
 
 

@@ -19,7 +19,14 @@ ObservationName = Literal["paper", "improved"]
 class Frozen(BaseModel):
     """Base of every configuration model: immutable, and an unknown key is an error rather than ignored."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        validate_default=True,
+        allow_inf_nan=False,
+        # What is read back is always complete, and the generated types say so.
+        json_schema_serialization_defaults_required=True,
+    )
 
 
 class ArenaConfig(Frozen):

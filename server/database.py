@@ -1,0 +1,81 @@
+"""The database: one engine, and the two kinds of transaction that everything goes through.
+
+SQLite runs in WAL mode, where readers and the one writer don't wait for one another. A transaction that means to write
+takes the write lock at its start (BEGIN IMMEDIATE): one that started as a reader could only fail when it upgrades, where
+this one waits.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from sqlite3 import Connection as SqliteConnection
+
+from sqlalchemy import Connection, create_engine, event, make_url, text
+from sqlalchemy.engine import Engine
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import ConnectionPoolEntry
+
+# How long a writer waits for another one; a transaction of ours takes milliseconds.
+_BUSY_TIMEOUT_MS = 10_000
+# FastAPI runs synchronous endpoints on up to 40 threads.
+_POOL_SIZE = 10
+_POOL_OVERFLOW = 40
+
+_READ_ONLY = "mapless_read_only"
+
+
+class Database:
+    """An engine with its transactions. Thread-safe; sessions are not, and live within one `read` or `write`."""
+
+    def __init__(self, url: str) -> None:
+        self.engine = _create_engine(url)
+        self._read_engine = self.engine.execution_options(**{_READ_ONLY: True, "postgresql_readonly": True})
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A consistent view that can't write: an attempt to is an error of the database."""
+        with Session(self._read_engine, expire_on_commit=False, autoflush=False) as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A transaction that commits at the end of the block and rolls back if the block raises."""
+        with Session(self.engine, expire_on_commit=False) as session, session.begin():
+            yield session
+
+    def ping(self) -> None:
+        """Ask the database for an answer.
+
+        Raises:
+            sqlalchemy.exc.SQLAlchemyError: there is none.
+        """
+        with self.read() as session:
+            session.execute(text("SELECT 1"))
+
+    def dispose(self) -> None:
+        """Close every connection."""
+        self.engine.dispose()
+
+
+def _create_engine(url: str) -> Engine:
+    parsed = make_url(url)
+    if parsed.get_backend_name() != "sqlite":
+        return create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True)
+    if parsed.database:
+        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW)
+
+    @event.listens_for(engine, "connect")
+    def _configure(connection: SqliteConnection, _record: ConnectionPoolEntry) -> None:
+        # The driver would begin transactions by itself, deferred ones; _begin does it instead.
+        connection.isolation_level = None
+        for pragma in ("journal_mode=WAL", "synchronous=NORMAL", f"busy_timeout={_BUSY_TIMEOUT_MS}", "foreign_keys=ON"):
+            connection.execute(f"PRAGMA {pragma}")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        read_only = bool(connection.get_execution_options().get(_READ_ONLY))
+        connection.exec_driver_sql(f"PRAGMA query_only={int(read_only)}")
+        connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
+
+    return engine

@@ -1,0 +1,84 @@
+"""The service's errors; each carries the HTTP status that it becomes and tells the reader what to do next.
+
+ServiceError                        500
+├── InvalidRequestError             400  the request makes no sense as a whole (a wrong Host header, say)
+├── UnauthorizedError               401  no valid token
+├── ForbiddenError                  403  a request from a foreign page, or a token without that right
+├── NotFoundError                   404  no such experiment, run, checkpoint
+├── ConflictError                   409  not in this state
+│   └── (server.runs.states.TransitionError)
+├── TooLargeError                   413  a body over its cap
+├── CorruptUploadError              422  the bytes are not what their checksum says
+└── TooManyAttemptsError            429  too many wrong tokens
+"""
+
+from pydantic import BaseModel
+
+
+class ErrorBody(BaseModel):
+    """The body of every error but 422 of a form, which lists its fields as FastAPI does."""
+
+    detail: str
+
+
+class ServiceError(Exception):
+    """Base of everything that the service refuses; `status` is its HTTP status."""
+
+    status = 500
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+
+class InvalidRequestError(ServiceError):
+    """The request makes no sense as a whole."""
+
+    status = 400
+
+
+class UnauthorizedError(ServiceError):
+    """No token, or a wrong one."""
+
+    status = 401
+
+
+class ForbiddenError(ServiceError):
+    """The request comes from a foreign page, or its token lacks the right."""
+
+    status = 403
+
+
+class NotFoundError(ServiceError):
+    """There is no such thing (any more)."""
+
+    status = 404
+
+    @classmethod
+    def of(cls, kind: str, identifier: str) -> "NotFoundError":
+        """The usual sentence for `kind` (experiment, run, checkpoint) and its id."""
+        return cls(f"There is no {kind} {identifier}; it may have been deleted.")
+
+
+class ConflictError(ServiceError):
+    """The thing exists, but not in a state that allows this."""
+
+    status = 409
+
+
+class TooLargeError(ServiceError):
+    """A body over its cap."""
+
+    status = 413
+
+
+class CorruptUploadError(ServiceError):
+    """The bytes that arrived are not what their checksum says."""
+
+    status = 422
+
+
+class TooManyAttemptsError(ServiceError):
+    """Too many wrong tokens from one address."""
+
+    status = 429

@@ -1,0 +1,21 @@
+"""What several domains say in JSON: the base of every message, and a number with its uncertainty."""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Schema(BaseModel):
+    """Base of the API's messages: immutable, unknown keys refused, complete when read."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, json_schema_serialization_defaults_required=True
+    )
+
+
+class Estimate(Schema):
+    """A measured number, its 95 % interval, and what stands behind it."""
+
+    value: float
+    low: float = Field(description="Lower end of the 95 % interval.")
+    high: float = Field(description="Upper end of the 95 % interval.")
+    seeds: int = Field(ge=1, description="Runs that it is measured over.")
+    episodes: int = Field(ge=1, description="Episodes of all those runs together.")

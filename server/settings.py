@@ -1,0 +1,99 @@
+"""What the service is told from outside: environment variables with the prefix MAPLESS_."""
+
+import ipaddress
+from pathlib import Path
+from typing import Self
+
+from pydantic import Field, SecretStr, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+PROJECT_ROOT = Path(__file__).resolve().parent.parent
+
+# A token that an attacker on the network may guess at needs at least this many characters.
+_MIN_NETWORK_TOKEN = 16
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server bound to `host`."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Settings(BaseSettings):
+    """Where the service keeps its data and how it is reached.
+
+    The defaults are the embedded mode: SQLite, a broker in a file, checkpoints in a directory, reachable from this machine
+    only.
+
+    Raises:
+        pydantic.ValidationError: a value is out of range, or the server would be reachable from the network without a token.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="MAPLESS_", frozen=True, extra="ignore", env_ignore_empty=True)
+
+    data_dir: Path = Field(
+        Path("data"), description="Everything that the service keeps, where the URLs below don't say otherwise."
+    )
+    database_url: str | None = Field(None, description="SQLAlchemy URL; SQLite in the data directory if not given.")
+    broker_url: str | None = Field(None, description="Celery broker URL; a SQLite file in the data directory if not given.")
+    files_url: str | None = Field(
+        None, description="Directory or fsspec URL of the checkpoints; in the data directory if not given."
+    )
+
+    host: str = Field("127.0.0.1", description="Address to bind.")
+    port: int = Field(8400, ge=0, le=65_535, description="Port to bind; 0 takes a free one.")
+    server_url: str | None = Field(None, description="How workers reach the server, if not at its own host and port.")
+    allowed_hosts: tuple[str, ...] = Field(
+        (), description="More names under which browsers may reach the server (JSON list)."
+    )
+
+    token: SecretStr | None = Field(None, description="Login token; generated and kept in the data directory if not given.")
+    worker_token: SecretStr | None = Field(None, description="The workers' token; generated likewise.")
+
+    workers: int | None = Field(
+        None, ge=0, le=256, description="Local worker processes of `mapless up`; one a core if not given."
+    )
+    lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run.")
+    web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
+    max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
+    max_body_bytes: int = Field(4 * 2**20, gt=0, description="Largest body of any other request.")
+
+    @model_validator(mode="after")
+    def _closed_on_a_network(self) -> Self:
+        if is_loopback(self.host):
+            return self
+        if self.token is None:
+            raise ValueError(
+                f"refusing to listen on {self.host} without a login token: set MAPLESS_TOKEN (for example to the output of "
+                "`openssl rand -hex 24`), or bind 127.0.0.1"
+            )
+        if len(self.token.get_secret_value()) < _MIN_NETWORK_TOKEN:
+            raise ValueError(f"MAPLESS_TOKEN must have at least {_MIN_NETWORK_TOKEN} characters to listen on {self.host}")
+        return self
+
+    @property
+    def resolved_database_url(self) -> str:
+        """SQLAlchemy URL of the database."""
+        return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'mapless.db'}"
+
+    @property
+    def resolved_broker_url(self) -> str:
+        """Celery URL of the broker."""
+        return self.broker_url or f"sqla+sqlite:///{self.data_dir.resolve() / 'broker.db'}"
+
+    @property
+    def resolved_files_url(self) -> str:
+        """Directory or fsspec URL of the checkpoints."""
+        return self.files_url or str(self.data_dir.resolve() / "checkpoints")
+
+    @property
+    def resolved_server_url(self) -> str:
+        """Base URL for workers, without a trailing slash."""
+        if self.server_url:
+            return self.server_url.rstrip("/")
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}"
