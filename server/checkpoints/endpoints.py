@@ -1,0 +1,46 @@
+"""Routes of checkpoints."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from fastapi.responses import StreamingResponse
+
+from server.checkpoints.schemas import Checkpoint, Episodes
+from server.checkpoints.service import CheckpointService
+from server.problems import NOT_FOUND, Responses
+from server.services import ServicesDep
+
+router = APIRouter(tags=["checkpoints"])
+
+_ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}}
+
+
+def _service(services: ServicesDep) -> CheckpointService:
+    return CheckpointService(services)
+
+
+CheckpointServiceDep = Annotated[CheckpointService, Depends(_service)]
+
+
+@router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND)
+def list_checkpoints(run_id: str, service: CheckpointServiceDep) -> list[Checkpoint]:
+    """The run's checkpoints by step."""
+    return service.of_run(run_id)
+
+
+@router.get("/api/checkpoints/{checkpoint_id}/download", response_class=StreamingResponse, responses=NOT_FOUND | _ZIP)
+def download_checkpoint(checkpoint_id: str, service: CheckpointServiceDep) -> StreamingResponse:
+    """The archive: weights as safetensors, manifest as JSON, and the state to resume."""
+    download = service.download(checkpoint_id)
+    headers = {
+        "Content-Disposition": f'attachment; filename="{download.file_name}"',
+        "Content-Length": str(download.size),
+        "ETag": f'"{download.sha256}"',
+    }
+    return StreamingResponse(download.blocks, media_type="application/zip", headers=headers)
+
+
+@router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND)
+def list_episodes(checkpoint_id: str, service: CheckpointServiceDep) -> Episodes:
+    """Every episode behind the checkpoint's figures."""
+    return service.episodes(checkpoint_id)

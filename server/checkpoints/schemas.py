@@ -1,0 +1,39 @@
+"""Checkpoints and their evaluations in JSON."""
+
+from pydantic import Field
+
+from server.schemas import Estimate, Schema
+from workers.reporting import EpisodeResult
+
+
+class Evaluation(Schema):
+    """A checkpoint on a suite."""
+
+    suite: str
+    suite_hash: str = Field(description="Only evaluations of the same hash may be compared.")
+    episodes: int
+    arrivals: int
+    success: Estimate = Field(description="Arrivals over episodes, with its Wilson interval.")
+    steps_mean: float | None = Field(description="Control steps to the target, over the episodes that arrived.")
+    reward_mean: float = Field(description="Summed reward of an episode.")
+
+
+class Checkpoint(Schema):
+    """A policy at a step of a run."""
+
+    id: str
+    step: int
+    size: int = Field(description="Bytes of the archive.")
+    sha256: str
+    created_at: float
+    best: bool = Field(description="Highest success rate of the run; of equal ones, fewest steps to the target.")
+    evaluation: Evaluation | None
+
+
+class Episodes(Schema):
+    """Every episode of a checkpoint's evaluation, in the suite's order."""
+
+    checkpoint_id: str
+    suite: str
+    suite_hash: str
+    episodes: tuple[EpisodeResult, ...]

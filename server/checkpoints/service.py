@@ -1,0 +1,76 @@
+"""What a person may do with checkpoints."""
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from server.checkpoints import views
+from server.checkpoints.repository import CheckpointRepository, decode_episodes
+from server.checkpoints.schemas import Checkpoint, Episodes
+from server.runs.repository import RunRepository
+from server.services import Services
+
+_MAX_SLUG = 60
+
+
+@dataclass(frozen=True)
+class Download:
+    """An archive on its way out: bytes, how many, and under what name to save them."""
+
+    file_name: str
+    size: int
+    sha256: str
+    blocks: Iterator[bytes]
+
+
+class CheckpointService:
+    """Lists checkpoints, their episodes, and hands out archives."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+
+    def of_run(self, run_id: str) -> list[Checkpoint]:
+        """The run's checkpoints by step.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._services.database.read() as session:
+            RunRepository(session).get(run_id)
+            return views.checkpoint_views(CheckpointRepository(session).of_run(run_id))
+
+    def episodes(self, checkpoint_id: str) -> Episodes:
+        """Every episode behind the checkpoint's figures.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or it was not evaluated.
+        """
+        with self._services.database.read() as session:
+            repository = CheckpointRepository(session)
+            repository.get(checkpoint_id)
+            evaluation = repository.evaluation(checkpoint_id)
+            return Episodes(
+                checkpoint_id=checkpoint_id,
+                suite=evaluation.suite,
+                suite_hash=evaluation.suite_hash,
+                episodes=decode_episodes(evaluation),
+            )
+
+    def download(self, checkpoint_id: str) -> Download:
+        """The archive.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or its file is gone.
+        """
+        with self._services.database.read() as session:
+            checkpoint = CheckpointRepository(session).get(checkpoint_id)
+            run = RunRepository(session).get(checkpoint.run_id)
+            file_name = f"mapless-{_slug(run.experiment.name)}-seed{run.seed}-step{checkpoint.step}.zip"
+        return Download(file_name, checkpoint.size, checkpoint.sha256, self._services.files.read(checkpoint_id))
+
+
+def _slug(name: str) -> str:
+    """The name in characters that every file system takes."""
+    ascii_name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return re.sub(r"[^a-z0-9]+", "-", ascii_name.lower()).strip("-")[:_MAX_SLUG] or "experiment"

@@ -1,0 +1,178 @@
+"""Metrics in SQL: rows as they come, compacted into chunks, and the newest value of each series beside them."""
+
+import math
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import Session
+
+from server import models
+from server.metrics.points import Points
+
+# Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
+COMPACT_AFTER = 500
+# Points of a full chunk; a smaller one is grown by the next compaction.
+_CHUNK_POINTS = 4_096
+# Rows in one INSERT; SQLite takes at most 32,766 parameters.
+_INSERT_ROWS = 1_000
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedRow:
+    """Metrics of one step as a worker numbered them: `seq` grows by one from message to message, over all attempts."""
+
+    seq: int
+    step: int
+    wall_time: float
+    values: Mapping[str, float]
+
+
+class MetricRepository:
+    """Reads and writes metrics within the caller's transaction, so that they are committed with what belongs to them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        backend = session.get_bind().dialect.name
+        # Both databases know ON CONFLICT; SQLAlchemy has it in each one's own insert.
+        self._insert = postgresql.insert if backend == "postgresql" else sqlite.insert
+
+    def append_rows(self, run_id: str, rows: Sequence[ReportedRow]) -> None:
+        """Add rows that came in order; those that are there already, as rows or in chunks (seq <= `last_seq`), are skipped.
+
+        `Run.last_seq` is left to the caller, who moves it in the same transaction once everything numbered so far is stored.
+        """
+        last_seq = self._session.scalar(select(models.Run.last_seq).where(models.Run.id == run_id)) or 0
+        fresh = [row for row in rows if row.seq > last_seq and row.values]
+        if not fresh:
+            return
+        for start in range(0, len(fresh), _INSERT_ROWS):
+            self._session.execute(
+                self._insert(models.MetricRow).on_conflict_do_nothing(),
+                [
+                    {
+                        "run_id": run_id,
+                        "seq": row.seq,
+                        "step": row.step,
+                        "wall_time": row.wall_time,
+                        "values": {name: value if math.isfinite(value) else None for name, value in row.values.items()},
+                    }
+                    for row in fresh[start : start + _INSERT_ROWS]
+                ],
+            )
+        newest = {name: (row.step, value) for row in fresh for name, value in row.values.items() if math.isfinite(value)}
+        self._set_latest(run_id, newest)
+
+    def needs_compaction(self, run_id: str) -> bool:
+        """Whether enough rows wait."""
+        return self._count_rows(run_id) >= COMPACT_AFTER
+
+    def compact(self, run_id: str) -> None:
+        """Move the run's rows into chunks."""
+        rows = self._rows(run_id)
+        fresh = _series(rows)
+        for name, points in fresh.items():
+            last = self._last_chunk(run_id, name)
+            # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
+            if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
+                points = Points.joined([_decode(last), points])
+                self._session.delete(last)
+                self._session.flush()
+            self._add_chunks(run_id, name, points)
+        self._session.execute(delete(models.MetricRow).where(models.MetricRow.run_id == run_id))
+        self._session.flush()
+
+    def drop_beyond(self, run_id: str, step: int) -> None:
+        """Forget every point after `step`: what a lost attempt did after the checkpoint from which the next one resumes."""
+        self._session.execute(
+            delete(models.MetricRow).where(models.MetricRow.run_id == run_id, models.MetricRow.step > step)
+        )
+        self._session.execute(
+            delete(models.MetricChunk).where(models.MetricChunk.run_id == run_id, models.MetricChunk.first_step > step)
+        )
+        straddling = select(models.MetricChunk).where(
+            models.MetricChunk.run_id == run_id, models.MetricChunk.last_step > step
+        )
+        for chunk in self._session.scalars(straddling).all():
+            points = _decode(chunk)
+            kept = points[: int((points.steps <= step).sum())]
+            chunk.last_step, chunk.count, chunk.points = int(kept.steps[-1]), len(kept), kept.encode()
+        self._session.flush()
+        self._session.execute(
+            delete(models.LatestMetric).where(models.LatestMetric.run_id == run_id, models.LatestMetric.step > step)
+        )
+        known = self._session.scalars(select(models.LatestMetric.name).where(models.LatestMetric.run_id == run_id)).all()
+        newest = {}
+        for name, points in self.read(run_id).items():
+            finite = [i for i in range(len(points) - 1, -1, -1) if math.isfinite(points.values[i])][:1]
+            if name not in known and finite:
+                newest[name] = (int(points.steps[finite[0]]), float(points.values[finite[0]]))
+        self._set_latest(run_id, newest)
+
+    def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
+        """The run's series by name, all or those of `names` that it has."""
+        query = select(models.MetricChunk).where(models.MetricChunk.run_id == run_id).order_by(models.MetricChunk.first_step)
+        if names is not None:
+            query = query.where(models.MetricChunk.name.in_(names))
+        parts: dict[str, list[Points]] = defaultdict(list)
+        for chunk in self._session.scalars(query):
+            parts[chunk.name].append(_decode(chunk))
+        for name, points in _series(self._rows(run_id)).items():
+            if names is None or name in names:
+                parts[name].append(points)
+        return {name: Points.joined(parts[name]) for name in sorted(parts)}
+
+    def _rows(self, run_id: str) -> Sequence[models.MetricRow]:
+        query = select(models.MetricRow).where(models.MetricRow.run_id == run_id).order_by(models.MetricRow.seq)
+        return self._session.scalars(query).all()
+
+    def _count_rows(self, run_id: str) -> int:
+        query = select(func.count()).select_from(models.MetricRow).where(models.MetricRow.run_id == run_id)
+        return self._session.scalar(query) or 0
+
+    def _last_chunk(self, run_id: str, name: str) -> models.MetricChunk | None:
+        query = select(models.MetricChunk).where(models.MetricChunk.run_id == run_id, models.MetricChunk.name == name)
+        return self._session.scalars(query.order_by(models.MetricChunk.first_step.desc()).limit(1)).first()
+
+    def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
+        for start in range(0, len(points), _CHUNK_POINTS):
+            part = points[start : start + _CHUNK_POINTS]
+            self._session.add(
+                models.MetricChunk(
+                    run_id=run_id,
+                    name=name,
+                    first_step=int(part.steps[0]),
+                    last_step=int(part.steps[-1]),
+                    count=len(part),
+                    points=part.encode(),
+                )
+            )
+
+    def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
+        if not newest:
+            return
+        insert = self._insert(models.LatestMetric)
+        self._session.execute(
+            insert.on_conflict_do_update(
+                index_elements=["run_id", "name"], set_={"step": insert.excluded.step, "value": insert.excluded.value}
+            ),
+            [{"run_id": run_id, "name": name, "step": step, "value": value} for name, (step, value) in newest.items()],
+        )
+
+
+def _decode(chunk: models.MetricChunk) -> Points:
+    return Points.decode(chunk.points, chunk.count)
+
+
+def _series(rows: Sequence[models.MetricRow]) -> dict[str, Points]:
+    """Rows in order as one series a name."""
+    columns: dict[str, tuple[list[int], list[float], list[float | None]]] = defaultdict(lambda: ([], [], []))
+    for row in rows:
+        for name, value in row.values.items():
+            steps, times, values = columns[name]
+            steps.append(row.step)
+            times.append(row.wall_time)
+            values.append(value)
+    return {name: Points.of(*column) for name, column in columns.items()}
