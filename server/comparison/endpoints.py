@@ -1,0 +1,33 @@
+"""Routes of the comparison."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from server.comparison.schemas import Comparison, Curves
+from server.comparison.service import ComparisonService
+from server.problems import NOT_FOUND
+from server.services import ServicesDep
+
+router = APIRouter(prefix="/api/compare", tags=["comparison"])
+
+ExperimentIds = Annotated[
+    list[str], Query(alias="experiment", min_length=1, max_length=20, description="Ids of the experiments, in order.")
+]
+
+
+@router.get("", responses=NOT_FOUND)
+def compare(experiment_ids: ExperimentIds, services: ServicesDep) -> Comparison:
+    """Final figures side by side, with intervals, and what differs in the configurations."""
+    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)))
+
+
+@router.get("/curves", responses=NOT_FOUND)
+def compare_curves(
+    experiment_ids: ExperimentIds,
+    services: ServicesDep,
+    name: Annotated[str, Query(max_length=64, description="Of the metric.")] = "eval/success_rate",
+    points: Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")] = 400,
+) -> Curves:
+    """One metric of every run on one grid, and each experiment's mean, interquartile mean and interval."""
+    return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points)

@@ -1,0 +1,1 @@
+"""What has changed, told as it happens."""

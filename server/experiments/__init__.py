@@ -1,0 +1,1 @@
+"""One configuration x several seeds: launched, listed, stopped, resumed, deleted."""

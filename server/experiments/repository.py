@@ -1,0 +1,106 @@
+"""Experiments in SQL: lists with filter, search and pages; the state of an experiment from those of its runs."""
+
+from collections.abc import Collection, Sequence
+
+from sqlalchemy import ColumnElement, case, func, select
+from sqlalchemy.orm import Session, selectinload
+
+from server import models
+from server.errors import NotFoundError
+from server.experiments.schemas import ExperimentState
+from server.models import RunState
+
+# While any run is in one of these, that is what the experiment is; the first that applies.
+UNFINISHED: tuple[RunState, ...] = ("running", "stopping", "queued")
+
+
+def aggregate_state(states: Collection[RunState]) -> ExperimentState:
+    """The state of runs together: what is still going on, else how all ended, else `mixed`."""
+    for state in UNFINISHED:
+        if state in states:
+            return state
+    distinct = set(states)
+    return distinct.pop() if len(distinct) == 1 else "mixed"
+
+
+def _aggregate_state_sql() -> ColumnElement[str]:
+    """`aggregate_state` over the runs of a group."""
+    unfinished = [(func.sum(case((models.Run.state == state, 1), else_=0)) > 0, state) for state in UNFINISHED]
+    uniform = (func.min(models.Run.state) == func.max(models.Run.state), func.min(models.Run.state))
+    return case(*unfinished, uniform, else_="mixed")
+
+
+class ExperimentRepository:
+    """Reads and writes experiments within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def add(self, experiment: models.Experiment) -> None:
+        """Add an experiment with its runs."""
+        self._session.add(experiment)
+
+    def get(self, experiment_id: str) -> models.Experiment:
+        """The experiment with its runs.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        found = self.get_many([experiment_id])
+        return found[0]
+
+    def get_many(self, experiment_ids: Sequence[str]) -> list[models.Experiment]:
+        """The experiments with their runs, in the order asked for.
+
+        Raises:
+            NotFoundError: one of them is missing.
+        """
+        query = (
+            select(models.Experiment)
+            .where(models.Experiment.id.in_(experiment_ids))
+            .options(selectinload(models.Experiment.runs))
+        )
+        found = {experiment.id: experiment for experiment in self._session.scalars(query)}
+        for experiment_id in experiment_ids:
+            if experiment_id not in found:
+                raise NotFoundError.of("experiment", experiment_id)
+        return [found[experiment_id] for experiment_id in experiment_ids]
+
+    def lock_runs(self, experiment_id: str) -> Sequence[models.Run]:
+        """The experiment's runs, by seed, locked where the database has row locks.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+        """
+        query = select(models.Run).where(models.Run.experiment_id == experiment_id).order_by(models.Run.seed)
+        runs = self._session.scalars(query.with_for_update()).all()
+        if not runs:
+            raise NotFoundError.of("experiment", experiment_id)
+        return runs
+
+    def page(
+        self, *, query: str, state: ExperimentState | None, limit: int, offset: int
+    ) -> tuple[Sequence[models.Experiment], int]:
+        """Experiments whose name contains `query` (in any case) and that are in `state`, newest first; how many in all."""
+        wanted = select(models.Experiment.id)
+        if query:
+            wanted = wanted.where(func.lower(models.Experiment.name).contains(query.lower(), autoescape=True))
+        if state is not None:
+            in_state = (
+                select(models.Run.experiment_id).group_by(models.Run.experiment_id).having(_aggregate_state_sql() == state)
+            )
+            wanted = wanted.where(models.Experiment.id.in_(in_state))
+        total = self._session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
+        rows = (
+            select(models.Experiment)
+            .where(models.Experiment.id.in_(wanted))
+            .options(selectinload(models.Experiment.runs))
+            .order_by(models.Experiment.created_at.desc(), models.Experiment.id)
+            .limit(limit)
+            .offset(offset)
+        )
+        return self._session.scalars(rows).all(), total
+
+    def delete(self, experiment: models.Experiment) -> None:
+        """Remove the experiment with everything that hangs on it."""
+        self._session.delete(experiment)

@@ -1,0 +1,76 @@
+"""An experiment in JSON: what is sent to launch one, and what is read back."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StringConstraints, field_validator
+
+from server.models import RunState
+from server.runs.schemas import Run
+from server.schemas import Estimate, Schema
+from sim.config import Frozen
+from workers.config import TrainingConfig
+from workers.presets import Preset
+
+ExperimentState = RunState | Literal["mixed"]
+
+_MAX_SEEDS = 50
+_MAX_SEED = 2**31 - 1
+
+ExperimentName = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120)]
+Seed = Annotated[int, Field(ge=0, le=_MAX_SEED)]
+
+
+class ExperimentCreate(Frozen):
+    """One configuration, to be trained once with each seed."""
+
+    name: ExperimentName = Field("My first policy", title="Name", description="What you will know it by.")
+    seeds: tuple[Seed, ...] = Field(
+        (0,),
+        min_length=1,
+        max_length=_MAX_SEEDS,
+        title="Seeds",
+        description="One run each. One is enough to get a policy; five or more to claim anything about the configuration.",
+    )
+    training: TrainingConfig = Field(default_factory=TrainingConfig, title="Training")
+
+    @field_validator("seeds")
+    @classmethod
+    def _seeds_differ(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        if len(set(seeds)) < len(seeds):
+            raise ValueError("every seed may be there only once: two runs with the same seed are the same run")
+        return seeds
+
+
+class ExperimentPatch(Schema):
+    """What may be changed after launch."""
+
+    name: ExperimentName
+
+
+class Experiment(Schema):
+    """One configuration x several seeds."""
+
+    id: str
+    name: str
+    created_at: float
+    training: TrainingConfig
+    state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
+    runs: list[Run] = Field(description="One a seed, by seed.")
+    success: Estimate | None = Field(
+        description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."
+    )
+
+
+class ExperimentPage(Schema):
+    """Some of the experiments, the newest first."""
+
+    items: list[Experiment]
+    total: int = Field(description="How many there are on all pages.")
+
+
+class TrainingForm(Schema):
+    """Everything that the launch form is made of."""
+
+    form_schema: dict[str, Any] = Field(alias="schema", description="JSON schema of ExperimentCreate.")
+    defaults: ExperimentCreate
+    presets: list[Preset]

@@ -1,0 +1,146 @@
+"""What a person may do with an experiment."""
+
+from collections.abc import Sequence
+
+from sqlalchemy.orm import Session
+
+from server import models
+from server.checkpoints.repository import CheckpointRepository
+from server.checkpoints.views import success_over_runs
+from server.errors import ConflictError
+from server.events.bus import Change
+from server.experiments.repository import ExperimentRepository, aggregate_state
+from server.experiments.schemas import Experiment, ExperimentCreate, ExperimentPage, ExperimentPatch, ExperimentState
+from server.ids import new_id
+from server.runs import states
+from server.runs.repository import RunRepository
+from server.runs.service import RunService, resume_run, stop_run
+from server.runs.views import SHOWN, run_view
+from server.services import Services
+from workers.config import TrainingConfig
+
+
+class ExperimentService:
+    """Launches, reads, stops, resumes and deletes experiments."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._runs = RunService(services)
+
+    def create(self, request: ExperimentCreate) -> Experiment:
+        """Queue one run a seed, and wake workers for them."""
+        experiment = models.Experiment(id=new_id(), name=request.name, training=request.training.model_dump(mode="json"))
+        experiment.runs = [models.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
+        with self._services.database.write() as session:
+            ExperimentRepository(session).add(experiment)
+        for run in experiment.runs:
+            self._services.doorbell.ring(run.id, run.attempt)
+        self._publish(experiment.id, "experiment")
+        return self.get(experiment.id)
+
+    def get(self, experiment_id: str) -> Experiment:
+        """The experiment as it is now.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        with self._services.database.read() as session:
+            return _views(session, [ExperimentRepository(session).get(experiment_id)])[0]
+
+    def page(self, *, query: str, state: ExperimentState | None, limit: int, offset: int) -> ExperimentPage:
+        """Experiments whose name contains `query` and that are in `state`, the newest first."""
+        with self._services.database.read() as session:
+            found, total = ExperimentRepository(session).page(query=query.strip(), state=state, limit=limit, offset=offset)
+            return ExperimentPage(items=_views(session, found), total=total)
+
+    def rename(self, experiment_id: str, patch: ExperimentPatch) -> Experiment:
+        """Give the experiment another name.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        with self._services.database.write() as session:
+            ExperimentRepository(session).get(experiment_id).name = patch.name
+        self._publish(experiment_id, "experiment")
+        return self.get(experiment_id)
+
+    def stop(self, experiment_id: str) -> Experiment:
+        """Stop every run that has not ended.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+            ConflictError: all of its runs have ended.
+        """
+        with self._services.database.write() as session:
+            runs = [
+                run for run in ExperimentRepository(session).lock_runs(experiment_id) if states.allows(run.state, "stop")
+            ]
+            if not runs:
+                raise ConflictError("All runs of this experiment have ended already.")
+            for run in runs:
+                stop_run(session, run)
+        for run in runs:
+            self._runs.announce_stopped(run)
+        return self.get(experiment_id)
+
+    def resume(self, experiment_id: str) -> Experiment:
+        """Queue every run that was stopped or failed.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+            ConflictError: none of its runs was stopped or failed.
+        """
+        with self._services.database.write() as session:
+            runs = [
+                run for run in ExperimentRepository(session).lock_runs(experiment_id) if states.allows(run.state, "resume")
+            ]
+            if not runs:
+                raise ConflictError("No run of this experiment was stopped or has failed, so there is nothing to resume.")
+            for run in runs:
+                resume_run(session, run)
+        for run in runs:
+            self._runs.announce_queued(run)
+        return self.get(experiment_id)
+
+    def delete(self, experiment_id: str) -> None:
+        """Remove the experiment, its runs, curves, checkpoints and files. A worker that still trains one of them is cut off.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        with self._services.database.write() as session:
+            repository = ExperimentRepository(session)
+            experiment = repository.get(experiment_id)
+            run_ids = [run.id for run in experiment.runs]
+            checkpoint_ids = CheckpointRepository(session).ids(run_ids)
+            repository.delete(experiment)
+        # Rows first: a file without a row is swept away at the next start, a row without its file would be a lie.
+        for run_id in run_ids:
+            self._services.links.cut(run_id)
+        for checkpoint_id in checkpoint_ids:
+            self._services.files.delete(checkpoint_id)
+        self._publish(experiment_id, "deleted")
+
+    def _publish(self, experiment_id: str, kind: str) -> None:
+        self._services.bus.publish(Change.model_validate({"experiment_id": experiment_id, "run_id": None, "kind": kind}))
+
+
+def _views(session: Session, experiments: Sequence[models.Experiment]) -> list[Experiment]:
+    run_ids = [run.id for experiment in experiments for run in experiment.runs]
+    latest = RunRepository(session).latest_metrics(run_ids, SHOWN)
+    final = CheckpointRepository(session).final_evaluations(run_ids)
+    views = []
+    for experiment in experiments:
+        training = TrainingConfig.model_validate(experiment.training)
+        views.append(
+            Experiment(
+                id=experiment.id,
+                name=experiment.name,
+                created_at=experiment.created_at,
+                training=training,
+                state=aggregate_state([run.state for run in experiment.runs]),
+                runs=[run_view(run, training, latest.get(run.id, {})) for run in experiment.runs],
+                success=success_over_runs([final[run.id] for run in experiment.runs if run.id in final]),
+            )
+        )
+    return views

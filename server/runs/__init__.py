@@ -1,0 +1,1 @@
+"""One seed's training, and its life."""

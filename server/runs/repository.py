@@ -1,0 +1,63 @@
+"""Runs and what hangs on them, in SQL."""
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, joinedload
+
+from server import models
+from server.errors import NotFoundError
+from workers.reporting import EventLevel
+
+
+class RunRepository:
+    """Reads and writes runs within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def get(self, run_id: str, *, for_update: bool = False) -> models.Run:
+        """The run with its experiment; `for_update` locks the row where the database has row locks.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        query = select(models.Run).where(models.Run.id == run_id).options(joinedload(models.Run.experiment))
+        if for_update:
+            query = query.with_for_update(of=models.Run)
+        run = self._session.scalar(query)
+        if run is None:
+            raise NotFoundError.of("run", run_id)
+        return run
+
+    def latest_metrics(self, run_ids: Collection[str], names: Collection[str]) -> dict[str, dict[str, float]]:
+        """The newest value of each of `names`, by run and name; what a run never reported is absent."""
+        query = select(models.LatestMetric).where(
+            models.LatestMetric.run_id.in_(run_ids), models.LatestMetric.name.in_(names)
+        )
+        latest: dict[str, dict[str, float]] = defaultdict(dict)
+        for metric in self._session.scalars(query):
+            latest[metric.run_id][metric.name] = metric.value
+        return latest
+
+    def events(self, run_id: str) -> Sequence[models.RunEvent]:
+        """The run's event log, oldest first."""
+        query = select(models.RunEvent).where(models.RunEvent.run_id == run_id).order_by(models.RunEvent.id)
+        return self._session.scalars(query).all()
+
+    def add_event(self, run_id: str, level: EventLevel, message: str, step: int = 0) -> None:
+        """Append a line to the run's event log."""
+        self._session.add(models.RunEvent(run_id=run_id, level=level, message=message, step=step))
+
+    def count_by_state(self) -> dict[str, int]:
+        """How many runs are in each state; a state without any is absent."""
+        rows = self._session.execute(select(models.Run.state, func.count()).group_by(models.Run.state))
+        return {row[0]: row[1] for row in rows}
+
+    def trained_by(self, workers: Collection[str]) -> dict[str, str]:
+        """The run that each of `workers` trains now, by worker."""
+        query = select(models.Run.worker, models.Run.id).where(
+            models.Run.state.in_(("running", "stopping")), models.Run.worker.in_(workers)
+        )
+        return {worker: run_id for worker, run_id in self._session.execute(query) if worker is not None}

@@ -1,0 +1,43 @@
+"""A run's row as JSON shows it."""
+
+from collections.abc import Mapping
+
+from server import models
+from server.runs.schemas import Run, RunDetail
+from workers.config import TrainingConfig
+
+SPEED = "time/steps_per_second"
+TRAIN_SUCCESS = "train/success_rate"
+EVAL_SUCCESS = "eval/success_rate"
+# The metrics that a run's row shows.
+SHOWN = (SPEED, TRAIN_SUCCESS, EVAL_SUCCESS)
+
+
+def run_view(run: models.Run, training: TrainingConfig, latest: Mapping[str, float]) -> Run:
+    """The run in JSON; `latest` holds the newest value of each of `SHOWN` that there is."""
+    speed = latest.get(SPEED) if run.state == "running" else None
+    return Run(
+        id=run.id,
+        experiment_id=run.experiment_id,
+        seed=run.seed,
+        state=run.state,
+        attempt=run.attempt,
+        step=run.step,
+        total_steps=training.steps,
+        steps_per_second=speed,
+        seconds_left=max(0, training.steps - run.step) / speed if speed else None,
+        success_rate=latest.get(TRAIN_SUCCESS),
+        eval_success_rate=latest.get(EVAL_SUCCESS),
+        worker=run.worker,
+        error=run.error,
+        created_at=run.created_at,
+        started_at=run.started_at,
+        finished_at=run.finished_at,
+    )
+
+
+def run_detail(run: models.Run, latest: Mapping[str, float]) -> RunDetail:
+    """The run in JSON with what it trains."""
+    training = TrainingConfig.model_validate(run.experiment.training)
+    view = run_view(run, training, latest)
+    return RunDetail(**view.model_dump(), experiment_name=run.experiment.name, training=training)
