@@ -1,0 +1,115 @@
+"""The application: routes, what runs beside them, and who may come in."""
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+
+from fastapi import APIRouter, FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from server import (
+    pages,
+)
+from server.checkpoints import endpoints as checkpoints
+from server.checkpoints.repository import CheckpointRepository
+from server.comparison import endpoints as comparison
+from server.database import Database
+from server.events import endpoints as events
+from server.experiments import endpoints as experiments
+from server.files import FileStore
+from server.metrics import endpoints as metrics
+from server.migrate import upgrade
+from server.problems import UNAUTHORIZED, install_error_handler
+from server.runs import endpoints as runs
+from server.security import endpoints as login
+from server.security.access import AccessMiddleware
+from server.security.headers import SecurityHeadersMiddleware
+from server.security.secrets import load_secrets
+from server.services import Services
+from server.settings import Settings
+from server.system import endpoints as system
+from server.version import version
+
+# A new domain's routes go here.
+ROUTERS: tuple[APIRouter, ...] = (
+    system.router,
+    login.router,
+    experiments.router,
+    runs.router,
+    metrics.router,
+    checkpoints.router,
+    comparison.router,
+    events.router,
+)
+
+# What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
+# services that it is given (`services.doorbell`, `services.links`).
+Background = Callable[[Services], AbstractAsyncContextManager[None]]
+BACKGROUND: tuple[Background, ...] = ()
+
+
+def create_services(settings: Settings) -> Services:
+    """The parts of a service, its database brought up to date.
+
+    Raises:
+        OSError: the data directory can't be written.
+        sqlalchemy.exc.SQLAlchemyError: the database can't be reached.
+    """
+    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    secrets = load_secrets(settings)
+    database = Database(settings.resolved_database_url)
+    upgrade(database)
+    files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
+    return Services(settings=settings, secrets=secrets, database=database, files=files)
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application; its services are made here and let go of at the end of its lifespan.
+
+    Raises:
+        As `create_services`.
+    """
+    services = create_services(settings or Settings())
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        async with AsyncExitStack() as stack:
+            stack.callback(services.database.dispose)
+            stack.callback(services.bus.close)
+            await run_in_threadpool(_sweep_files, services)
+            for background in BACKGROUND:
+                await stack.enter_async_context(background(services))
+            yield
+
+    app = describe(lifespan)
+    app.state.services = services
+    pages.mount_pages(app, services.settings.web_dist)
+    # The last one added meets a request first.
+    app.add_middleware(
+        AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
+    )
+    app.add_middleware(SecurityHeadersMiddleware)
+    return app
+
+
+def describe(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]] | None = None) -> FastAPI:
+    """The application's routes without anything behind them: enough for its OpenAPI description."""
+    app = FastAPI(
+        title="Mapless",
+        version=version(),
+        lifespan=lifespan,
+        openapi_url="/api/openapi.json",
+        # Swagger's pages load scripts from elsewhere, which the content security policy forbids.
+        docs_url=None,
+        redoc_url=None,
+        responses=UNAUTHORIZED,
+    )
+    install_error_handler(app)
+    for router in ROUTERS:
+        app.include_router(router)
+    return app
+
+
+def _sweep_files(services: Services) -> None:
+    with services.database.read() as session:
+        known = CheckpointRepository(session).ids()
+    services.files.keep_only(known)

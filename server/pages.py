@@ -1,0 +1,51 @@
+"""The built pages: hashed assets that never change, and one page for every route of the application."""
+
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from fastapi.responses import FileResponse, HTMLResponse, Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from server.errors import NotFoundError
+
+_MISSING = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Mapless</title>
+<body style="font: 1rem/1.5 system-ui; max-width: 40rem; margin: 4rem auto; padding: 0 1rem">
+<h1>The pages have not been built</h1>
+<p>The service is running, but <code>web/dist</code> is not there. Run <code>make web</code> in the project's directory and
+reload this page. The API works meanwhile.</p></body></html>"""
+
+# Vite puts a hash of the content into the names below assets/.
+_FOREVER = "public, max-age=31536000, immutable"
+
+
+class _Assets(StaticFiles):
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = _FOREVER
+        return response
+
+
+def mount_pages(app: FastAPI, dist: Path) -> None:
+    """Serve `dist` beside the API; to be called last, since it answers every path that is left."""
+    app.mount("/assets", _Assets(directory=dist / "assets", check_dir=False), name="assets")
+
+    @app.get("/{path:path}", include_in_schema=False)
+    def page(path: str, request: Request) -> Response:
+        if path.startswith(("api/", "live/")):
+            raise NotFoundError(f"There is no route {request.url.path}.")
+        file = _file_within(dist, path)
+        if file is not None:
+            return FileResponse(file, headers={"Cache-Control": "no-cache"})
+        index = dist / "index.html"
+        if index.is_file():
+            return FileResponse(index, headers={"Cache-Control": "no-cache"})
+        return HTMLResponse(_MISSING, status_code=503)
+
+
+def _file_within(directory: Path, path: str) -> Path | None:
+    """The regular file at `path` below `directory`, links that lead out of it not followed; None if there is none."""
+    if not path or "\0" in path:
+        return None
+    file = (directory / path).resolve()
+    return file if file.is_relative_to(directory.resolve()) and file.is_file() else None

@@ -1,0 +1,144 @@
+"""Who may send a request: right Host, no foreign page, and a valid token; decided before anything else looks at it.
+
+- *Host* must be one of ours: a foreign name that resolves to this machine (DNS rebinding) is refused.
+- *Origin*, where a browser sends one with a request that changes something or opens a WebSocket, must be the page's own.
+- Everything under /api and /live needs the login token, as a cookie or as `Authorization: Bearer`; /api/worker needs the
+  workers' token instead, which opens nothing else. The pages themselves, /healthz and the login are open.
+"""
+
+import hmac
+import ipaddress
+from urllib.parse import urlsplit
+
+from starlette.datastructures import URL
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import RedirectResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from server.errors import ForbiddenError, InvalidRequestError, ServiceError, UnauthorizedError
+from server.problems import error_response
+from server.security.cookies import cookie_name, set_login_cookie
+from server.security.limits import LoginLimiter
+from server.security.secrets import Secrets
+from server.settings import Settings
+
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+_LOCAL_NAMES = frozenset({"localhost"})
+_WORKER_PREFIX = "/api/worker/"
+_PROTECTED_PREFIXES = ("/api/", "/live/")
+_OPEN_PATHS = frozenset({"/api/login"})
+# RFC 6455: the request violates the server's policy; browsers see the handshake refused with 403.
+_POLICY_VIOLATION = 1008
+
+
+class AccessMiddleware:
+    """Refuses what may not come in; the rest passes on unchanged."""
+
+    def __init__(self, app: ASGIApp, *, settings: Settings, secrets: Secrets, limiter: LoginLimiter) -> None:
+        self._app = app
+        self._settings = settings
+        self._secrets = secrets
+        self._limiter = limiter
+        names = {settings.host, *settings.allowed_hosts, *_LOCAL_NAMES}
+        if settings.server_url:
+            names.add(urlsplit(settings.server_url).hostname or "")
+        self._host_names = {name.lower() for name in names}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, or answer at once."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        try:
+            self._check_host(connection)
+            self._check_origin(connection)
+            if scope["type"] == "http" and "token" in connection.query_params and not _is_protected(scope["path"]):
+                await self._login_by_url(connection, scope, receive, send)
+                return
+            self._check_token(connection)
+        except ServiceError as error:
+            await _refuse(error, scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _check_host(self, connection: HTTPConnection) -> None:
+        try:
+            name = urlsplit(f"//{connection.headers.get('host', '')}").hostname or ""
+        except ValueError:
+            name = ""
+        if name in self._host_names or _is_address(name):
+            return
+        raise InvalidRequestError(
+            f"This server does not go by the name {name!r}. If it should, add it to MAPLESS_ALLOWED_HOSTS."
+        )
+
+    def _check_origin(self, connection: HTTPConnection) -> None:
+        changes = connection.scope["type"] == "websocket" or connection.scope["method"] not in _SAFE_METHODS
+        origin = connection.headers.get("origin")
+        # Browsers always send an Origin along; programs don't, and have no cookie that could be abused.
+        if not changes or origin is None:
+            return
+        if urlsplit(origin).netloc.lower() != connection.headers.get("host", "").lower():
+            raise ForbiddenError("This request comes from another site's page.")
+
+    def _check_token(self, connection: HTTPConnection) -> None:
+        path: str = connection.scope["path"]
+        if not _is_protected(path) or path in _OPEN_PATHS:
+            return
+        bearer = _bearer(connection)
+        if path.startswith(_WORKER_PREFIX):
+            if not _equal(bearer, self._secrets.worker_token):
+                raise UnauthorizedError("This needs the workers' token: set MAPLESS_WORKER_TOKEN to the server's.")
+            return
+        cookie = connection.cookies.get(cookie_name(self._settings))
+        if _equal(bearer, self._secrets.token) or _equal(cookie, self._secrets.cookie):
+            return
+        if _equal(bearer, self._secrets.worker_token):
+            raise ForbiddenError("The workers' token opens the worker API only.")
+        raise UnauthorizedError("Log in first: open the URL that the server printed at start.")
+
+    async def _login_by_url(self, connection: HTTPConnection, scope: Scope, receive: Receive, send: Send) -> None:
+        """Set the cookie and go to the same page without the token, so that it stays in no history."""
+        token = connection.query_params["token"]
+        self._limiter.check(connection)
+        if not _equal(token, self._secrets.token):
+            self._limiter.failed(connection)
+            raise UnauthorizedError("Wrong token: open the URL that the server printed at its last start.")
+        # Path and query only: the place to go to is never another host.
+        url = URL(scope=scope).remove_query_params("token")
+        target = "/" + url.path.lstrip("/") + (f"?{url.query}" if url.query else "")
+        response = RedirectResponse(target, status_code=303)
+        set_login_cookie(response, Request(scope), self._settings, self._secrets)
+        await response(scope, receive, send)
+
+
+def _is_protected(path: str) -> bool:
+    return path.startswith(_PROTECTED_PREFIXES)
+
+
+def _is_address(name: str) -> bool:
+    """Whether `name` is a literal IP address: no name that an attacker owns could have been made to resolve to it."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _bearer(connection: HTTPConnection) -> str | None:
+    scheme, _, token = connection.headers.get("authorization", "").partition(" ")
+    return token.strip() if scheme.lower() == "bearer" else None
+
+
+def _equal(given: str | None, expected: str) -> bool:
+    """In a time that does not tell how much of it is right."""
+    return given is not None and hmac.compare_digest(given.encode(), expected.encode())
+
+
+async def _refuse(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": error.message[:120]})
+        return
+    await error_response(error)(scope, receive, send)

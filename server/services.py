@@ -1,0 +1,37 @@
+"""What every request and background task shares; `app.state.services` holds the one of an application."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from server.database import Database
+from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
+from server.events.bus import EventBus
+from server.files import FileStore
+from server.security.limits import LoginLimiter
+from server.security.secrets import Secrets
+from server.settings import Settings
+
+
+@dataclass
+class Services:
+    """The parts of a running service. `doorbell` and `links` are exchanged for real ones where workers are to be reached."""
+
+    settings: Settings
+    secrets: Secrets
+    database: Database
+    files: FileStore
+    bus: EventBus = field(default_factory=EventBus)
+    doorbell: Doorbell = field(default_factory=NoDoorbell)
+    links: Links = field(default_factory=NoLinks)
+    login_limiter: LoginLimiter = field(default_factory=LoginLimiter)
+
+
+def _services(connection: HTTPConnection) -> Services:
+    services: Services = connection.app.state.services
+    return services
+
+
+ServicesDep = Annotated[Services, Depends(_services)]

@@ -1,0 +1,28 @@
+"""The service itself in JSON."""
+
+from pydantic import Field
+
+from server.schemas import Schema
+
+
+class Version(Schema):
+    """What is running."""
+
+    version: str
+    commit: str | None = Field(description="Git commit, short; null where it is not known.")
+
+
+class WorkerStatus(Schema):
+    """A worker that has been heard of lately."""
+
+    name: str
+    last_seen: float
+    run_id: str | None = Field(description="The run that it trains now.")
+
+
+class Status(Version):
+    """The service at a glance."""
+
+    workers: list[WorkerStatus]
+    queued: int = Field(description="Runs that wait for a worker.")
+    running: int = Field(description="Runs that a worker trains, those about to stop included.")
