@@ -1,0 +1,84 @@
+"""The real stack and a real Chromium: `mapless up` in a directory of its own, driven by Playwright."""
+
+import os
+import re
+import selectors
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
+
+ROOT = Path(__file__).parents[2]
+# Software rendering of WebGL, and none of the background connections of a desktop browser.
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+]
+
+
+def read_url(process: "subprocess.Popen[str]", seconds: float) -> str:
+    """The address that `mapless up` prints once it answers."""
+    assert process.stdout is not None
+    selector = selectors.DefaultSelector()
+    selector.register(process.stdout, selectors.EVENT_READ)
+    seen = ""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if not selector.select(timeout=1.0):
+            continue
+        line = process.stdout.readline()
+        if not line:
+            break
+        seen += line
+        if match := re.search(r"http://\S+token=\S+", line):
+            return match.group()
+    raise AssertionError(f"mapless up printed no address:\n{seen}")
+
+
+@pytest.fixture(scope="session")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address, with its login token, of a service with two workers that runs until the session ends."""
+    data = tmp_path_factory.mktemp("data")
+    command = [sys.executable, "-m", "server", "up", "--port", "0", "--workers", "2", "--data-dir", str(data)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        yield read_url(process, 60.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(15) == 0, "Ctrl-C must end the service cleanly within 10 s"
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Debian's Chromium, or any that is on the path."""
+    executable = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if executable is None:
+        if os.environ.get("REQUIRE_CHROMIUM"):
+            pytest.fail("no Chromium on the path, and REQUIRE_CHROMIUM is set")
+        pytest.skip("no Chromium on the path")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=executable, args=CHROMIUM_FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def context(browser: Browser, stack: str) -> Iterator[BrowserContext]:
+    """A logged-in browser profile of its own, 1280 x 900."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900}, accept_downloads=True)
+    page = context.new_page()
+    page.goto(stack)
+    page.close()
+    yield context
+    context.close()
