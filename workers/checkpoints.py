@@ -162,7 +162,7 @@ def _arrays(data: bytes, name: str) -> dict[str, NDArray[np.generic]]:
 
 def _weights(archive: zipfile.ZipFile, manifest: Manifest) -> dict[str, NDArray[np.float32]]:
     weights = _arrays(_member(archive, manifest, POLICY), POLICY)
-    expected = weight_shapes(manifest.training.algorithm.network, len(manifest.observation))
+    expected = weight_shapes(manifest.training.algorithm.network, len(manifest.observation.numbers))
     found = {name: array.shape for name, array in weights.items()}
     if found != expected or any(array.dtype != np.float32 for array in weights.values()):
         raise ArchiveIntegrityError(f"{POLICY} does not hold the float32 arrays of its network: {expected}")

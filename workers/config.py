@@ -92,6 +92,104 @@ class PpoConfig(Frozen):
         return self
 
 
+class OffPolicyConfig(Frozen):
+    """What DDPG, TD3 and SAC share: collection, memory and step sizes."""
+
+    network: Network = Field(
+        default_factory=lambda: MlpNetwork(hidden_sizes=(128, 128)), title="Network", description="Of actor and critics."
+    )
+    robots: int = Field(
+        64,
+        ge=1,
+        le=4096,
+        title="Robots",
+        description="Robots that collect experience side by side.",
+        json_schema_extra=ADVANCED,
+    )
+    updates_per_step: int = Field(
+        4, ge=1, le=64, title="Updates per step", description="For each step of all robots.", json_schema_extra=ADVANCED
+    )
+    batch_size: int = Field(256, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)
+    replay_size: int = Field(
+        200_000, ge=1_000, le=2_000_000, title="Memory", description="Transitions kept.", json_schema_extra=ADVANCED
+    )
+    warmup_steps: int = Field(
+        10_000,
+        ge=0,
+        le=1_000_000,
+        title="Warm-up",
+        description="Environment steps of uniform actions before learning starts.",
+        json_schema_extra=ADVANCED,
+    )
+    actor_learning_rate: float = Field(3e-4, gt=0.0, le=0.1, title="Actor learning rate", json_schema_extra=ADVANCED)
+    critic_learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Critic learning rate", json_schema_extra=ADVANCED)
+    gamma: float = Field(0.99, gt=0.0, lt=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
+    tau: float = Field(
+        0.01,
+        gt=0.0,
+        le=1.0,
+        title="Target rate (tau)",
+        description="Part of the way that target networks go in each update.",
+        json_schema_extra=ADVANCED,
+    )
+    reward_scale: float = Field(
+        0.01, gt=0.0, le=100.0, title="Reward scale", description="Multiplies rewards.", json_schema_extra=ADVANCED
+    )
+
+
+class _DeterministicConfig(OffPolicyConfig):
+    """What DDPG and TD3 share: noise on a deterministic policy."""
+
+    exploration_noise: float = Field(
+        0.5,
+        gt=0.0,
+        le=2.0,
+        title="Exploration noise, first",
+        description="Deviation, in halves of an action's range; decays linearly.",
+        json_schema_extra=ADVANCED,
+    )
+    final_exploration_noise: float = Field(0.05, ge=0.0, le=2.0, title="Exploration noise, last", json_schema_extra=ADVANCED)
+
+
+class DdpgConfig(_DeterministicConfig):
+    """Deep Deterministic Policy Gradient (Lillicrap et al. 2016)."""
+
+    name: Literal["ddpg"] = Field("ddpg", title="DDPG")
+
+
+class Td3Config(_DeterministicConfig):
+    """Twin Delayed DDPG (Fujimoto et al. 2018)."""
+
+    name: Literal["td3"] = Field("td3", title="TD3")
+    policy_delay: int = Field(
+        2, ge=1, le=16, title="Policy delay", description="Critic updates for each of the actor.", json_schema_extra=ADVANCED
+    )
+    target_noise: float = Field(
+        0.2,
+        ge=0.0,
+        le=2.0,
+        title="Target noise",
+        description="Smooths the target, in halves of an action's range.",
+        json_schema_extra=ADVANCED,
+    )
+    target_noise_clip: float = Field(0.5, ge=0.0, le=2.0, title="Target noise limit", json_schema_extra=ADVANCED)
+
+
+class SacConfig(OffPolicyConfig):
+    """Soft Actor-Critic with a learned temperature (Haarnoja et al. 2018)."""
+
+    name: Literal["sac"] = Field("sac", title="SAC")
+    initial_temperature: float = Field(
+        0.1, gt=0.0, le=10.0, title="Initial temperature", description="Weight of entropy.", json_schema_extra=ADVANCED
+    )
+    target_entropy: float = Field(
+        -2.0, ge=-10.0, le=2.0, title="Target entropy", description="Nats over both actions.", json_schema_extra=ADVANCED
+    )
+
+
+Algorithm = Annotated[PpoConfig | DdpgConfig | Td3Config | SacConfig, Field(discriminator="name")]
+
+
 class EvaluationConfig(Frozen):
     """How often a training is measured on its frozen suite, and how often a checkpoint is kept."""
 
@@ -108,7 +206,7 @@ class TrainingConfig(Frozen):
     """One training, complete but for its seed: the message to a worker and the file in a checkpoint."""
 
     task: TaskConfig = Field(default_factory=TaskConfig, title="Task")
-    algorithm: PpoConfig = Field(default_factory=PpoConfig, title="Algorithm")
+    algorithm: Algorithm = Field(default_factory=PpoConfig, title="Algorithm")
     steps: int = Field(
         300_000,
         ge=1_000,

@@ -19,7 +19,7 @@ class Number(Frozen):
     Attributes:
         index: its place in the vector.
         name: short and unique in the vector.
-        meaning: how it is computed from physical quantities, or what it commands.
+        meaning: how it is computed from lengths in metres and angles in radians, or what it commands.
         low, high: its range.
     """
 
@@ -28,6 +28,14 @@ class Number(Frozen):
     meaning: str
     low: float
     high: float
+
+
+class Observation(Frozen):
+    """What the policy is given: `numbers` in order; the same name and version always mean the same numbers."""
+
+    name: str
+    version: int
+    numbers: tuple[Number, ...]
 
 
 class NetworkLayout(Frozen):
@@ -70,7 +78,7 @@ class Manifest(Frozen):
     training: TrainingConfig
     seed: int
     step: int = Field(ge=0)
-    observation: tuple[Number, ...]
+    observation: Observation
     action: tuple[Number, ...]
     network: NetworkLayout
     evaluation: EvaluationSummary | None

@@ -12,6 +12,9 @@ from workers.layout import LEAKY_SLOPE, RESBLOCK_WIDTH
 # A policy head this small starts every training at the middle of the actions, whatever the observation.
 _POLICY_HEAD_SCALE = 0.01
 
+# Larger, since a deterministic policy gradient has to find its way through this head.
+_DETERMINISTIC_HEAD_SCALE = 0.1
+
 
 class ResBlock(nn.Module):
     """The paper's network: two blocks whose shortcut is a concatenation (tables 'PPO Critic network structure details').
@@ -90,6 +93,22 @@ class GaussianActor(nn.Module):
 
     def forward(self, observations: Tensor) -> Tensor:
         """The mean action (n, 2) for observations (n, size): also the deterministic policy."""
+        return bound_actions(self.network(observations))
+
+
+class DeterministicActor(nn.Module):
+    """Observations to bounded actions."""
+
+    def __init__(self, network: Body, observation_size: int) -> None:
+        super().__init__()
+        self.network = network
+        self.observation_size = observation_size
+        with torch.no_grad():
+            network.head.weight.mul_(_DETERMINISTIC_HEAD_SCALE)
+            network.head.bias.zero_()
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Actions (n, 2) for observations (n, size)."""
         return bound_actions(self.network(observations))
 
 

@@ -16,7 +16,7 @@ from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, read
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork, TrainingConfig
 from workers.errors import ArchiveFormatError, ArchiveIntegrityError
 from workers.layout import layout, weight_shapes
-from workers.manifest import EvaluationSummary, Manifest, Number, TrainingCounters
+from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.networks import bound_actions, build_network
 from workers.policy import Policy, torch_policy
 
@@ -31,7 +31,11 @@ def make_checkpoint(network: Network) -> Checkpoint:
             training=TrainingConfig(algorithm=PpoConfig(network=network)),
             seed=7,
             step=4096,
-            observation=tuple(Number(index=i, name=f"n{i}", meaning="a number", low=-1, high=1) for i in range(16)),
+            observation=Observation(
+                name="improved",
+                version=1,
+                numbers=tuple(Number(index=i, name=f"n{i}", meaning="a number", low=-1, high=1) for i in range(16)),
+            ),
             action=(
                 Number(index=0, name="linear", meaning="x 0.25 m/s", low=0, high=1),
                 Number(index=1, name="angular", meaning="x 1 rad/s", low=-1, high=1),

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from workers.algorithms.flat_adam import FlatAdam
+from workers.algorithms.flat import FlatParameters
 from workers.backward import backward_of
 from workers.config import MlpNetwork, Network, ResBlockNetwork
 from workers.networks import GaussianActor, build_network
@@ -63,7 +63,7 @@ def test_mean_actions_are_bounded_and_start_in_the_middle(config: Network) -> No
 def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> None:
     torch.manual_seed(0)
     network = build_network(config, 16, 3).double()
-    flat = FlatAdam([network], 1e-3)
+    flat = FlatParameters(network)
     inputs, by_output = torch.randn(rows, 16).double(), torch.randn(rows, 3).double()
 
     outputs = network(inputs)

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
-from workers.algorithms.flat_adam import FlatAdam
+from workers.algorithms.flat import FlatAdam
 from workers.algorithms.ppo_gradients import PpoGradients, WrittenPpo, entropy, log_prob
 from workers.algorithms.return_scaler import ReturnScaler
 from workers.algorithms.rollout import RolloutStorage, generalized_advantages
@@ -51,7 +51,7 @@ class Ppo:
         self.actor, self.critic, self.storage = actor, critic, storage
         self.robots, self.steps_per_update = config.robots, config.rollout_steps
         self._generator = generator
-        self._optimizer = FlatAdam((actor, critic), config.learning_rate)
+        self._optimizer = FlatAdam(actor, critic, learning_rate=config.learning_rate)
         self._gradients = gradients or WrittenPpo(
             actor, critic, config.clip_range, config.entropy_coefficient, config.minibatch_size
         )

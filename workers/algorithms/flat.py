@@ -1,4 +1,4 @@
-"""Adam over several modules at once, with all parameters in one vector: one kernel a step instead of one per layer."""
+"""The parameters of several modules as one vector: one kernel instead of one per layer, for Adam, clipping and averages."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 
-class FlatAdam:
-    """Adam (Kingma & Ba 2015) whose parameters and gradients are each one contiguous vector.
+class FlatParameters:
+    """One contiguous vector of parameters and one of gradients.
 
     The modules keep working as before: their parameters become views of `values`, and their `.grad`, which are always
     there, views of `gradients`. So autograd and hand-written passes fill the same vector.
     """
 
-    def __init__(self, modules: Sequence[nn.Module], learning_rate: float) -> None:
+    def __init__(self, *modules: nn.Module) -> None:
         parameters = [parameter for module in modules for parameter in module.parameters()]
+        self._parameters = parameters
         self.values = torch.cat([parameter.detach().reshape(-1) for parameter in parameters])
         self.gradients = torch.zeros_like(self.values)
         offset = 0
@@ -26,11 +27,27 @@ class FlatAdam:
             parameter.grad = self.gradients[span].view_as(parameter)
             offset = span.stop
         sizes = [sum(parameter.numel() for parameter in module.parameters()) for module in modules]
-        self._module_gradients = torch.split(self.gradients, sizes)
-        flat = nn.Parameter(self.values)
-        flat.grad = self.gradients
-        self._adam = torch.optim.Adam([flat], learning_rate, fused=True)
-        self._flat = flat
+        self._module_gradients: Sequence[Tensor] = torch.split(self.gradients, sizes)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every parameter is a finite number."""
+        return bool(torch.isfinite(self.values).all())
+
+    def clip_gradients(self, max_norm: float) -> None:
+        """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
+        for gradient in self._module_gradients:
+            gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
+
+
+class FlatAdam(FlatParameters):
+    """Adam (Kingma & Ba 2015) over all parameters of some modules."""
+
+    def __init__(self, *modules: nn.Module, learning_rate: float) -> None:
+        super().__init__(*modules)
+        self._flat = nn.Parameter(self.values)
+        self._flat.grad = self.gradients
+        self._adam = torch.optim.Adam([self._flat], learning_rate, fused=True)
 
     @property
     def learning_rate(self) -> float:
@@ -41,23 +58,15 @@ class FlatAdam:
     def learning_rate(self, value: float) -> None:
         self._adam.param_groups[0]["lr"] = value
 
-    def zero_gradients(self) -> None:
-        """Before a backward pass of autograd, which adds."""
-        self.gradients.zero_()
-
-    def clip_gradients(self, max_norm: float) -> None:
-        """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
-        for gradient in self._module_gradients:
-            gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
-
     def step(self) -> None:
-        """One step along `gradients`."""
+        """One step against `gradients`."""
         self._adam.step()
 
-    @property
-    def finite(self) -> bool:
-        """Whether every parameter is a finite number."""
-        return bool(torch.isfinite(self.values).all())
+    def descend(self, loss: Tensor) -> None:
+        """One step against the gradient of a scalar, by autograd; other parameters get no gradient."""
+        self.gradients.zero_()
+        torch.autograd.backward(loss, inputs=self._parameters)
+        self.step()
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Parameters and moments, for `load_state`."""
@@ -66,7 +75,6 @@ class FlatAdam:
 
     def load_state(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Continues where `state` was taken."""
-        tensors = {name: torch.from_numpy(np.array(array)) for name, array in state.items()}
+        tensors = {name: torch.from_numpy(np.array(array)).to(self.values.device) for name, array in state.items()}
         self.values.copy_(tensors.pop("values"))
-        # Adam keeps its step count on the CPU only when it is not fused.
-        self._adam.state[self._flat] = {name: tensor.to(self.values.device) for name, tensor in tensors.items()}
+        self._adam.state[self._flat] = tensors

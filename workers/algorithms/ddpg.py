@@ -1,0 +1,116 @@
+"""Deep Deterministic Policy Gradient (Lillicrap et al. 2016, 'Continuous control with deep reinforcement learning').
+
+The lines of its Algorithm 1 are named in `Ddpg.learn`. Different here: noise is uncorrelated and decays (its
+Ornstein-Uhlenbeck process gains nothing on this task), all robots act at once, and the critic sees actions from its
+first layer on.
+"""
+
+import copy
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from workers.algorithms.flat import FlatAdam, FlatParameters
+from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
+from workers.algorithms.replay import Transitions
+from workers.config import DdpgConfig, Td3Config
+from workers.layout import ACTION_SIZE
+from workers.networks import Body, DeterministicActor, build_network
+
+
+class NoisyPolicy(OffPolicyAlgorithm):
+    """A deterministic actor with decaying noise: what DDPG and TD3 have in common."""
+
+    def __init__(
+        self, config: DdpgConfig | Td3Config, actor: DeterministicActor, critics: nn.ModuleList, generator: torch.Generator
+    ) -> None:
+        self.config, self.actor, self.critics = config, actor, critics
+        self.target_actor, self.target_critics = copy.deepcopy(actor), copy.deepcopy(critics)
+        self.actor_optimizer = FlatAdam(actor, learning_rate=config.actor_learning_rate)
+        self.critic_optimizer = FlatAdam(critics, learning_rate=config.critic_learning_rate)
+        super().__init__(
+            config,
+            online={"actor": self.actor_optimizer, "critic": self.critic_optimizer},
+            targets={
+                "target_actor": FlatParameters(self.target_actor),
+                "target_critic": FlatParameters(self.target_critics),
+            },
+            observation_size=actor.observation_size,
+            generator=generator,
+        )
+        self._noise = config.exploration_noise
+        self._half_range = ACTION_HALF_RANGE.to(generator.device)
+
+    def explore(self, observations: Tensor) -> Tensor:
+        """See `OffPolicyAlgorithm.explore`."""
+        actions: Tensor = self.actor(observations)
+        return actions + self._noise * self.normal((len(observations), ACTION_SIZE))
+
+    def normal(self, shape: tuple[int, ...]) -> Tensor:
+        """Standard normal noise in halves of the actions' ranges."""
+        return self._half_range * torch.randn(shape, generator=self._generator, device=self._device)
+
+    def set_progress(self, progress: float) -> dict[str, float]:
+        """See `OffPolicyAlgorithm.set_progress`."""
+        first, last = self.config.exploration_noise, self.config.final_exploration_noise
+        self._noise = first + (last - first) * progress
+        return {
+            "policy/std_linear": 0.5 * self._noise,
+            "policy/std_angular": self._noise,
+            "optim/learning_rate": self.config.actor_learning_rate,
+        }
+
+    def policy_weights(self) -> dict[str, NDArray[np.float32]]:
+        """See `Algorithm.policy_weights`."""
+        return {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.network.state_dict().items()}
+
+
+class Ddpg(NoisyPolicy):
+    """DDPG."""
+
+    def learn(self, batch: Transitions) -> dict[str, Tensor]:
+        """See `OffPolicyAlgorithm.learn`."""
+        # Set y_i = r_i + gamma Q'(s_{i+1}, mu'(s_{i+1}))
+        with torch.no_grad():
+            next_actions = self.target_actor(batch.next_observations)
+            following = action_value(self.target_critics[0], batch.next_observations, next_actions)
+            targets = batch.rewards + self.config.gamma * batch.continues * following
+
+        # Update critic by minimizing the loss L = 1/N sum_i (y_i - Q(s_i, a_i))^2
+        values = action_value(self.critics[0], batch.observations, batch.actions)
+        critic_loss = (values - targets).square().mean()
+        self.critic_optimizer.descend(critic_loss)
+
+        # Update the actor policy using the sampled policy gradient 1/N sum_i grad_a Q(s_i, a) grad mu(s_i)
+        actor_loss = -action_value(self.critics[0], batch.observations, self.actor(batch.observations)).mean()
+        self.actor_optimizer.descend(actor_loss)
+
+        # Update the target networks
+        self.follow("target_critic", "critic")
+        self.follow("target_actor", "actor")
+        return {"loss/policy": actor_loss.detach(), "loss/value": critic_loss.detach(), "value/mean": targets.mean()}
+
+
+def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Tensor:
+    """Q (n, 1) of observations (n, size) and actions (n, 2)."""
+    value: Tensor = critic(torch.cat((observations, actions), dim=1))
+    return value
+
+
+def build_noisy_networks(
+    config: DdpgConfig | Td3Config, critics: int, observation_size: int, seed: int, device: torch.device
+) -> tuple[DeterministicActor, nn.ModuleList]:
+    """Actor and critics, freshly initialised; the same seed gives the same weights on every device."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        actor = DeterministicActor(build_network(config.network, observation_size, ACTION_SIZE), observation_size)
+        networks: list[Body] = [build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(critics)]
+    return actor.to(device), nn.ModuleList(networks).to(device)
+
+
+def build_ddpg(config: DdpgConfig, observation_size: int, seed: int, device: torch.device) -> Ddpg:
+    """DDPG with freshly initialised networks."""
+    actor, critics = build_noisy_networks(config, 1, observation_size, seed, device)
+    return Ddpg(config, actor, critics, torch.Generator(device).manual_seed(seed))

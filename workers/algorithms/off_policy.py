@@ -1,0 +1,153 @@
+"""What DDPG, TD3 and SAC share: a memory, uniform actions to fill it, several updates a step, slow target networks."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from workers.algorithms.base import Arrays, with_prefix, without_prefix
+from workers.algorithms.flat import FlatAdam, FlatParameters
+from workers.algorithms.replay import ReplayBuffer, Transitions
+from workers.config import OffPolicyConfig
+
+ACTION_LOW = torch.tensor([0.0, -1.0])
+ACTION_HIGH = torch.tensor([1.0, 1.0])
+ACTION_HALF_RANGE = torch.tensor([0.5, 1.0])
+"""Noise is scaled by it, so that the same deviation means as much for both velocities."""
+
+
+class OffPolicyAlgorithm(ABC):
+    """The frame around one update rule.
+
+    Args:
+        config: hyperparameters that the three algorithms share.
+        online: what is trained, by the name under which its state is kept.
+        targets: slow copies, by name.
+        observation_size: numbers in an observation.
+        generator: of exploration and of sampling, on the same device as the networks.
+    """
+
+    steps_per_update = 1
+
+    def __init__(
+        self,
+        config: OffPolicyConfig,
+        online: dict[str, FlatAdam],
+        targets: dict[str, FlatParameters],
+        observation_size: int,
+        generator: torch.Generator,
+    ) -> None:
+        self.robots = config.robots
+        self._shared = config
+        self._online, self._targets = online, targets
+        self._generator = generator
+        self._device = generator.device
+        self._replay = ReplayBuffer(config.replay_size, config.robots, observation_size, self._device)
+        self._observations = torch.zeros(config.robots, observation_size, device=self._device)
+        self._actions = torch.zeros(config.robots, 2, device=self._device)
+        self._steps = 0
+        self._progress = 0.0
+
+    @abstractmethod
+    def explore(self, observations: Tensor) -> Tensor:
+        """Exploring actions (robots, 2) for observations (robots, size), not yet clipped."""
+
+    @abstractmethod
+    def learn(self, batch: Transitions) -> dict[str, Tensor]:
+        """One update from one minibatch; scalars under the project's metric names."""
+
+    @abstractmethod
+    def set_progress(self, progress: float) -> dict[str, float]:
+        """Moves the schedules to a part of the training, 0 to 1; what to report of them."""
+
+    @property
+    def warming_up(self) -> bool:
+        """Whether actions are still uniform and nothing is learned."""
+        return self._steps < self._shared.warmup_steps
+
+    @torch.no_grad()
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """See `Algorithm.act`."""
+        self._observations.copy_(torch.from_numpy(observations))
+        low, high = ACTION_LOW.to(self._device), ACTION_HIGH.to(self._device)
+        if self.warming_up:
+            uniform = torch.rand(self._actions.shape, generator=self._generator, device=self._device)
+            self._actions.copy_(low + (high - low) * uniform)
+        else:
+            torch.clamp(self.explore(self._observations), low, high, out=self._actions)
+        self._steps += self.robots
+        actions: NDArray[np.float32] = self._actions.cpu().numpy()
+        return actions
+
+    def record(
+        self,
+        observations: NDArray[np.float32],
+        rewards: NDArray[np.float32],
+        terminations: NDArray[np.bool_],
+        truncations: NDArray[np.bool_],
+        final_observations: NDArray[np.float32],
+    ) -> None:
+        """See `Algorithm.record`."""
+        ended = terminations | truncations
+        following = np.where(ended[:, None], final_observations, observations) if ended.any() else observations
+        self._replay.add(
+            self._observations,
+            self._actions,
+            torch.from_numpy(rewards * np.float32(self._shared.reward_scale)),
+            torch.from_numpy(~terminations),
+            torch.from_numpy(following),
+        )
+
+    def update(self, progress: float) -> dict[str, float]:
+        """See `Algorithm.update`."""
+        self._progress = progress
+        schedules = self.set_progress(progress)
+        if self.warming_up:
+            return schedules
+        totals: dict[str, Tensor] = {}
+        counts: dict[str, int] = {}
+        for batch in self._replay.sample(self._shared.updates_per_step, self._shared.batch_size, self._generator):
+            for name, value in self.learn(batch).items():
+                totals[name] = totals[name] + value if name in totals else value
+                counts[name] = counts.get(name, 0) + 1
+        return schedules | {name: total.item() / counts[name] for name, total in totals.items()}
+
+    def follow(self, target: str, online: str) -> None:
+        """Moves a target network a little towards its original: target += tau (online - target)."""
+        self._targets[target].values.lerp_(self._online[online].values, self._shared.tau)
+
+    @property
+    def finite(self) -> bool:
+        """See `Algorithm.finite`."""
+        return all(parameters.finite for parameters in self._online.values())
+
+    @abstractmethod
+    def policy_weights(self) -> dict[str, NDArray[np.float32]]:
+        """See `Algorithm.policy_weights`."""
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """See `Algorithm.state`."""
+        state: dict[str, NDArray[np.generic]] = {
+            **with_prefix("replay", self._replay.state()),
+            "generator": self._generator.get_state().numpy().copy(),
+            "steps": np.array(self._steps),
+            "progress": np.array(self._progress),
+        }
+        for name, adam in self._online.items():
+            state |= with_prefix(name, adam.state())
+        for name, target in self._targets.items():
+            state[name] = target.values.cpu().numpy().copy()
+        return state
+
+    def load_state(self, state: Arrays) -> None:
+        """See `Algorithm.load_state`."""
+        self._replay.load_state(without_prefix("replay", state))
+        self._generator.set_state(torch.from_numpy(np.array(state["generator"], np.uint8)))
+        self._steps, self._progress = int(state["steps"]), float(state["progress"])
+        self.set_progress(self._progress)
+        for name, adam in self._online.items():
+            adam.load_state(without_prefix(name, state))
+        for name, target in self._targets.items():
+            target.values.copy_(torch.from_numpy(np.array(state[name], np.float32)))

@@ -1,0 +1,151 @@
+"""Soft Actor-Critic with a learned temperature (Haarnoja et al. 2018, 'Soft actor-critic algorithms and applications').
+
+The lines of its Algorithm 1 are named in `Sac.learn`. The policy squashes a normal variable u by a sigmoid for the linear
+and a tanh for the angular velocity; its deterministic form squashes the mean, so that the exported policy is a network
+with the same heads as every other algorithm's.
+"""
+
+import copy
+import math
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional
+
+from workers.algorithms.ddpg import action_value
+from workers.algorithms.flat import FlatAdam, FlatParameters
+from workers.algorithms.off_policy import OffPolicyAlgorithm
+from workers.algorithms.ppo_gradients import log_prob
+from workers.algorithms.replay import Transitions
+from workers.config import SacConfig
+from workers.layout import ACTION_SIZE
+from workers.networks import Body, bound_actions, build_network
+
+# Deviations of u from 0.7 % to 740 %: outside of it gradients vanish or samples saturate.
+LOG_STD_RANGE = (-5.0, 2.0)
+
+
+class Temperature(nn.Module):
+    """The weight of entropy, kept as its logarithm so that it stays positive."""
+
+    def __init__(self, initial: float) -> None:
+        super().__init__()
+        self.log_alpha = nn.Parameter(torch.tensor([math.log(initial)]))
+
+
+class Sac(OffPolicyAlgorithm):
+    """SAC.
+
+    Args:
+        config: hyperparameters.
+        actor: observations (n, size) to mean and logarithm of the deviation of u, (n, 4).
+        critics: two networks of observation and action.
+        observation_size: numbers in an observation.
+        generator: of exploration and of sampling.
+    """
+
+    def __init__(
+        self, config: SacConfig, actor: Body, critics: nn.ModuleList, observation_size: int, generator: torch.Generator
+    ) -> None:
+        self.config, self.actor, self.critics = config, actor, critics
+        self.temperature = Temperature(config.initial_temperature).to(generator.device)
+        self.target_critics = copy.deepcopy(critics)
+        self.actor_optimizer = FlatAdam(actor, learning_rate=config.actor_learning_rate)
+        self.critic_optimizer = FlatAdam(critics, learning_rate=config.critic_learning_rate)
+        self.temperature_optimizer = FlatAdam(self.temperature, learning_rate=config.actor_learning_rate)
+        super().__init__(
+            config,
+            online={
+                "actor": self.actor_optimizer,
+                "critic": self.critic_optimizer,
+                "temperature": self.temperature_optimizer,
+            },
+            targets={"target_critic": FlatParameters(self.target_critics)},
+            observation_size=observation_size,
+            generator=generator,
+        )
+
+    def sample(self, observations: Tensor) -> tuple[Tensor, Tensor]:
+        """Actions (n, 2) and their log densities (n, 1), differentiable by the actor's parameters (its Eq. 9)."""
+        mean, log_std = self.actor(observations).split(ACTION_SIZE, dim=1)
+        low, high = LOG_STD_RANGE
+        log_std = low + 0.5 * (high - low) * (torch.tanh(log_std) + 1.0)
+        noise = torch.randn(mean.shape, generator=self._generator, device=self._device)
+        u = mean + torch.exp(log_std) * noise
+        return bound_actions(u), (log_prob(noise, log_std) - log_slope(u)).unsqueeze(1)
+
+    def explore(self, observations: Tensor) -> Tensor:
+        """See `OffPolicyAlgorithm.explore`."""
+        return self.sample(observations)[0]
+
+    def learn(self, batch: Transitions) -> dict[str, Tensor]:
+        """See `OffPolicyAlgorithm.learn`."""
+        config = self.config
+        alpha = self.temperature.log_alpha.detach().exp()
+
+        # theta_i <- theta_i - lambda_Q grad J_Q(theta_i), J_Q and its target from Eq. 5 and 6
+        with torch.no_grad():
+            next_actions, next_log_probs = self.sample(batch.next_observations)
+            following = torch.minimum(
+                *(action_value(critic, batch.next_observations, next_actions) for critic in self.target_critics)
+            )
+            targets = batch.rewards + config.gamma * batch.continues * (following - alpha * next_log_probs)
+        critic_loss = torch.stack(
+            [(action_value(critic, batch.observations, batch.actions) - targets).square().mean() for critic in self.critics]
+        ).sum()
+        self.critic_optimizer.descend(critic_loss)
+
+        # phi <- phi - lambda_pi grad J_pi(phi), Eq. 10
+        actions, log_probs = self.sample(batch.observations)
+        values = torch.minimum(*(action_value(critic, batch.observations, actions) for critic in self.critics))
+        actor_loss = (alpha * log_probs - values).mean()
+        self.actor_optimizer.descend(actor_loss)
+
+        # alpha <- alpha - lambda grad J(alpha), Eq. 18, by the logarithm of alpha
+        surplus = log_probs.detach().mean() + config.target_entropy
+        self.temperature_optimizer.descend(-(self.temperature.log_alpha * surplus).sum())
+
+        # target_i <- tau theta_i + (1 - tau) target_i
+        self.follow("target_critic", "critic")
+        return {
+            "loss/policy": actor_loss.detach(),
+            "loss/value": critic_loss.detach(),
+            "value/mean": targets.mean(),
+            "policy/entropy": -log_probs.detach().mean(),
+            "policy/temperature": alpha.sum(),
+        }
+
+    def set_progress(self, progress: float) -> dict[str, float]:
+        """See `OffPolicyAlgorithm.set_progress`: nothing here has a schedule."""
+        return {"optim/learning_rate": self.config.actor_learning_rate}
+
+    def policy_weights(self) -> dict[str, NDArray[np.float32]]:
+        """See `Algorithm.policy_weights`: without the head's rows that make the deviation."""
+        weights = {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.state_dict().items()}
+        return weights | {name: weights[name][:ACTION_SIZE].copy() for name in ("head.weight", "head.bias")}
+
+
+def log_slope(u: Tensor) -> Tensor:
+    """Log of the derivative of `bound_actions` by u, summed over both actions: (n, 2) to (n,).
+
+    sigmoid'(u) = sigmoid(u) sigmoid(-u), tanh'(u) = 4 sigmoid(2 u) sigmoid(-2 u): exact where 1 - tanh(u)^2 would cancel.
+    """
+    linear, angular = u[:, 0], 2.0 * u[:, 1]
+    return (
+        functional.logsigmoid(linear)
+        + functional.logsigmoid(-linear)
+        + functional.logsigmoid(angular)
+        + functional.logsigmoid(-angular)
+        + math.log(4.0)
+    )
+
+
+def build_sac(config: SacConfig, observation_size: int, seed: int, device: torch.device) -> Sac:
+    """SAC with freshly initialised networks; the same seed gives the same weights on every device."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        actor = build_network(config.network, observation_size, 2 * ACTION_SIZE).to(device)
+        critics = nn.ModuleList(build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(2))
+    return Sac(config, actor, critics.to(device), observation_size, torch.Generator(device).manual_seed(seed))
