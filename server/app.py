@@ -18,7 +18,7 @@ from server.experiments import endpoints as experiments
 from server.files import FileStore
 from server.metrics import endpoints as metrics
 from server.migrate import upgrade
-from server.problems import UNAUTHORIZED, install_error_handler
+from server.problems import UNAUTHORIZED, install_error_handlers
 from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
@@ -80,7 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 await stack.enter_async_context(background(services))
             yield
 
-    app = describe(lifespan)
+    app = describe(lifespan, max_body_size=services.settings.max_body_bytes)
     app.state.services = services
     pages.mount_pages(app, services.settings.web_dist)
     # The last one added meets a request first.
@@ -91,8 +91,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     return app
 
 
-def describe(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]] | None = None) -> FastAPI:
-    """The application's routes without anything behind them: enough for its OpenAPI description."""
+def describe(
+    lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]] | None = None, *, max_body_size: int | None = None
+) -> FastAPI:
+    """The application's routes without anything behind them: enough for its OpenAPI description.
+
+    A route that takes more than `max_body_size` bytes, an upload, says so with a `max_body_size` of its own.
+    """
     app = FastAPI(
         title="Mapless",
         version=version(),
@@ -102,8 +107,9 @@ def describe(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]] | 
         docs_url=None,
         redoc_url=None,
         responses=UNAUTHORIZED,
+        max_body_size=max_body_size,
     )
-    install_error_handler(app)
+    install_error_handlers(app)
     for router in ROUTERS:
         app.include_router(router)
     return app

@@ -12,7 +12,7 @@ from server.errors import NotFoundError
 _MISSING = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Mapless</title>
 <body style="font: 1rem/1.5 system-ui; max-width: 40rem; margin: 4rem auto; padding: 0 1rem">
 <h1>The pages have not been built</h1>
-<p>The service is running, but <code>web/dist</code> is not there. Run <code>make web</code> in the project's directory and
+<p>The service is running, but <code>web/dist</code> is not there. Run <code>make pages</code> in the project's directory and
 reload this page. The API works meanwhile.</p></body></html>"""
 
 # Vite puts a hash of the content into the names below assets/.

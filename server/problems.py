@@ -3,6 +3,7 @@
 from typing import Any
 
 from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 
 from server.errors import ErrorBody, ServiceError
@@ -20,9 +21,18 @@ def error_response(error: ServiceError) -> JSONResponse:
     return JSONResponse(ErrorBody(detail=error.message).model_dump(), status_code=error.status)
 
 
-def install_error_handler(app: FastAPI) -> None:
-    """Answer every `ServiceError` that an endpoint raises with its status and its sentence."""
+def install_error_handlers(app: FastAPI) -> None:
+    """Answer what an endpoint raises with its status and its sentence, and refused fields with their places."""
 
     @app.exception_handler(ServiceError)
-    async def _handle(_request: Request, error: ServiceError) -> JSONResponse:
+    async def _refuse(_request: Request, error: ServiceError) -> JSONResponse:
         return error_response(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def _refuse_fields(_request: Request, error: RequestValidationError) -> JSONResponse:
+        # What was sent is not sent back: it may be a token, and it may be a number that JSON can't hold.
+        problems = [
+            {"loc": problem["loc"], "msg": problem["msg"].removeprefix("Value error, "), "type": problem["type"]}
+            for problem in error.errors()
+        ]
+        return JSONResponse({"detail": problems}, status_code=422)

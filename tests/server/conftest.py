@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from server.app import create_app
@@ -12,22 +13,29 @@ from server.settings import Settings
 
 TOKEN = "a-login-token-for-tests"
 WORKER_TOKEN = "a-worker-token-for-tests"
+BASE_URL = "http://127.0.0.1:8400"
 
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    return Settings(data_dir=tmp_path / "data", token=TOKEN, worker_token=WORKER_TOKEN, web_dist=tmp_path / "dist")
+    return Settings.model_validate(
+        {"data_dir": tmp_path / "data", "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": tmp_path / "dist"}
+    )
 
 
 @pytest.fixture
-def client(settings: Settings) -> Iterator[TestClient]:
+def app(settings: Settings) -> FastAPI:
+    return create_app(settings)
+
+
+@pytest.fixture
+def client(app: FastAPI) -> Iterator[TestClient]:
     """Logged in by its Authorization header."""
-    with TestClient(create_app(settings), base_url="http://127.0.0.1:8400") as client:
-        client.headers["Authorization"] = f"Bearer {TOKEN}"
+    with TestClient(app, base_url=BASE_URL, headers={"Authorization": f"Bearer {TOKEN}"}) as client:
         yield client
 
 
 @pytest.fixture
-def services(client: TestClient) -> Services:
-    services: Services = client.app.state.services  # type: ignore[attr-defined]
+def services(app: FastAPI) -> Services:
+    services: Services = app.state.services
     return services

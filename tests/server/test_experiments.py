@@ -1,19 +1,291 @@
 """Launching, listing, stopping, resuming, renaming and deleting experiments."""
 
+from typing import Any
+
+import pytest
 from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server import models
+from server.database import Database
+from server.events.bus import Change, EventBus
+from server.experiments.repository import ExperimentRepository, aggregate_state
+from server.migrate import upgrade
+from server.models import RunState
+from server.services import Services
+from workers.config import TrainingConfig
 
 
-def test_launching_queues_one_run_a_seed(client: TestClient) -> None:
-    response = client.post("/api/experiments", json={"name": "Corridor", "seeds": [3, 1], "training": {"steps": 5_000}})
+class RecordingDoorbell:
+    """Remembers who was rung."""
 
-    assert response.status_code == 201
-    experiment = response.json()
+    def __init__(self) -> None:
+        self.rings: list[tuple[str, int]] = []
+
+    def ring(self, run_id: str, attempt: int) -> None:
+        self.rings.append((run_id, attempt))
+
+
+class RecordingLinks:
+    """Remembers what the workers were told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, str]] = []
+
+    def stop(self, run_id: str) -> None:
+        self.told.append(("stop", run_id))
+
+    def cut(self, run_id: str) -> None:
+        self.told.append(("cut", run_id))
+
+
+@pytest.fixture
+def doorbell(services: Services) -> RecordingDoorbell:
+    services.doorbell = doorbell = RecordingDoorbell()
+    return doorbell
+
+
+@pytest.fixture
+def links(services: Services) -> RecordingLinks:
+    services.links = links = RecordingLinks()
+    return links
+
+
+def launch(client: TestClient, name: str = "Corridor", seeds: tuple[int, ...] = (0,), **training: Any) -> dict[str, Any]:
+    response = client.post("/api/experiments", json={"name": name, "seeds": seeds, "training": training})
+    assert response.status_code == 201, response.text
+    experiment: dict[str, Any] = response.json()
+    return experiment
+
+
+def set_state(services: Services, run: dict[str, Any], state: RunState, **columns: Any) -> None:
+    """Bring a run where a worker would have brought it."""
+    with services.database.write() as session:
+        row = session.get_one(models.Run, run["id"])
+        row.state = state
+        for name, value in columns.items():
+            setattr(row, name, value)
+
+
+def test_launching_queues_one_run_a_seed_and_rings_for_each(client: TestClient, doorbell: RecordingDoorbell) -> None:
+    experiment = launch(client, "  Corridor ", seeds=(3, 1), steps=5_000)
+
     assert experiment["name"] == "Corridor"
     assert experiment["state"] == "queued"
     assert experiment["success"] is None
-    assert [(run["seed"], run["state"], run["total_steps"]) for run in experiment["runs"]] == [
-        (1, "queued", 5_000),
-        (3, "queued", 5_000),
+    assert [(run["seed"], run["state"], run["attempt"], run["step"], run["total_steps"]) for run in experiment["runs"]] == [
+        (1, "queued", 0, 0, 5_000),
+        (3, "queued", 0, 0, 5_000),
     ]
-    assert experiment["training"]["task"]["arena"] == {"name": "simple"}
+    # What was left out has its default, and is shown.
+    assert experiment["training"] == TrainingConfig(steps=5_000).model_dump(mode="json")
     assert client.get(f"/api/experiments/{experiment['id']}").json() == experiment
+    assert doorbell.rings == [(run["id"], 0) for run in experiment["runs"]]
+
+
+@pytest.mark.parametrize(
+    ("body", "loc"),
+    [
+        ({"name": ""}, ["body", "name"]),
+        ({"name": "x" * 121}, ["body", "name"]),
+        ({"seeds": []}, ["body", "seeds"]),
+        ({"seeds": [1, 1]}, ["body", "seeds"]),
+        ({"seeds": [0, -1]}, ["body", "seeds", 1]),
+        ({"training": {"steps": 10}}, ["body", "training", "steps"]),
+        ({"training": {"algorithm": {"gamma": 1.5}}}, ["body", "training", "algorithm", "gamma"]),
+        ({"training": {"task": {"lidar": {"batches": 7}}}}, ["body", "training", "task", "lidar"]),
+        ({"surprise": 1}, ["body", "surprise"]),
+    ],
+)
+def test_a_wrong_value_is_refused_next_to_its_field(client: TestClient, body: dict[str, Any], loc: list[str]) -> None:
+    response = client.post("/api/experiments", json=body)
+
+    assert response.status_code == 422
+    assert [problem["loc"] for problem in response.json()["detail"]] == [loc]
+    assert client.get("/api/experiments").json()["total"] == 0
+
+
+def test_infinite_and_missing_numbers_are_refused(client: TestClient) -> None:
+    body = '{"training": {"task": {"reward": {"arrival": Infinity, "collision": NaN}}}}'
+    response = client.post("/api/experiments", content=body, headers={"Content-Type": "application/json"})
+
+    assert response.status_code == 422
+    assert [problem["loc"][-1] for problem in response.json()["detail"]] == ["arrival", "collision"]
+
+
+def test_the_form_can_be_sent_as_it_comes(client: TestClient) -> None:
+    form = client.get("/api/training/form").json()
+
+    assert form["schema"]["title"] == "ExperimentCreate"
+    assert [preset["id"] for preset in form["presets"]] == ["default", "paper"]
+    assert form["presets"][0]["training"] == form["defaults"]["training"]
+    assert client.post("/api/experiments", json=form["defaults"]).status_code == 201
+    paper = form["defaults"] | {"training": form["presets"][1]["training"]}
+    assert client.post("/api/experiments", json=paper).json()["training"]["algorithm"]["network"]["name"] == "resblock"
+
+
+def test_the_list_is_searched_filtered_and_paged(client: TestClient, services: Services) -> None:
+    names = ["Maze 50%", "maze 500", "Corridor", "Élan"]
+    created = {name: launch(client, name) for name in names}
+    set_state(services, created["Corridor"]["runs"][0], "failed")
+
+    def listed(**parameters: Any) -> list[str]:
+        page = client.get("/api/experiments", params=parameters).json()
+        return [experiment["name"] for experiment in page["items"]]
+
+    assert listed() == names[::-1]
+    assert listed(query="MAZE") == ["maze 500", "Maze 50%"]
+    # A search is for what it says, not a pattern.
+    assert listed(query="50%") == ["Maze 50%"]
+    assert listed(query="_") == []
+    assert listed(state="failed") == ["Corridor"]
+    assert listed(state="queued", limit=2, offset=1) == ["maze 500", "Maze 50%"]
+    assert client.get("/api/experiments", params={"state": "queued", "limit": 1}).json()["total"] == 3
+
+
+@pytest.mark.parametrize("parameters", [{"limit": 0}, {"limit": 201}, {"offset": -1}, {"state": "happy"}])
+def test_a_page_that_cannot_be_is_refused(client: TestClient, parameters: dict[str, Any]) -> None:
+    assert client.get("/api/experiments", params=parameters).status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("states", "together"),
+    [
+        (["completed", "completed"], "completed"),
+        (["completed", "running"], "running"),
+        (["stopping", "queued"], "stopping"),
+        (["completed", "queued"], "queued"),
+        (["completed", "failed"], "mixed"),
+        (["stopped"], "stopped"),
+    ],
+)
+def test_the_state_of_runs_together(states: list[RunState], together: str) -> None:
+    assert aggregate_state(states) == together
+
+
+run_states = st.sampled_from(["queued", "running", "stopping", "stopped", "completed", "failed"])
+
+
+@pytest.fixture(scope="module")
+def module_database(tmp_path_factory: pytest.TempPathFactory) -> Database:
+    database = Database(f"sqlite:///{tmp_path_factory.mktemp('states') / 'test.db'}")
+    upgrade(database)
+    return database
+
+
+@given(states=st.lists(run_states, min_size=1, max_size=5))
+def test_the_filter_in_sql_agrees_with_the_state_that_is_shown(module_database: Database, states: list[RunState]) -> None:
+    with Session(module_database.engine) as session:
+        runs = [models.Run(id=str(seed), seed=seed, state=state) for seed, state in enumerate(states)]
+        session.add(models.Experiment(id="e", name="e", training={}, runs=runs))
+        session.flush()
+        shown = aggregate_state(states)
+        for state in ("queued", "running", "stopping", "stopped", "completed", "failed", "mixed"):
+            _, total = ExperimentRepository(session).page(query="", state=state, limit=1, offset=0)
+            assert total == (state == shown)
+        session.rollback()
+
+
+def test_stopping_ends_what_waits_and_asks_what_runs(client: TestClient, services: Services, links: RecordingLinks) -> None:
+    experiment = launch(client, seeds=(0, 1, 2))
+    set_state(services, experiment["runs"][1], "running")
+    set_state(services, experiment["runs"][2], "completed")
+
+    stopped = client.post(f"/api/experiments/{experiment['id']}/stop").json()
+
+    assert [run["state"] for run in stopped["runs"]] == ["stopped", "stopping", "completed"]
+    assert stopped["state"] == "stopping"
+    assert stopped["runs"][0]["finished_at"] is not None
+    assert links.told == [("stop", experiment["runs"][1]["id"])]
+
+
+def test_resuming_queues_what_was_stopped_or_has_failed(
+    client: TestClient, services: Services, doorbell: RecordingDoorbell
+) -> None:
+    experiment = launch(client, seeds=(0, 1, 2))
+    set_state(services, experiment["runs"][0], "stopped", attempt=2, finished_at=1.0)
+    set_state(services, experiment["runs"][1], "failed", attempt=4, error="out of memory", losses=3)
+    set_state(services, experiment["runs"][2], "completed")
+    doorbell.rings.clear()
+
+    resumed = client.post(f"/api/experiments/{experiment['id']}/resume").json()
+
+    assert [run["state"] for run in resumed["runs"]] == ["queued", "queued", "completed"]
+    assert resumed["runs"][0]["finished_at"] is None
+    assert resumed["runs"][1]["error"] is None
+    assert doorbell.rings == [(experiment["runs"][0]["id"], 2), (experiment["runs"][1]["id"], 4)]
+    with services.database.read() as session:
+        assert session.scalar(select(models.Run.losses).where(models.Run.id == experiment["runs"][1]["id"])) == 0
+
+
+def test_nothing_to_stop_and_nothing_to_resume(client: TestClient, services: Services) -> None:
+    experiment = launch(client)
+    assert client.post(f"/api/experiments/{experiment['id']}/resume").status_code == 409
+    set_state(services, experiment["runs"][0], "completed")
+
+    response = client.post(f"/api/experiments/{experiment['id']}/stop")
+    assert response.status_code == 409
+    assert response.json() == {"detail": "All runs of this experiment have ended already."}
+
+
+def test_renaming(client: TestClient) -> None:
+    experiment = launch(client)
+
+    renamed = client.patch(f"/api/experiments/{experiment['id']}", json={"name": "Better name"})
+    assert renamed.status_code == 200
+    assert renamed.json() == experiment | {"name": "Better name"}
+    assert client.patch(f"/api/experiments/{experiment['id']}", json={"name": "   "}).status_code == 422
+    assert client.patch(f"/api/experiments/{experiment['id']}", json={"id": "x", "name": "y"}).status_code == 422
+
+
+def test_deleting_cuts_off_workers_and_leaves_nothing(client: TestClient, services: Services, links: RecordingLinks) -> None:
+    experiment, other = launch(client), launch(client)
+    run = experiment["runs"][0]
+    set_state(services, run, "running")
+
+    response = client.delete(f"/api/experiments/{experiment['id']}")
+
+    assert response.status_code == 204
+    assert links.told == [("cut", run["id"])]
+    assert client.get(f"/api/experiments/{experiment['id']}").status_code == 404
+    assert client.get(f"/api/runs/{run['id']}").status_code == 404
+    assert client.get(f"/api/experiments/{other['id']}").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/api/experiments/nobody"),
+        ("PATCH", "/api/experiments/nobody"),
+        ("DELETE", "/api/experiments/nobody"),
+        ("POST", "/api/experiments/nobody/stop"),
+        ("POST", "/api/experiments/nobody/resume"),
+    ],
+)
+def test_an_experiment_that_is_not_there(client: TestClient, method: str, path: str) -> None:
+    response = client.request(method, path, json={"name": "x"})
+
+    assert response.status_code == 404
+    assert response.json() == {"detail": "There is no experiment nobody; it may have been deleted."}
+
+
+def test_whoever_looks_on_is_told(client: TestClient, services: Services) -> None:
+    told: list[Change] = []
+
+    class RecordingBus(EventBus):
+        def publish(self, change: Change) -> None:
+            told.append(change)
+
+    services.bus = RecordingBus()
+    experiment = launch(client)
+    client.post(f"/api/experiments/{experiment['id']}/stop")
+    client.delete(f"/api/experiments/{experiment['id']}")
+
+    assert [(change.experiment_id, change.run_id, change.kind) for change in told] == [
+        (experiment["id"], None, "experiment"),
+        (experiment["id"], experiment["runs"][0]["id"], "run"),
+        (experiment["id"], None, "deleted"),
+    ]

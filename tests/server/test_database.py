@@ -1,0 +1,85 @@
+"""Transactions: readers can't write, writers wait for one another, and a failed block leaves nothing."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy.exc import DBAPIError
+
+from server import models
+from server.database import Database
+from server.migrate import upgrade
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
+    is_sqlite = request.param == "sqlite"
+    database = Database(f"sqlite:///{tmp_path / 'test.db'}" if is_sqlite else request.getfixturevalue("postgres_url"))
+    upgrade(database)
+    yield database
+    database.dispose()
+
+
+def names(database: Database) -> list[str]:
+    with database.read() as session:
+        return sorted(worker.name for worker in session.query(models.Worker))
+
+
+def test_a_reader_cannot_write(database: Database) -> None:
+    with database.read() as session:
+        session.add(models.Worker(name="w", last_seen=0.0))
+        with pytest.raises(DBAPIError, match=r"read-?only"):
+            session.flush()
+
+    with database.write() as session:
+        session.add(models.Worker(name="allowed again", last_seen=0.0))
+    assert names(database) == ["allowed again"]
+
+
+def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
+    def fail_midway() -> None:
+        with database.write() as session:
+            session.add(models.Worker(name="w", last_seen=0.0))
+            session.flush()
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail_midway()
+
+    assert names(database) == []
+
+
+def test_writers_wait_for_one_another(database: Database) -> None:
+    """Eight threads count in one row; deferred transactions would lose counts or fail."""
+    with database.write() as session:
+        session.add(models.Worker(name="counter", last_seen=0.0))
+
+    def count() -> None:
+        for _ in range(20):
+            with database.write() as session:
+                session.get_one(models.Worker, "counter", with_for_update=True).last_seen += 1
+
+    threads = [threading.Thread(target=count) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+    with database.read() as session:
+        assert session.get_one(models.Worker, "counter").last_seen == 160
+
+
+def test_an_experiment_takes_everything_along_when_it_goes(database: Database) -> None:
+    with database.write() as session:
+        session.add(models.Experiment(id="e", name="e", training={}, runs=[models.Run(id="r", seed=0)]))
+        session.flush()
+        session.add(models.RunEvent(run_id="r", level="info", message="m"))
+        session.add(models.MetricRow(run_id="r", seq=1, step=1, wall_time=0.0, values={"x": 1.0}))
+        session.add(models.Checkpoint(id="c", run_id="r", step=1, size=1, sha256="0"))
+    with database.write() as session:
+        session.delete(session.get_one(models.Experiment, "e"))
+
+    with database.read() as session:
+        for table in (models.Run, models.RunEvent, models.MetricRow, models.Checkpoint):
+            assert session.query(table).count() == 0

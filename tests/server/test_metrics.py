@@ -1,0 +1,241 @@
+"""Curves: appended once, compacted without loss, cut back to a checkpoint, downsampled without losing extremes."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server import models
+from server.database import Database
+from server.metrics.points import Points, downsample
+from server.metrics.repository import MetricRepository, ReportedRow
+from server.migrate import upgrade
+from server.services import Services
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
+    """Each database that the service runs on, with one run in it."""
+    is_sqlite = request.param == "sqlite"
+    database = Database(f"sqlite:///{tmp_path / 'test.db'}" if is_sqlite else request.getfixturevalue("postgres_url"))
+    upgrade(database)
+    with database.write() as session:
+        session.add(models.Experiment(id="e", name="e", training={}, runs=[models.Run(id="r", seed=0)]))
+    yield database
+    database.dispose()
+
+
+def rows(*steps: int, first_seq: int = 1, name: str = "loss/policy") -> list[ReportedRow]:
+    """One row a step, whose value is the step's negative."""
+    return [ReportedRow(first_seq + i, step, 1_000.0 + step, {name: -float(step)}) for i, step in enumerate(steps)]
+
+
+def append(database: Database, new: list[ReportedRow]) -> None:
+    """What the link does with a batch: rows and cursor in one transaction."""
+    with database.write() as session:
+        MetricRepository(session).append_rows("r", new)
+        run = session.get_one(models.Run, "r")
+        run.last_seq = max(run.last_seq, *(row.seq for row in new))
+
+
+def compact(database: Database) -> None:
+    with database.write() as session:
+        MetricRepository(session).compact("r")
+
+
+def drop_beyond(database: Database, step: int) -> None:
+    with database.write() as session:
+        MetricRepository(session).drop_beyond("r", step)
+
+
+def steps(database: Database, name: str = "loss/policy") -> list[int]:
+    with database.read() as session:
+        found = MetricRepository(session).read("r").get(name, Points.joined([]))
+    assert found.values.tolist() == [-float(step) for step in found.steps]
+    assert found.times.tolist() == [1_000.0 + step for step in found.steps]
+    return [int(step) for step in found.steps]
+
+
+def latest(database: Database) -> dict[str, tuple[int, float]]:
+    with database.read() as session:
+        return {metric.name: (metric.step, metric.value) for metric in session.query(models.LatestMetric)}
+
+
+def test_rows_are_there_once_however_often_they_come(database: Database) -> None:
+    append(database, rows(10, 20, 30))
+    append(database, rows(10, 20, 30, 40))
+
+    assert steps(database) == [10, 20, 30, 40]
+    assert latest(database) == {"loss/policy": (40, -40.0)}
+
+
+def test_rows_that_were_compacted_do_not_come_back(database: Database) -> None:
+    append(database, rows(10, 20, 30))
+    compact(database)
+    append(database, rows(10, 20, 30, 40))
+
+    assert steps(database) == [10, 20, 30, 40]
+
+
+def test_compaction_leaves_the_curve_as_it_was(database: Database) -> None:
+    append(database, [*rows(1, 2, 3), *rows(3, first_seq=4, name="eval/steps")])
+    compact(database)
+    append(database, [*rows(4, first_seq=5), *rows(4, first_seq=6, name="eval/steps")])
+    compact(database)
+
+    assert steps(database) == [1, 2, 3, 4]
+    assert steps(database, "eval/steps") == [3, 4]
+    with database.read() as session:
+        # A chunk that is not full is grown: rare series don't end in chunks of one point.
+        assert session.query(models.MetricChunk).count() == 2
+        assert session.query(models.MetricRow).count() == 0
+
+
+def test_a_chunk_that_is_full_is_followed_by_another(database: Database) -> None:
+    append(database, rows(*range(1, 5_001)))
+    compact(database)
+    append(database, rows(5_001, first_seq=5_001))
+    compact(database)
+
+    assert steps(database) == list(range(1, 5_002))
+    with database.read() as session:
+        assert sorted(count for (count,) in session.query(models.MetricChunk.count)) == [905, 4_096]
+
+
+@pytest.mark.parametrize("compacted", [False, True])
+@pytest.mark.parametrize(("cut", "left"), [(25, [10, 20]), (20, [10, 20]), (9, []), (99, [10, 20, 30])])
+def test_what_a_lost_attempt_did_beyond_its_checkpoint_is_dropped(
+    database: Database, compacted: bool, cut: int, left: list[int]
+) -> None:
+    append(database, rows(10, 20, 30))
+    if compacted:
+        compact(database)
+    drop_beyond(database, cut)
+
+    assert steps(database) == left
+    assert latest(database) == ({"loss/policy": (left[-1], -float(left[-1]))} if left else {})
+
+
+def test_the_next_attempt_continues_where_the_lost_one_was_cut(database: Database) -> None:
+    append(database, rows(10, 20, 30))
+    compact(database)
+    drop_beyond(database, 20)
+    append(database, rows(25, 35, first_seq=4))
+    compact(database)
+
+    assert steps(database) == [10, 20, 25, 35]
+
+
+def test_values_that_are_not_finite_are_gaps(database: Database) -> None:
+    append(database, [ReportedRow(1, 1, 0.0, {"x": 1.0}), ReportedRow(2, 2, 0.0, {"x": math.nan, "y": math.inf})])
+    for _ in range(2):
+        with database.read() as session:
+            series = MetricRepository(session).read("r")
+        assert np.isnan(series["x"].values).tolist() == [False, True]
+        assert np.isnan(series["y"].values).tolist() == [True]
+        compact(database)
+    assert latest(database) == {"x": (1, 1.0)}
+
+
+points_strategy = st.lists(
+    st.tuples(st.integers(0, 2**40), st.floats(0, 2e9), st.floats(width=32, allow_nan=False, allow_infinity=False)),
+    unique_by=lambda point: point[0],
+    max_size=300,
+).map(sorted)
+
+
+@given(points_strategy)
+def test_a_chunk_gives_back_exactly_what_was_put_in(points: list[tuple[int, float, float]]) -> None:
+    original = Points.of([p[0] for p in points], [p[1] for p in points], [p[2] for p in points])
+    decoded = Points.decode(original.encode(), len(points))
+
+    assert decoded.steps.tolist() == [p[0] for p in points]
+    assert decoded.times.tolist() == [p[1] for p in points]
+    assert decoded.values.tolist() == [p[2] for p in points]
+
+
+def test_of_several_values_at_one_step_the_last_counts() -> None:
+    points = Points.of([1, 2, 2, 3], [0, 0, 0, 0], [1, 2, 9, 3])
+
+    assert points.steps.tolist() == [1, 2, 3]
+    assert points.values.tolist() == [1, 9, 3]
+
+
+@given(points_strategy, st.integers(2, 50))
+def test_downsampling_keeps_extremes_ends_and_order(points: list[tuple[int, float, float]], limit: int) -> None:
+    original = Points.of([p[0] for p in points], [p[1] for p in points], [p[2] for p in points])
+    cut = downsample(original, limit)
+
+    if len(points) <= limit:
+        assert cut.low is None
+        assert cut.values.tolist() == original.values.tolist()
+        return
+    assert cut.low is not None
+    assert cut.high is not None
+    assert cut.steps.size == limit
+    assert (np.diff(cut.steps) > 0).all()
+    assert cut.low.min() == original.values.min()
+    assert cut.high.max() == original.values.max()
+    assert (cut.low <= cut.values).all()
+    assert (cut.values <= cut.high).all()
+    # The newest point stands alone, so that the end of a curve is what the run's page says in figures.
+    assert (cut.steps[-1], cut.values[-1]) == (original.steps[-1], original.values[-1])
+
+
+def test_downsampling_worked_by_hand() -> None:
+    cut = downsample(Points.of([1, 2, 3, 4, 5], [0] * 5, [1, 3, 5, math.nan, 2]), 3)
+
+    # Two buckets of two and the newest point.
+    assert cut.steps.tolist() == [2, 4, 5]
+    assert cut.values.tolist() == [2, 5, 2]
+    assert cut.low is not None
+    assert cut.low.tolist() == [1, 5, 2]
+    assert cut.high is not None
+    assert cut.high.tolist() == [3, 5, 2]
+
+
+def run_of(client: TestClient) -> str:
+    run_id: str = client.post("/api/experiments", json={}).json()["runs"][0]["id"]
+    return run_id
+
+
+def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None:
+    run_id = run_of(client)
+    with services.database.write() as session:
+        reported = [ReportedRow(i, i * 10, 0.0, {"train/return": i / 4, "loss/value": math.nan}) for i in range(1, 6)]
+        MetricRepository(session).append_rows(run_id, reported)
+
+    everything = client.get(f"/api/runs/{run_id}/metrics").json()["series"]
+    assert [series["name"] for series in everything] == ["loss/value", "train/return"]
+    assert everything[0]["values"] == [None] * 5
+    assert everything[1]["steps"] == [10, 20, 30, 40, 50]
+    assert everything[1]["values"] == [0.25, 0.5, 0.75, 1.0, 1.25]
+    assert everything[1]["min"] is None
+
+    (narrow,) = client.get(f"/api/runs/{run_id}/metrics", params={"names": "train/return", "points": 2}).json()["series"]
+    assert narrow == {
+        "name": "train/return",
+        "steps": [40, 50],
+        "values": [0.625, 1.25],
+        "min": [0.25, 1.25],
+        "max": [1.0, 1.25],
+    }
+    assert client.get(f"/api/runs/{run_id}/metrics", params={"names": "nothing"}).json() == {"series": []}
+
+
+def test_curves_of_no_run_and_in_no_width(client: TestClient) -> None:
+    assert client.get("/api/runs/nobody/metrics").status_code == 404
+    assert client.get(f"/api/runs/{run_of(client)}/metrics", params={"points": 1}).status_code == 422
+
+
+def test_figures_have_the_seven_digits_that_are_kept(client: TestClient, services: Services) -> None:
+    run_id = run_of(client)
+    with services.database.write() as session:
+        MetricRepository(session).append_rows(run_id, [ReportedRow(1, 10, 0.0, {"x": 0.1})])
+
+    assert client.get(f"/api/runs/{run_id}/metrics").json()["series"][0]["values"] == [0.1]

@@ -1,0 +1,56 @@
+"""The migrations lead from nothing to exactly the tables of the models, on both databases."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import inspect, text
+
+from server.database import Database
+from server.migrate import IncompatibleDatabaseError, migration_config, upgrade
+from server.models import Base
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
+    is_sqlite = request.param == "sqlite"
+    database = Database(f"sqlite:///{tmp_path / 'test.db'}" if is_sqlite else request.getfixturevalue("postgres_url"))
+    yield database
+    database.dispose()
+
+
+def test_migrations_and_models_agree(database: Database) -> None:
+    upgrade(database)
+
+    with database.engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True, "compare_server_default": True})
+        assert compare_metadata(context, Base.metadata) == []
+
+
+def test_a_second_start_finds_nothing_to_do(database: Database) -> None:
+    upgrade(database)
+    with database.write() as session:
+        session.execute(text("INSERT INTO workers (name, last_seen) VALUES ('kept', 1.0)"))
+    upgrade(database)
+
+    with database.read() as session:
+        assert session.scalar(text("SELECT name FROM workers")) == "kept"
+
+
+def test_the_way_back_leaves_nothing(database: Database) -> None:
+    upgrade(database)
+    command.downgrade(migration_config(database), "base")
+
+    assert inspect(database.engine).get_table_names() == ["alembic_version"]
+
+
+def test_a_database_of_a_newer_version_is_refused(database: Database) -> None:
+    upgrade(database)
+    with database.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+
+    with pytest.raises(IncompatibleDatabaseError, match="newer version"):
+        upgrade(database)
