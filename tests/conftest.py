@@ -12,7 +12,7 @@ POSTGRES = ("127.0.0.1", 5432)
 
 
 def require_service(name: str, host: str, port: int) -> None:
-    """Skip the test where nobody listens; with REQUIRE_SERVICES=1 that is an error, so that CI can't pass without having run it."""
+    """Skip the test where nobody listens; with REQUIRE_SERVICES=1 that is an error: CI must have run it."""
     try:
         socket.create_connection((host, port), timeout=2).close()
     except OSError as error:
