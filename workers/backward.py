@@ -17,13 +17,16 @@ _aten = torch.ops.aten
 
 
 class Backward(Protocol):
-    """One network's forward and backward pass; `backward` belongs to the `forward` before it."""
+    """One network's forward and backward pass; the gradients belong to the `forward` before them."""
 
     def forward(self, inputs: Tensor) -> Tensor:
         """(n, inputs) to (n, outputs), n at most the batch size that the buffers were made for."""
 
     def backward(self, output_gradient: Tensor) -> None:
-        """Overwrites every parameter's `.grad` with the gradient of the scalar whose derivative by the outputs is given."""
+        """Overwrites every parameter's `.grad`, given the derivative (n, outputs) of a scalar by the outputs."""
+
+    def input_gradient(self, output_gradient: Tensor) -> Tensor:
+        """The derivative (n, inputs) of that scalar by the inputs; leaves the parameters' `.grad` alone."""
 
 
 def backward_of(network: Body, batch_size: int) -> Backward:
@@ -53,19 +56,29 @@ class MlpBackward:
 
     def backward(self, output_gradient: Tensor) -> None:
         """See `Backward.backward`."""
+        deltas = self._backpropagate(output_gradient)
+        inputs = (self._inputs, *(hidden[: len(output_gradient)] for hidden in self._hidden))
+        for layer, layer_inputs, delta in zip((*self._layers, self._head), inputs, deltas, strict=True):
+            _parameter_gradients(layer, layer_inputs, delta)
+
+    def input_gradient(self, output_gradient: Tensor) -> Tensor:
+        """See `Backward.input_gradient`."""
+        return self._backpropagate(output_gradient)[0] @ self._layers[0].weight
+
+    def _backpropagate(self, output_gradient: Tensor) -> list[Tensor]:
+        """The derivative by each layer's sum before its activation, first layer first."""
         rows = len(output_gradient)
-        delta, above = output_gradient, self._head
-        for layer, hidden, buffer in zip(
-            reversed(self._layers), reversed(self._hidden), reversed(self._deltas), strict=True
+        deltas = [output_gradient]
+        for above, hidden, buffer in zip(
+            (self._head, *reversed(self._layers[1:])), reversed(self._hidden), reversed(self._deltas), strict=True
         ):
-            _parameter_gradients(above, hidden[:rows], delta)
-            delta = torch.mm(delta, above.weight, out=buffer[:rows])
+            delta = torch.mm(deltas[-1], above.weight, out=buffer[:rows])
             if self._relu:
                 _aten.threshold_backward.grad_input(delta, hidden[:rows], 0, grad_input=delta)
             else:
                 _aten.tanh_backward.grad_input(delta, hidden[:rows], grad_input=delta)
-            above = layer
-        _parameter_gradients(above, self._inputs, delta)
+            deltas.append(delta)
+        return deltas[::-1]
 
 
 class ResBlockBackward:
@@ -100,20 +113,32 @@ class ResBlockBackward:
     def backward(self, output_gradient: Tensor) -> None:
         """See `Backward.backward`."""
         net, rows = self._net, len(output_gradient)
-        hidden1, concat1 = self._hidden1[:rows], self._concat1[:rows]
-        hidden3, concat2 = self._hidden3[:rows], self._concat2[:rows]
+        delta1, delta2, delta3, delta4, _ = self._backpropagate(output_gradient)
+        _parameter_gradients(net.head, self._concat2[:rows], output_gradient)
+        _parameter_gradients(net.layer4, self._hidden3[:rows], delta4)
+        _parameter_gradients(net.layer3, self._concat1[:rows], delta3)
+        _parameter_gradients(net.layer2, self._hidden1[:rows], delta2)
+        _parameter_gradients(net.layer1, self._inputs, delta1)
 
-        _parameter_gradients(net.head, concat2, output_gradient)
+    def input_gradient(self, output_gradient: Tensor) -> Tensor:
+        """See `Backward.input_gradient`."""
+        delta1, _, _, _, shortcut = self._backpropagate(output_gradient)
+        return torch.addmm(shortcut, delta1, self._net.layer1.weight)
+
+    def _backpropagate(self, output_gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        """The derivatives by the sums of layers 1 to 4 before activation, and by the inputs over the first shortcut."""
+        net, rows = self._net, len(output_gradient)
+        concat1, concat2 = self._concat1[:rows], self._concat2[:rows]
         delta_concat2 = _through_leaky(output_gradient @ net.head.weight, concat2)
         delta4 = _through_leaky(delta_concat2[:, : self._width2], concat2[:, : self._width2])
-        _parameter_gradients(net.layer4, hidden3, delta4)
-        delta3 = _through_leaky(torch.mm(delta4, net.layer4.weight, out=self._delta3[:rows]), hidden3)
-        _parameter_gradients(net.layer3, concat1, delta3)
+        delta3 = torch.mm(delta4, net.layer4.weight, out=self._delta3[:rows])
+        _through_leaky(delta3, self._hidden3[:rows])
         delta_concat1 = torch.addmm(delta_concat2[:, self._width2 :], delta3, net.layer3.weight)
-        delta2 = _through_leaky(delta_concat1, concat1)[:, : self._width1]
-        _parameter_gradients(net.layer2, hidden1, delta2)
-        delta1 = _through_leaky(torch.mm(delta2, net.layer2.weight, out=self._delta1[:rows]), hidden1)
-        _parameter_gradients(net.layer1, self._inputs, delta1)
+        _through_leaky(delta_concat1, concat1)
+        delta2 = delta_concat1[:, : self._width1]
+        delta1 = torch.mm(delta2, net.layer2.weight, out=self._delta1[:rows])
+        _through_leaky(delta1, self._hidden1[:rows])
+        return delta1, delta2, delta3, delta4, delta_concat1[:, self._width1 :]
 
 
 def _buffer(layer: nn.Linear, rows: int) -> Tensor:

@@ -64,7 +64,7 @@ def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> Non
     torch.manual_seed(0)
     network = build_network(config, 16, 3).double()
     flat = FlatParameters(network)
-    inputs, by_output = torch.randn(rows, 16).double(), torch.randn(rows, 3).double()
+    inputs, by_output = torch.randn(rows, 16).double().requires_grad_(), torch.randn(rows, 3).double()
 
     outputs = network(inputs)
     outputs.backward(by_output)
@@ -75,4 +75,7 @@ def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> Non
     with torch.no_grad():
         assert torch.allclose(passes.forward(inputs), outputs, rtol=0, atol=1e-13)
         passes.backward(by_output)
+        by_input = passes.input_gradient(by_output)
+    assert inputs.grad is not None
+    assert torch.allclose(by_input, inputs.grad, rtol=0, atol=1e-12)
     assert torch.allclose(flat.gradients, expected, rtol=0, atol=1e-12)

@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers.algorithms import build_algorithm
+from workers.algorithms.actor_critic_gradients import AutogradActorCritic, WrittenActorCritic
 from workers.algorithms.ddpg import Ddpg, build_ddpg
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.replay import ReplayBuffer, Transitions
 from workers.algorithms.sac import Sac, build_sac, log_slope
 from workers.algorithms.td3 import Td3, build_td3
-from workers.config import DdpgConfig, MlpNetwork, SacConfig, Td3Config
+from workers.config import DdpgConfig, MlpNetwork, Network, ResBlockNetwork, SacConfig, Td3Config
 from workers.policy import Policy
 
 F = np.float32
@@ -105,12 +106,31 @@ def test_target_networks_move_by_tau() -> None:
     assert torch.equal(target.values, torch.full_like(target.values, 1.5))
 
 
-def test_actor_update_leaves_the_critic_alone() -> None:
-    ddpg = build_ddpg(DdpgConfig(network=SMALL), 3, 0, CPU)
-    ddpg.learn(one_batch())
-    before = ddpg.critic_optimizer.gradients.clone()
-    ddpg.actor_optimizer.descend(-ddpg.critics[0](torch.cat((torch.ones(1, 3), ddpg.actor(torch.ones(1, 3))), 1)).mean())
-    assert torch.equal(ddpg.critic_optimizer.gradients, before)
+@pytest.mark.parametrize("network", [MlpNetwork(), ResBlockNetwork()], ids=repr)
+def test_written_out_gradients_equal_autograd(network: Network) -> None:
+    td3 = build_td3(Td3Config(network=network, batch_size=32), 16, 0, CPU)
+    actor, critics = td3.actor_optimizer, td3.critic_optimizer
+    reference = AutogradActorCritic(td3.actor, td3.critics, actor, critics)
+    written = WrittenActorCritic(td3.actor, td3.critics, 32)
+    with torch.no_grad():
+        td3.actor.network.head.weight.mul_(10.0)
+    batch = Transitions(torch.randn(32, 16), torch.rand(32, 2), torch.rand(32, 1), torch.ones(32, 1), torch.randn(32, 16))
+    targets = torch.randn(32, 1)
+
+    expected_loss = reference.critics(batch, targets)
+    expected = critics.gradients.clone()
+    critics.gradients.fill_(float("nan"))
+    assert torch.allclose(written.critics(batch, targets), expected_loss)
+    assert torch.allclose(critics.gradients, expected, rtol=0, atol=2e-6 * float(expected.abs().max()))
+
+    expected_loss = reference.actor(batch.observations)
+    expected = actor.gradients.clone()
+    assert expected.abs().max() > 1e-3
+    before = critics.gradients.clone()
+    actor.gradients.fill_(float("nan"))
+    assert torch.allclose(written.actor(batch.observations), expected_loss)
+    assert torch.allclose(actor.gradients, expected, rtol=0, atol=2e-6 * float(expected.abs().max()))
+    assert torch.equal(critics.gradients, before)  # the actor's update leaves the critics alone
 
 
 def record(algorithm: OffPolicyAlgorithm, rng: np.random.Generator, steps: int) -> None:

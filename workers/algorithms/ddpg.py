@@ -10,8 +10,9 @@ import copy
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
+from workers.algorithms.actor_critic_gradients import ActorCriticGradients, WrittenActorCritic, action_value
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
 from workers.algorithms.replay import Transitions
@@ -24,22 +25,27 @@ class NoisyPolicy(OffPolicyAlgorithm):
     """A deterministic actor with decaying noise: what DDPG and TD3 have in common."""
 
     def __init__(
-        self, config: DdpgConfig | Td3Config, actor: DeterministicActor, critics: nn.ModuleList, generator: torch.Generator
+        self,
+        config: DdpgConfig | Td3Config,
+        actor: DeterministicActor,
+        critics: tuple[Body, ...],
+        generator: torch.Generator,
     ) -> None:
         self.config, self.actor, self.critics = config, actor, critics
         self.target_actor, self.target_critics = copy.deepcopy(actor), copy.deepcopy(critics)
         self.actor_optimizer = FlatAdam(actor, learning_rate=config.actor_learning_rate)
-        self.critic_optimizer = FlatAdam(critics, learning_rate=config.critic_learning_rate)
+        self.critic_optimizer = FlatAdam(*critics, learning_rate=config.critic_learning_rate)
         super().__init__(
             config,
             online={"actor": self.actor_optimizer, "critic": self.critic_optimizer},
             targets={
                 "target_actor": FlatParameters(self.target_actor),
-                "target_critic": FlatParameters(self.target_critics),
+                "target_critic": FlatParameters(*self.target_critics),
             },
             observation_size=actor.observation_size,
             generator=generator,
         )
+        self.gradients: ActorCriticGradients = WrittenActorCritic(actor, critics, config.batch_size)
         self._noise = config.exploration_noise
         self._half_range = ACTION_HALF_RANGE.to(generator.device)
 
@@ -79,35 +85,28 @@ class Ddpg(NoisyPolicy):
             targets = batch.rewards + self.config.gamma * batch.continues * following
 
         # Update critic by minimizing the loss L = 1/N sum_i (y_i - Q(s_i, a_i))^2
-        values = action_value(self.critics[0], batch.observations, batch.actions)
-        critic_loss = (values - targets).square().mean()
-        self.critic_optimizer.descend(critic_loss)
+        critic_loss = self.gradients.critics(batch, targets)
+        self.critic_optimizer.step()
 
         # Update the actor policy using the sampled policy gradient 1/N sum_i grad_a Q(s_i, a) grad mu(s_i)
-        actor_loss = -action_value(self.critics[0], batch.observations, self.actor(batch.observations)).mean()
-        self.actor_optimizer.descend(actor_loss)
+        actor_loss = self.gradients.actor(batch.observations)
+        self.actor_optimizer.step()
 
         # Update the target networks
         self.follow("target_critic", "critic")
         self.follow("target_actor", "actor")
-        return {"loss/policy": actor_loss.detach(), "loss/value": critic_loss.detach(), "value/mean": targets.mean()}
-
-
-def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Tensor:
-    """Q (n, 1) of observations (n, size) and actions (n, 2)."""
-    value: Tensor = critic(torch.cat((observations, actions), dim=1))
-    return value
+        return {"loss/policy": actor_loss, "loss/value": critic_loss, "value/mean": targets.mean()}
 
 
 def build_noisy_networks(
     config: DdpgConfig | Td3Config, critics: int, observation_size: int, seed: int, device: torch.device
-) -> tuple[DeterministicActor, nn.ModuleList]:
+) -> tuple[DeterministicActor, tuple[Body, ...]]:
     """Actor and critics, freshly initialised; the same seed gives the same weights on every device."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         actor = DeterministicActor(build_network(config.network, observation_size, ACTION_SIZE), observation_size)
-        networks: list[Body] = [build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(critics)]
-    return actor.to(device), nn.ModuleList(networks).to(device)
+        networks = [build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(critics)]
+    return actor.to(device), tuple(network.to(device) for network in networks)
 
 
 def build_ddpg(config: DdpgConfig, observation_size: int, seed: int, device: torch.device) -> Ddpg:

@@ -29,6 +29,11 @@ class FlatParameters:
         sizes = [sum(parameter.numel() for parameter in module.parameters()) for module in modules]
         self._module_gradients: Sequence[Tensor] = torch.split(self.gradients, sizes)
 
+    def differentiate(self, loss: Tensor) -> None:
+        """Overwrites `gradients` with those of a scalar, by autograd; other parameters get none."""
+        self.gradients.zero_()
+        torch.autograd.backward(loss, inputs=self._parameters)
+
     @property
     def finite(self) -> bool:
         """Whether every parameter is a finite number."""
@@ -63,9 +68,8 @@ class FlatAdam(FlatParameters):
         self._adam.step()
 
     def descend(self, loss: Tensor) -> None:
-        """One step against the gradient of a scalar, by autograd; other parameters get no gradient."""
-        self.gradients.zero_()
-        torch.autograd.backward(loss, inputs=self._parameters)
+        """One step against the gradient of a scalar, by autograd."""
+        self.differentiate(loss)
         self.step()
 
     def state(self) -> dict[str, NDArray[np.generic]]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from workers.algorithms.ddpg import action_value
+from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.ppo_gradients import log_prob
@@ -47,13 +47,13 @@ class Sac(OffPolicyAlgorithm):
     """
 
     def __init__(
-        self, config: SacConfig, actor: Body, critics: nn.ModuleList, observation_size: int, generator: torch.Generator
+        self, config: SacConfig, actor: Body, critics: tuple[Body, ...], observation_size: int, generator: torch.Generator
     ) -> None:
         self.config, self.actor, self.critics = config, actor, critics
         self.temperature = Temperature(config.initial_temperature).to(generator.device)
         self.target_critics = copy.deepcopy(critics)
         self.actor_optimizer = FlatAdam(actor, learning_rate=config.actor_learning_rate)
-        self.critic_optimizer = FlatAdam(critics, learning_rate=config.critic_learning_rate)
+        self.critic_optimizer = FlatAdam(*critics, learning_rate=config.critic_learning_rate)
         self.temperature_optimizer = FlatAdam(self.temperature, learning_rate=config.actor_learning_rate)
         super().__init__(
             config,
@@ -62,7 +62,7 @@ class Sac(OffPolicyAlgorithm):
                 "critic": self.critic_optimizer,
                 "temperature": self.temperature_optimizer,
             },
-            targets={"target_critic": FlatParameters(self.target_critics)},
+            targets={"target_critic": FlatParameters(*self.target_critics)},
             observation_size=observation_size,
             generator=generator,
         )
@@ -147,5 +147,5 @@ def build_sac(config: SacConfig, observation_size: int, seed: int, device: torch
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         actor = build_network(config.network, observation_size, 2 * ACTION_SIZE).to(device)
-        critics = nn.ModuleList(build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(2))
-    return Sac(config, actor, critics.to(device), observation_size, torch.Generator(device).manual_seed(seed))
+        critics = tuple(build_network(config.network, observation_size + ACTION_SIZE, 1).to(device) for _ in range(2))
+    return Sac(config, actor, critics, observation_size, torch.Generator(device).manual_seed(seed))

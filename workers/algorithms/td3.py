@@ -8,8 +8,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.base import Arrays
-from workers.algorithms.ddpg import NoisyPolicy, action_value, build_noisy_networks
+from workers.algorithms.ddpg import NoisyPolicy, build_noisy_networks
 from workers.algorithms.off_policy import ACTION_HIGH, ACTION_LOW
 from workers.algorithms.replay import Transitions
 from workers.config import Td3Config
@@ -37,19 +38,16 @@ class Td3(NoisyPolicy):
             targets = batch.rewards + config.gamma * batch.continues * following
 
         # Update critics theta_i <- argmin 1/N sum (y - Q_i(s, a))^2
-        critic_loss = torch.stack(
-            [(action_value(critic, batch.observations, batch.actions) - targets).square().mean() for critic in self.critics]
-        ).sum()
-        self.critic_optimizer.descend(critic_loss)
-        losses = {"loss/value": critic_loss.detach(), "value/mean": targets.mean()}
+        critic_loss = self.gradients.critics(batch, targets)
+        self.critic_optimizer.step()
+        losses = {"loss/value": critic_loss, "value/mean": targets.mean()}
 
         # if t mod d then
         self._updates += 1
         if self._updates % config.policy_delay == 0:
             # Update phi by the deterministic policy gradient 1/N sum grad_a Q_1(s, a) grad pi(s)
-            actor_loss = -action_value(self.critics[0], batch.observations, self.actor(batch.observations)).mean()
-            self.actor_optimizer.descend(actor_loss)
-            losses["loss/policy"] = actor_loss.detach()
+            losses["loss/policy"] = self.gradients.actor(batch.observations)
+            self.actor_optimizer.step()
             # Update target networks
             self.follow("target_critic", "critic")
             self.follow("target_actor", "actor")

@@ -1,0 +1,94 @@
+"""The gradients of DDPG's and TD3's losses: by autograd, which reads as the papers do, and written out, which is faster.
+
+critics  L = sum_i 1/N sum (y - Q_i(s, a))^2
+actor    J = -1/N sum Q_1(s, mu(s))
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+
+from workers.algorithms.flat import FlatParameters
+from workers.algorithms.replay import Transitions
+from workers.backward import backward_of
+from workers.networks import Body, DeterministicActor, bound_actions
+
+
+class ActorCriticGradients(Protocol):
+    """Fills the `.grad` of the actor's or of the critics' parameters."""
+
+    def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
+        """Overwrites the critics' gradients, given targets (n, 1); returns the loss."""
+
+    def actor(self, observations: Tensor) -> Tensor:
+        """Overwrites the actor's gradients, given observations (n, size); returns the loss."""
+
+
+def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Tensor:
+    """Q (n, 1) of observations (n, size) and actions (n, 2)."""
+    value: Tensor = critic(torch.cat((observations, actions), dim=1))
+    return value
+
+
+class AutogradActorCritic:
+    """The reference."""
+
+    def __init__(
+        self,
+        actor: DeterministicActor,
+        critics: Sequence[Body],
+        actor_parameters: FlatParameters,
+        critic_parameters: FlatParameters,
+    ) -> None:
+        self._actor, self._critics = actor, critics
+        self._actor_parameters, self._critic_parameters = actor_parameters, critic_parameters
+
+    @torch.enable_grad()
+    def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
+        """See `ActorCriticGradients.critics`."""
+        errors = [action_value(critic, batch.observations, batch.actions) - targets for critic in self._critics]
+        loss = torch.stack([error.square().mean() for error in errors]).sum()
+        self._critic_parameters.differentiate(loss)
+        return loss.detach()
+
+    @torch.enable_grad()
+    def actor(self, observations: Tensor) -> Tensor:
+        """See `ActorCriticGradients.actor`."""
+        loss = -action_value(self._critics[0], observations, self._actor(observations)).mean()
+        self._actor_parameters.differentiate(loss)
+        return loss.detach()
+
+
+class WrittenActorCritic:
+    """The same gradients without autograd; a test compares them with `AutogradActorCritic`'s."""
+
+    def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int) -> None:
+        self._actor = backward_of(actor.network, batch_size)
+        self._critics = [backward_of(critic, batch_size) for critic in critics]
+
+    @torch.no_grad()
+    def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
+        """See `ActorCriticGradients.critics`."""
+        inputs = torch.cat((batch.observations, batch.actions), dim=1)
+        loss = torch.zeros((), device=targets.device)
+        for critic in self._critics:
+            error = critic.forward(inputs).sub_(targets)
+            loss += error.square().mean()
+            critic.backward(error.mul_(2.0 / len(targets)))
+        return loss
+
+    @torch.no_grad()
+    def actor(self, observations: Tensor) -> Tensor:
+        """See `ActorCriticGradients.actor`."""
+        rows, size = observations.shape
+        actions = bound_actions(self._actor.forward(observations))
+        values = self._critics[0].forward(torch.cat((observations, actions), dim=1))
+        by_actions = self._critics[0].input_gradient(torch.full_like(values, -1.0 / rows))[:, size:]
+        # Through sigmoid (s (1 - s)) and tanh (1 - t^2).
+        by_logits = by_actions.contiguous()
+        by_logits[:, 0].mul_(actions[:, 0] * (1.0 - actions[:, 0]))
+        by_logits[:, 1].mul_(1.0 - actions[:, 1].square())
+        self._actor.backward(by_logits)
+        return -values.mean()
