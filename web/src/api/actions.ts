@@ -1,0 +1,39 @@
+/** What a person can do to experiments and runs; each asks for the truth again afterwards and says what went wrong. */
+import { notifications } from '@mantine/notifications'
+import { useQueryClient } from '@tanstack/react-query'
+import { $api } from './client'
+import { messageOf } from './errors'
+
+/** Mutations of experiments and runs, ready to call. */
+export function useActions() {
+  const client = useQueryClient()
+  const settle = (what: string) => ({
+    onError: (error: unknown) =>
+      notifications.show({ color: 'red', title: `Could not ${what}`, message: messageOf(error) }),
+    onSettled: () => void client.invalidateQueries(),
+  })
+  return {
+    stopExperiment: $api.useMutation(
+      'post',
+      '/api/experiments/{experiment_id}/stop',
+      settle('stop the training'),
+    ),
+    resumeExperiment: $api.useMutation(
+      'post',
+      '/api/experiments/{experiment_id}/resume',
+      settle('resume the training'),
+    ),
+    renameExperiment: $api.useMutation(
+      'patch',
+      '/api/experiments/{experiment_id}',
+      settle('rename the training'),
+    ),
+    deleteExperiment: $api.useMutation(
+      'delete',
+      '/api/experiments/{experiment_id}',
+      settle('delete the training'),
+    ),
+    stopRun: $api.useMutation('post', '/api/runs/{run_id}/stop', settle('stop the run')),
+    resumeRun: $api.useMutation('post', '/api/runs/{run_id}/resume', settle('resume the run')),
+  }
+}

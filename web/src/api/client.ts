@@ -1,0 +1,53 @@
+/** The typed client of the server's API: types generated from its OpenAPI, errors as classes, queries with defaults. */
+import { MutationCache, QueryCache, QueryClient } from '@tanstack/react-query'
+import createFetchClient from 'openapi-fetch'
+import createQueryHooks from 'openapi-react-query'
+import { ApiError, errorOf, isUnauthorized, OfflineError } from './errors'
+import type { paths } from './schema'
+
+export const api = createFetchClient<paths>({
+  baseUrl: window.location.origin,
+  // Looked up at each call, so that a test can stand in for the network.
+  fetch: (request) => globalThis.fetch(request),
+})
+
+api.use({
+  async onResponse({ response }) {
+    if (!response.ok) throw await errorOf(response)
+  },
+  onError({ error }) {
+    return error instanceof DOMException && error.name === 'AbortError' ? error : new OfflineError()
+  },
+})
+
+export const $api = createQueryHooks(api)
+
+export const statusKey = ['get', '/api/status'] as const
+
+/** A client for one page load. Whatever is refused with 401 makes the status query ask again, and with it the login. */
+export function createQueryClient(): QueryClient {
+  const onError = (error: unknown) => {
+    if (isUnauthorized(error)) void client.invalidateQueries({ queryKey: statusKey })
+  }
+  const client = new QueryClient({
+    queryCache: new QueryCache({
+      onError: (error, query) => {
+        if (query.queryKey[1] !== statusKey[1]) onError(error)
+      },
+    }),
+    mutationCache: new MutationCache({ onError }),
+    defaultOptions: {
+      queries: {
+        // The server is often this very machine: a laptop without a network still reaches it.
+        networkMode: 'always',
+        staleTime: 2_000,
+        refetchOnReconnect: false,
+        // A refusal stays one; a server that restarts is worth waiting for.
+        retry: (failures, error) => !(error instanceof ApiError && error.status < 500) && failures < 2,
+        retryDelay: (failures) => Math.min(500 * 2 ** failures, 4_000),
+      },
+      mutations: { networkMode: 'always', retry: false },
+    },
+  })
+  return client
+}

@@ -1,0 +1,42 @@
+/** The routes; each page is a bundle of its own, loaded when it is first opened. */
+import { createBrowserRouter, type RouteObject } from 'react-router'
+import { Shell } from './components/Shell'
+import { BrokenPage, NotFoundPage } from './pages/NotFoundPage'
+
+export const routes: RouteObject[] = [
+  {
+    element: <Shell />,
+    hydrateFallbackElement: <div />,
+    errorElement: <BrokenPage />,
+    children: [
+      {
+        errorElement: <BrokenPage />,
+        children: [
+          {
+            index: true,
+            lazy: async () => ({ Component: (await import('./pages/TrainingsPage')).TrainingsPage }),
+          },
+          {
+            path: 'new',
+            lazy: async () => ({ Component: (await import('./pages/NewTrainingPage')).NewTrainingPage }),
+          },
+          {
+            path: 'experiments/:experimentId',
+            lazy: async () => ({ Component: (await import('./pages/ExperimentPage')).ExperimentPage }),
+          },
+          {
+            path: 'runs/:runId',
+            lazy: async () => ({ Component: (await import('./pages/RunPage')).RunPage }),
+          },
+          {
+            path: 'compare',
+            lazy: async () => ({ Component: (await import('./pages/ComparePage')).ComparePage }),
+          },
+          { path: '*', element: <NotFoundPage /> },
+        ],
+      },
+    ],
+  },
+]
+
+export const createRouter = () => createBrowserRouter(routes)

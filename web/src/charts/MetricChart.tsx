@@ -1,0 +1,80 @@
+/** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
+import { Checkbox, Group, Title } from '@mantine/core'
+import { type ReactNode, useMemo, useState } from 'react'
+import { Chart } from './Chart'
+import classes from './MetricChart.module.css'
+import { allPositive, type ChartData, smooth } from './series'
+
+const SMOOTHING = 0.85
+
+interface MetricChartProps {
+  title: string
+  note?: string
+  data: ChartData
+  format?: (value: number) => string
+  yRange?: readonly [number, number]
+  /** Whether smoothing makes sense: not for a handful of evaluations. */
+  smoothable?: boolean
+  /** Whether a logarithmic axis is offered. */
+  scalable?: boolean
+  height?: number
+  /** What stands in place of the curve while it has no point. */
+  empty?: ReactNode
+}
+
+export function MetricChart({
+  title,
+  note,
+  data,
+  smoothable = false,
+  scalable = false,
+  height = 220,
+  empty = 'No value yet',
+  ...rest
+}: MetricChartProps) {
+  const [smoothed, setSmoothed] = useState(false)
+  const [logarithmic, setLogarithmic] = useState(false)
+  const shown = useMemo(
+    () =>
+      smoothed
+        ? { ...data, lines: data.lines.map((line) => ({ ...line, values: smooth(line.values, SMOOTHING) })) }
+        : data,
+    [data, smoothed],
+  )
+  const loggable = scalable && allPositive(data.lines)
+  return (
+    <div className={classes.metric}>
+      <div className={classes.head}>
+        <Title order={3}>
+          {title}
+          {note && <span className={classes.note}>{note}</span>}
+        </Title>
+        <Group gap="sm">
+          {smoothable && (
+            <Checkbox
+              size="xs"
+              label="Smooth"
+              checked={smoothed}
+              onChange={(event) => setSmoothed(event.currentTarget.checked)}
+            />
+          )}
+          {loggable && (
+            <Checkbox
+              size="xs"
+              label="Log"
+              checked={logarithmic}
+              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
+            />
+          )}
+        </Group>
+      </div>
+      {data.x.length === 0 ? (
+        <div className={classes.empty} style={{ height: height + 24 }}>
+          {empty}
+        </div>
+      ) : (
+        <Chart data={shown} label={title} logarithmic={logarithmic && loggable} height={height} {...rest} />
+      )}
+    </div>
+  )
+}

@@ -1,0 +1,166 @@
+/** The metrics of a run: which belong in one chart, and how they are called. */
+import { compact, percent, significant } from '../lib/format'
+
+export interface ChartSpec {
+  title: string
+  note?: string
+  metrics: readonly { name: string; label: string }[]
+  format?: (value: number) => string
+  yRange?: readonly [number, number]
+  smoothable?: boolean
+  scalable?: boolean
+}
+
+const rate = { format: percent, yRange: [0, 1.02] as const }
+
+/** What is looked at first. */
+export const MAIN_CHARTS: readonly ChartSpec[] = [
+  {
+    title: 'Success rate',
+    metrics: [
+      { name: 'train/success_rate', label: 'training' },
+      { name: 'eval/success_rate', label: 'evaluation' },
+    ],
+    smoothable: true,
+    ...rate,
+  },
+  {
+    title: 'Return',
+    note: 'per episode',
+    metrics: [
+      { name: 'train/return', label: 'training' },
+      { name: 'eval/return', label: 'evaluation' },
+    ],
+    smoothable: true,
+  },
+]
+
+/** The rest, by section. */
+export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[] = [
+  {
+    title: 'Episodes',
+    charts: [
+      {
+        title: 'Reward',
+        note: 'per step',
+        metrics: [{ name: 'train/reward', label: 'training' }],
+        smoothable: true,
+      },
+      {
+        title: 'Episode length',
+        note: 'steps',
+        metrics: [{ name: 'train/episode_length', label: 'training' }],
+        smoothable: true,
+      },
+      {
+        title: 'How episodes end',
+        note: 'training',
+        metrics: [
+          { name: 'train/success_rate', label: 'arrival' },
+          { name: 'train/collision_rate', label: 'collision' },
+          { name: 'train/timeout_rate', label: 'time-out' },
+        ],
+        smoothable: true,
+        ...rate,
+      },
+    ],
+  },
+  {
+    title: 'Learning',
+    charts: [
+      {
+        title: 'Policy loss',
+        metrics: [{ name: 'loss/policy', label: 'loss' }],
+        smoothable: true,
+        format: significant,
+      },
+      {
+        title: 'Value loss',
+        metrics: [{ name: 'loss/value', label: 'loss' }],
+        smoothable: true,
+        scalable: true,
+        format: significant,
+      },
+      {
+        title: 'KL divergence',
+        note: 'old to new policy',
+        metrics: [{ name: 'policy/kl', label: 'KL' }],
+        smoothable: true,
+        scalable: true,
+        format: significant,
+      },
+      { title: 'Entropy', metrics: [{ name: 'policy/entropy', label: 'entropy' }], format: significant },
+      {
+        title: 'Exploration',
+        note: 'standard deviation',
+        metrics: [
+          { name: 'policy/std_linear', label: 'linear' },
+          { name: 'policy/std_angular', label: 'angular' },
+        ],
+        format: significant,
+      },
+      {
+        title: 'Clipped samples',
+        metrics: [{ name: 'policy/clip_fraction', label: 'fraction' }],
+        format: percent,
+        smoothable: true,
+      },
+      {
+        title: 'Explained variance',
+        note: 'of the returns, by the critic',
+        metrics: [{ name: 'value/explained_variance', label: 'fraction' }],
+        format: significant,
+      },
+      {
+        title: 'Learning rate',
+        metrics: [{ name: 'optim/learning_rate', label: 'rate' }],
+        format: significant,
+      },
+    ],
+  },
+  {
+    title: 'Evaluation',
+    charts: [
+      {
+        title: 'How episodes end',
+        note: 'on the suite',
+        metrics: [
+          { name: 'eval/success_rate', label: 'arrival' },
+          { name: 'eval/collision_rate', label: 'collision' },
+          { name: 'eval/timeout_rate', label: 'time-out' },
+        ],
+        ...rate,
+      },
+      { title: 'Steps to the target', metrics: [{ name: 'eval/steps', label: 'steps' }] },
+      {
+        title: 'Path efficiency',
+        note: 'shortest path over path driven',
+        metrics: [{ name: 'eval/path_efficiency', label: 'efficiency' }],
+        format: percent,
+      },
+      { title: 'Reward', note: 'per step', metrics: [{ name: 'eval/reward', label: 'reward' }] },
+    ],
+  },
+  {
+    title: 'Speed',
+    charts: [
+      {
+        title: 'Steps per second',
+        metrics: [{ name: 'time/steps_per_second', label: 'all robots' }],
+        format: compact,
+        smoothable: true,
+      },
+      {
+        title: 'Where the time goes',
+        metrics: [
+          { name: 'time/simulation', label: 'simulation' },
+          { name: 'time/inference', label: 'inference' },
+          { name: 'time/update', label: 'update' },
+          { name: 'time/reporting', label: 'reporting' },
+        ],
+        format: percent,
+        yRange: [0, 1.02],
+      },
+    ],
+  },
+]

@@ -1,0 +1,44 @@
+/** From the API's answers to the charts' lines. */
+import type { Curves, Series } from '../api/types'
+import { plural } from '../lib/format'
+import type { ChartSpec } from './metrics'
+import { alignSeries, type ChartData, type Line } from './series'
+
+/** The series that a chart shows, on one x; a series without points is left out. */
+export function chartOf(spec: ChartSpec, series: readonly Series[]): ChartData {
+  const found = spec.metrics.flatMap((metric, color) => {
+    const one = series.find((candidate) => candidate.name === metric.name)
+    return one && one.steps.length > 0 ? [{ ...metric, color, series: one }] : []
+  })
+  const { x, values } = alignSeries(found.map((one) => one.series))
+  const lines = found.map(
+    ({ name, label, color }, index): Line => ({ key: name, label, color, values: values[index] ?? [] }),
+  )
+  return { x, lines }
+}
+
+/**
+ * Experiments together: each seed thin, the mean of the seeds bold, and its interval as a band. The legend counts the
+ * seeds: how many stand behind the curve at its fullest.
+ */
+export function chartOfCurves(curves: Curves): ChartData {
+  const lines = curves.experiments.flatMap((experiment, color): Line[] => {
+    const seeds = Math.max(0, ...experiment.count)
+    if (seeds === 0) return []
+    const single = seeds === 1
+    const thin = single
+      ? []
+      : experiment.seeds.map(
+          ({ seed, values }): Line => ({ key: `${experiment.id}:${seed}`, color, thin: true, values }),
+        )
+    const mean: Line = {
+      key: experiment.id,
+      label: `${experiment.name}, ${plural(seeds, 'seed')}`,
+      color,
+      values: experiment.mean,
+      ...(single ? {} : { band: { low: experiment.low, high: experiment.high } }),
+    }
+    return [...thin, mean]
+  })
+  return { x: lines.length > 0 ? curves.steps : [], lines }
+}

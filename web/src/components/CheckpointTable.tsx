@@ -1,0 +1,80 @@
+/** The policies of a run, to take away. */
+import { Badge, Button, Table } from '@mantine/core'
+import { IconDownload } from '@tabler/icons-react'
+import type { Checkpoint } from '../api/types'
+import { count, dateTime, fileSize, significant } from '../lib/format'
+import classes from './ExperimentTable.module.css'
+import { Message, SuccessEstimate } from './ui'
+import ui from './ui.module.css'
+
+export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpoint[] }) {
+  if (checkpoints.length === 0) {
+    return (
+      <Message title="No checkpoint yet">
+        Each evaluation keeps one; the first comes soon after the start.
+      </Message>
+    )
+  }
+  return (
+    <Table.ScrollContainer minWidth={680} mah={420}>
+      <Table highlightOnHover className={classes.table} data-testid="checkpoints">
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th ta="right" w={110}>
+              Step
+            </Table.Th>
+            <Table.Th w={60} aria-label="Best" />
+            <Table.Th>Success, 95 % interval</Table.Th>
+            <Table.Th ta="right">Steps to target</Table.Th>
+            <Table.Th ta="right">Size</Table.Th>
+            <Table.Th ta="right">Saved</Table.Th>
+            <Table.Th w={120} aria-label="Download" />
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {[...checkpoints].reverse().map((checkpoint) => (
+            <Table.Tr key={checkpoint.id} data-testid="checkpoint" data-best={checkpoint.best || undefined}>
+              <Table.Td ta="right" fw={550} className={ui.number}>
+                {count(checkpoint.step)}
+              </Table.Td>
+              <Table.Td>
+                {checkpoint.best && (
+                  <Badge size="sm" variant="light">
+                    Best
+                  </Badge>
+                )}
+              </Table.Td>
+              <Table.Td>
+                <SuccessEstimate estimate={checkpoint.evaluation?.success ?? null} episodes />
+              </Table.Td>
+              <Table.Td ta="right" className={ui.number}>
+                {checkpoint.evaluation?.steps_mean == null
+                  ? '–'
+                  : significant(checkpoint.evaluation.steps_mean, 3)}
+              </Table.Td>
+              <Table.Td ta="right" className={ui.number} title={`SHA-256 ${checkpoint.sha256}`}>
+                {fileSize(checkpoint.size)}
+              </Table.Td>
+              <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`}>
+                {dateTime(checkpoint.created_at)}
+              </Table.Td>
+              <Table.Td ta="right">
+                <Button
+                  component="a"
+                  href={`/api/checkpoints/${checkpoint.id}/download`}
+                  download
+                  size="compact-sm"
+                  variant={checkpoint.best ? 'filled' : 'default'}
+                  leftSection={<IconDownload size={14} />}
+                  aria-label={`Download step ${checkpoint.step}`}
+                >
+                  Download
+                </Button>
+              </Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  )
+}

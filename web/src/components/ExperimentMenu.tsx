@@ -1,0 +1,146 @@
+/** What can be done to an experiment: a menu, with the dialogs that it needs. */
+import { ActionIcon, Button, Group, Menu, Modal, Stack, Text, TextInput } from '@mantine/core'
+import { useDisclosure } from '@mantine/hooks'
+import {
+  IconCopy,
+  IconDots,
+  IconPencil,
+  IconPlayerPlay,
+  IconPlayerStop,
+  IconTrash,
+} from '@tabler/icons-react'
+import { useState } from 'react'
+import { Link } from 'react-router'
+import { useActions } from '../api/actions'
+import type { Experiment } from '../api/types'
+import { plural } from '../lib/format'
+import { canResume, canStop } from './states'
+
+interface ExperimentMenuProps {
+  experiment: Experiment
+  /** Called once the experiment is gone. */
+  onDeleted?: () => void
+}
+
+export function ExperimentMenu({ experiment, onDeleted }: ExperimentMenuProps) {
+  const { id, name } = experiment
+  const actions = useActions()
+  const [renaming, rename] = useDisclosure()
+  const [deleting, remove] = useDisclosure()
+  const states = experiment.runs.map((run) => run.state)
+  const of = { params: { path: { experiment_id: id } } }
+  return (
+    <>
+      <Menu>
+        <Menu.Target>
+          <ActionIcon variant="subtle" color="gray" aria-label={`Actions for ${name}`}>
+            <IconDots size={18} stroke={1.6} />
+          </ActionIcon>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Menu.Item leftSection={<IconCopy size={16} />} component={Link} to={`/new?from=${id}`}>
+            Duplicate
+          </Menu.Item>
+          <Menu.Item leftSection={<IconPencil size={16} />} onClick={rename.open}>
+            Rename
+          </Menu.Item>
+          <Menu.Item
+            leftSection={<IconPlayerStop size={16} />}
+            disabled={!canStop(states)}
+            onClick={() => actions.stopExperiment.mutate(of)}
+          >
+            Stop
+          </Menu.Item>
+          <Menu.Item
+            leftSection={<IconPlayerPlay size={16} />}
+            disabled={!canResume(states)}
+            onClick={() => actions.resumeExperiment.mutate(of)}
+          >
+            Resume
+          </Menu.Item>
+          <Menu.Divider />
+          <Menu.Item color="red" leftSection={<IconTrash size={16} />} onClick={remove.open}>
+            Delete
+          </Menu.Item>
+        </Menu.Dropdown>
+      </Menu>
+      <RenameDialog
+        key={`${renaming}`}
+        opened={renaming}
+        name={name}
+        onClose={rename.close}
+        onRename={(next) =>
+          actions.renameExperiment.mutate({ ...of, body: { name: next } }, { onSuccess: rename.close })
+        }
+        busy={actions.renameExperiment.isPending}
+      />
+      <Modal opened={deleting} onClose={remove.close} title={`Delete “${name}”?`}>
+        <Stack>
+          <Text size="sm">
+            Its {plural(experiment.runs.length, 'run')}, curves and checkpoints are removed for good. Runs
+            that are going on are ended.
+          </Text>
+          <Group justify="flex-end">
+            <Button variant="default" onClick={remove.close} data-autofocus>
+              Keep
+            </Button>
+            <Button
+              color="red"
+              loading={actions.deleteExperiment.isPending}
+              onClick={() =>
+                actions.deleteExperiment.mutate(of, {
+                  onSuccess: () => {
+                    remove.close()
+                    onDeleted?.()
+                  },
+                })
+              }
+            >
+              Delete
+            </Button>
+          </Group>
+        </Stack>
+      </Modal>
+    </>
+  )
+}
+
+interface RenameDialogProps {
+  opened: boolean
+  name: string
+  busy: boolean
+  onClose: () => void
+  onRename: (name: string) => void
+}
+
+function RenameDialog({ opened, name, busy, onClose, onRename }: RenameDialogProps) {
+  const [text, setText] = useState(name)
+  return (
+    <Modal opened={opened} onClose={onClose} title="Rename">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault()
+          onRename(text)
+        }}
+      >
+        <Stack>
+          <TextInput
+            label="Name"
+            value={text}
+            maxLength={120}
+            data-autofocus
+            onChange={(event) => setText(event.currentTarget.value)}
+          />
+          <Group justify="flex-end">
+            <Button variant="default" onClick={onClose}>
+              Cancel
+            </Button>
+            <Button type="submit" loading={busy} disabled={text.trim() === ''}>
+              Rename
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  )
+}

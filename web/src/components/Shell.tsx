@@ -1,0 +1,138 @@
+/** The frame around every page: navigation, the state of the service, colour scheme, version. */
+import {
+  ActionIcon,
+  Anchor,
+  Group,
+  Text,
+  Tooltip,
+  useComputedColorScheme,
+  useMantineColorScheme,
+} from '@mantine/core'
+import { IconMoon, IconSun } from '@tabler/icons-react'
+import { Suspense } from 'react'
+import { Link, NavLink, Outlet } from 'react-router'
+import { isUnauthorized } from '../api/errors'
+import { useServerEvents } from '../api/events'
+import type { Status } from '../api/types'
+import { useStatus } from '../api/useStatus'
+import { plural } from '../lib/format'
+import { LoginPage } from '../pages/LoginPage'
+import classes from './Shell.module.css'
+
+export function Shell() {
+  const { data: status, error, isError } = useStatus()
+  const locked = isUnauthorized(error)
+  const offline = isError && !locked
+  useServerEvents(status !== undefined && !locked)
+
+  return (
+    <div className={classes.shell}>
+      <a href="#main" className={classes.skip}>
+        Skip to content
+      </a>
+      <header className={classes.header}>
+        <Link to="/" className={classes.name} aria-label="Mapless, home">
+          <img src="/favicon.svg" alt="" width={22} height={22} />
+          <span>Mapless</span>
+        </Link>
+        {!locked && (
+          <nav aria-label="Main" className={classes.nav}>
+            <NavLink to="/" end>
+              Trainings
+            </NavLink>
+            <NavLink to="/new">
+              New<span className={classes.wide}> training</span>
+            </NavLink>
+            <NavLink to="/compare">Compare</NavLink>
+          </nav>
+        )}
+        <Group gap={10} ml="auto" wrap="nowrap">
+          {!locked && <ServiceState status={status} offline={offline} />}
+          <SchemeSwitch />
+        </Group>
+      </header>
+      {offline && status !== undefined && (
+        <div role="alert" className={classes.offline} data-testid="offline">
+          The server cannot be reached. What you see is the last that it said; trainings go on without it, and
+          this page catches up by itself.
+        </div>
+      )}
+      <main id="main" className={classes.main} tabIndex={-1}>
+        {locked ? (
+          <LoginPage />
+        ) : (
+          <Suspense fallback={null}>
+            <Outlet />
+          </Suspense>
+        )}
+      </main>
+      <footer className={classes.footer}>
+        <span>Mapless{status ? ` ${status.version}` : ''}</span>
+        {status?.commit && <code>{status.commit}</code>}
+        <Anchor href="/api/openapi.json" inherit c="inherit" className={classes.docs}>
+          API
+        </Anchor>
+      </footer>
+    </div>
+  )
+}
+
+/** "4 workers, 2 running": whether anything can be trained, and whether anything is. */
+function ServiceState({ status, offline }: { status: Status | undefined; offline: boolean }) {
+  if (offline) return <Badge tone="bad" text="Offline" hint="The server cannot be reached" />
+  if (!status) return <Badge tone="none" text="" hint="" />
+  const { workers, running, queued } = status
+  const waiting = queued > 0 ? `, ${queued} queued` : ''
+  if (workers.length === 0) {
+    return (
+      <Badge
+        tone="bad"
+        text={`No worker${waiting}`}
+        hint="Trainings wait until a worker is started: mapless worker"
+      />
+    )
+  }
+  return (
+    <Badge
+      tone={running > 0 ? 'busy' : 'idle'}
+      text={`${plural(workers.length, 'worker')}${running > 0 ? `, ${running} running` : ''}${waiting}`}
+      hint={workers.map((worker) => `${worker.name}: ${worker.run_id ? 'training' : 'free'}`).join('\n')}
+    />
+  )
+}
+
+function Badge({ tone, text, hint }: { tone: 'bad' | 'busy' | 'idle' | 'none'; text: string; hint: string }) {
+  return (
+    <Tooltip label={<span style={{ whiteSpace: 'pre-line' }}>{hint}</span>} disabled={!hint}>
+      <Text
+        component="span"
+        size="xs"
+        className={classes.badge}
+        data-tone={tone}
+        role="status"
+        data-testid="service-state"
+        tabIndex={hint ? 0 : -1}
+      >
+        {text}
+      </Text>
+    </Tooltip>
+  )
+}
+
+function SchemeSwitch() {
+  const { setColorScheme } = useMantineColorScheme()
+  const dark = useComputedColorScheme('light') === 'dark'
+  const label = dark ? 'Light colours' : 'Dark colours'
+  return (
+    <Tooltip label={label}>
+      <ActionIcon
+        variant="subtle"
+        color="gray"
+        aria-label={label}
+        onClick={() => setColorScheme(dark ? 'light' : 'dark')}
+      >
+        {dark ? <IconSun size={18} stroke={1.6} /> : <IconMoon size={18} stroke={1.6} />}
+      </ActionIcon>
+    </Tooltip>
+  )
+}

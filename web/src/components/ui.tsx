@@ -1,0 +1,201 @@
+/** The small parts that every page is made of. */
+import { Button, Skeleton, Title, Tooltip, useComputedColorScheme } from '@mantine/core'
+import type { CSSProperties, ReactNode } from 'react'
+import { isNotFound, messageOf, OfflineError } from '../api/errors'
+import type { Estimate, ExperimentState } from '../api/types'
+import { lineColor } from '../charts/palette'
+import { count, percent, percentRange, plural } from '../lib/format'
+import { STATES } from './states'
+import classes from './ui.module.css'
+
+/** A page's frame: its title on the left, what can be done on the right. */
+export function Page({
+  title,
+  above,
+  below,
+  actions,
+  children,
+}: {
+  title: ReactNode
+  above?: ReactNode
+  below?: ReactNode
+  actions?: ReactNode
+  children: ReactNode
+}) {
+  return (
+    <div className={classes.page}>
+      <div className={classes.top}>
+        <div className={classes.topText}>
+          {above}
+          <Title order={1}>{title}</Title>
+          {below}
+        </div>
+        {actions}
+      </div>
+      {children}
+    </div>
+  )
+}
+
+export function Panel({
+  title,
+  actions,
+  children,
+  flush = false,
+  ...rest
+}: {
+  title?: ReactNode
+  actions?: ReactNode
+  children: ReactNode
+  /** Whether the content reaches the edges (tables do). */
+  flush?: boolean
+  'data-testid'?: string
+}) {
+  return (
+    <section className={classes.panel} {...rest}>
+      {(title || actions) && (
+        <div className={classes.panelHead} style={flush ? { paddingBottom: 10 } : undefined}>
+          <Title order={2}>{title}</Title>
+          {actions}
+        </div>
+      )}
+      {flush ? children : <div className={classes.panelBody}>{children}</div>}
+    </section>
+  )
+}
+
+/** What stands where there is nothing to show: why, and what to do about it. */
+export function Message({
+  icon,
+  title,
+  children,
+  actions,
+  role,
+}: {
+  icon?: ReactNode
+  title: string
+  children?: ReactNode
+  actions?: ReactNode
+  role?: 'alert' | 'status'
+}) {
+  return (
+    <div className={classes.message} role={role}>
+      {icon}
+      <Title order={2}>{title}</Title>
+      {children && <p>{children}</p>}
+      {actions && <div className={classes.actions}>{actions}</div>}
+    </div>
+  )
+}
+
+/** A failed query: what is missing, why, and another try. */
+export function QueryError({ error, what, retry }: { error: unknown; what: string; retry: () => void }) {
+  if (isNotFound(error)) {
+    return (
+      <Message title={`There is no such ${what}`} role="alert">
+        It may have been deleted, or the address is not complete.
+      </Message>
+    )
+  }
+  const offline = error instanceof OfflineError
+  return (
+    <Message
+      title={offline ? 'The server cannot be reached' : `The ${what} could not be loaded`}
+      role="alert"
+      actions={
+        <Button variant="default" onClick={retry}>
+          Try again
+        </Button>
+      }
+    >
+      {offline ? 'This page fills by itself as soon as the server is back.' : messageOf(error)}
+    </Message>
+  )
+}
+
+export function StateLabel({ state }: { state: ExperimentState }) {
+  const { label, color } = STATES[state]
+  return (
+    <span
+      className={classes.state}
+      data-state={state}
+      data-testid="state"
+      style={{ '--state-color': color } as CSSProperties}
+    >
+      <span className={classes.dot} />
+      {label}
+    </span>
+  )
+}
+
+/** A bar from 0 to 1 in the state's colour. */
+export function ProgressBar({
+  value,
+  state,
+  label,
+}: {
+  value: number
+  state: ExperimentState
+  label: string
+}) {
+  const share = Math.min(1, Math.max(0, value)) * 100
+  return (
+    <div
+      className={classes.progress}
+      role="progressbar"
+      aria-label={label}
+      aria-valuemin={0}
+      aria-valuemax={100}
+      aria-valuenow={Math.round(share)}
+      style={{ '--state-color': STATES[state].color } as CSSProperties}
+    >
+      <span style={{ width: `${share}%` }} />
+    </div>
+  )
+}
+
+interface SuccessEstimateProps {
+  estimate: Estimate | null
+  /** Says in full what stands behind the number; otherwise its tooltip does. */
+  detail?: boolean
+  /** Whether N counts episodes (of one policy) rather than seeds. */
+  episodes?: boolean
+}
+
+/** "98.4 %  97.1–99.4 %  N = 5": a success rate, its interval, and what stands behind it. */
+export function SuccessEstimate({ estimate, detail = false, episodes = false }: SuccessEstimateProps) {
+  if (!estimate) return <span className={classes.quiet}>–</span>
+  const { value, low, high } = estimate
+  const basis = `${plural(estimate.seeds, 'seed')}, ${plural(estimate.episodes, 'episode')}`
+  const short = `N = ${count(episodes ? estimate.episodes : estimate.seeds)}`
+  return (
+    <Tooltip label={`95 % interval ${percentRange(low, high)}, from ${basis}`} disabled={detail}>
+      <span className={`${classes.number} ${classes.estimate}`}>
+        <strong>{percent(value)}</strong>
+        <span className={classes.quiet}>{percentRange(low, high)}</span>
+        <span className={classes.quiet}>{detail ? basis : short}</span>
+      </span>
+    </Tooltip>
+  )
+}
+
+/** The colour of a chart's line, to find it again in a table. */
+export function Swatch({ color }: { color: number }) {
+  const dark = useComputedColorScheme('light') === 'dark'
+  return <span className={classes.swatch} style={{ background: lineColor(color, dark) }} />
+}
+
+/** Rows of a table that is still loading, as high as the real ones. */
+export function LoadingRows({ rows, columns }: { rows: number; columns: number }) {
+  return Array.from({ length: rows }, (_, row) => (
+    // biome-ignore lint/suspicious/noArrayIndexKey: placeholders have no other identity.
+    <tr key={row} aria-hidden>
+      {Array.from({ length: columns }, (_, column) => (
+        // biome-ignore lint/suspicious/noArrayIndexKey: placeholders have no other identity.
+        <td key={column} style={{ padding: '12px 10px' }}>
+          <Skeleton height={12} width={column === 0 ? 16 : '70%'} />
+        </td>
+      ))}
+    </tr>
+  ))
+}

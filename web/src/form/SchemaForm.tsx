@@ -1,0 +1,100 @@
+/** The fields of a form in two parts: what most people set, and everything else under *Advanced*. */
+import { Accordion, Alert, Text, Title } from '@mantine/core'
+import { IconAdjustmentsHorizontal } from '@tabler/icons-react'
+import { useEffect, useState } from 'react'
+import { FieldInput, fieldId } from './FieldInput'
+import classes from './form.module.css'
+import { type Field, grouped } from './layout'
+import type { Problems } from './problems'
+import type { Json, Schema } from './schema'
+import type { Form } from './useForm'
+import { sameValue, valueAt } from './values'
+
+interface FieldGridProps {
+  fields: readonly Field[]
+  form: Form
+  root: Schema
+  initial: Json
+}
+
+export function FieldGrid({ fields, ...rest }: FieldGridProps) {
+  return (
+    <div className={classes.grid}>
+      {fields.map((field) => (
+        <FieldInput key={field.key} field={field} {...rest} />
+      ))}
+    </div>
+  )
+}
+
+/** Everything else, by heading; opens by itself where the server refused something inside. */
+export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
+  const { form, initial } = rest
+  const [open, setOpen] = useState<string | null>(null)
+  const troubled = fields.some((field) => fieldOf([field], form.problems).length > 0)
+  useEffect(() => {
+    if (troubled) setOpen('advanced')
+  }, [troubled])
+  const changed = fields.filter(
+    (field) => !sameValue(valueAt(form.values, field.path), valueAt(initial, field.path)),
+  ).length
+  return (
+    <Accordion variant="contained" value={open} onChange={setOpen}>
+      <Accordion.Item value="advanced">
+        <Accordion.Control icon={<IconAdjustmentsHorizontal size={18} stroke={1.6} />}>
+          Advanced
+          <Text component="span" size="xs" c="dimmed" ml={10}>
+            {fields.length} more settings{changed > 0 && `, ${changed} changed from the default`}
+          </Text>
+        </Accordion.Control>
+        <Accordion.Panel>
+          {grouped(fields).map(([heading, some]) => (
+            <section key={heading} className={classes.group}>
+              <Title order={3} className={classes.heading}>
+                {heading}
+              </Title>
+              <FieldGrid fields={some} {...rest} />
+            </section>
+          ))}
+        </Accordion.Panel>
+      </Accordion.Item>
+    </Accordion>
+  )
+}
+
+/** The paths of the problems that belong to `fields`. */
+function fieldOf(fields: readonly Field[], problems: Problems): string[] {
+  return Object.keys(problems).filter((path) =>
+    fields.some(
+      (field) => path === field.key || (field.kind !== 'union' && path.startsWith(`${field.key}.`)),
+    ),
+  )
+}
+
+/** All that the server refused, each leading to its field; what belongs to no field stands here in words. */
+export function ProblemSummary({ fields, problems }: { fields: readonly Field[]; problems: Problems }) {
+  const entries = Object.entries(problems)
+  if (entries.length === 0) return null
+  return (
+    <Alert
+      color="red"
+      variant="light"
+      title="Not launched: some values were refused"
+      role="alert"
+      data-testid="problems"
+    >
+      <ul style={{ margin: 0, paddingLeft: 18 }}>
+        {entries.map(([path, message]) => {
+          const field = fields.find((one) => fieldOf([one], { [path]: message }).length > 0)
+          return (
+            <li key={path}>
+              {field ? <a href={`#${fieldId(field.key)}`}>{field.label}</a> : null}
+              {field ? ': ' : ''}
+              {message}
+            </li>
+          )
+        })}
+      </ul>
+    </Alert>
+  )
+}

@@ -1,0 +1,281 @@
+/** Experiments side by side: curves, final figures with what stands behind them, and what differs in their settings. */
+import { Alert, Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
+import { IconAlertTriangle } from '@tabler/icons-react'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useState } from 'react'
+import { Link, useSearchParams } from 'react-router'
+import { $api } from '../api/client'
+import type { Comparison, Estimate } from '../api/types'
+import charts from '../charts/MetricChart.module.css'
+import { settingText } from '../components/Configuration'
+import { COMPARED, CurveChart } from '../components/CurveChart'
+import { ExperimentTable } from '../components/ExperimentTable'
+import table from '../components/ExperimentTable.module.css'
+import { Message, Page, Panel, QueryError, Swatch } from '../components/ui'
+import ui from '../components/ui.module.css'
+import { count, percent, percentRange, plural, significant } from '../lib/format'
+import { useTitle } from '../lib/hooks'
+
+export function ComparePage() {
+  useTitle('Compare')
+  const [search, setSearch] = useSearchParams()
+  const chosen = search.getAll('experiment')
+  const [picking, setPicking] = useState(false)
+  const choose = (ids: readonly string[]) => setSearch({ experiment: [...ids] }, { replace: true })
+  if (chosen.length === 0 || picking) {
+    return (
+      <Picker
+        chosen={chosen}
+        onChoose={choose}
+        onDone={() => setPicking(false)}
+        onStart={() => setPicking(true)}
+      />
+    )
+  }
+  return <Chosen chosen={chosen} onChange={() => setPicking(true)} />
+}
+
+interface PickerProps {
+  chosen: readonly string[]
+  onChoose: (ids: readonly string[]) => void
+  onStart: () => void
+  onDone: () => void
+}
+
+function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
+  const { data, error, refetch } = $api.useQuery('get', '/api/experiments', {
+    params: { query: { limit: 200 } },
+  })
+  return (
+    <Page
+      title="Compare"
+      below={
+        <Text size="sm" c="dimmed" mt={4}>
+          Tick the trainings to lay side by side.
+        </Text>
+      }
+      actions={
+        <Button disabled={chosen.length === 0} onClick={onDone}>
+          {chosen.length === 0 ? 'Compare' : `Compare ${chosen.length}`}
+        </Button>
+      }
+    >
+      <Panel flush>
+        {error && !data ? (
+          <QueryError error={error} what="list of trainings" retry={refetch} />
+        ) : data?.items.length === 0 ? (
+          <Message
+            title="Nothing to compare yet"
+            actions={
+              <Button component={Link} to="/new">
+                New training
+              </Button>
+            }
+          >
+            Launch two trainings that differ in one setting, each with five seeds.
+          </Message>
+        ) : (
+          <ExperimentTable
+            experiments={data?.items}
+            ticked={chosen}
+            menu={false}
+            onTick={(ids) => {
+              onStart()
+              onChoose(ids)
+            }}
+          />
+        )}
+      </Panel>
+    </Page>
+  )
+}
+
+function Chosen({ chosen, onChange }: { chosen: readonly string[]; onChange: () => void }) {
+  const { data, error, refetch } = $api.useQuery(
+    'get',
+    '/api/compare',
+    { params: { query: { experiment: [...chosen] } } },
+    { placeholderData: keepPreviousData },
+  )
+  return (
+    <Page
+      title="Compare"
+      below={
+        <Text size="sm" c="dimmed" mt={4}>
+          {plural(chosen.length, 'training')}, each colour the same everywhere on this page
+        </Text>
+      }
+      actions={
+        <Button variant="default" onClick={onChange}>
+          Choose others
+        </Button>
+      }
+    >
+      {error && !data ? (
+        <Panel>
+          <QueryError error={error} what="comparison" retry={refetch} />
+        </Panel>
+      ) : (
+        <Stack gap="md">
+          {data && data.warnings.length > 0 && <Warnings warnings={data.warnings} />}
+          <Panel title="Final figures" flush>
+            {data ? <Figures comparison={data} /> : <Skeleton height={120} m="md" w="auto" />}
+          </Panel>
+          <Panel
+            title="Curves"
+            actions={
+              <Text size="xs" c="dimmed">
+                thin: single seeds · bold: their mean · band: 95 % interval
+              </Text>
+            }
+          >
+            <div className={charts.grid}>
+              {COMPARED.map((metric) => (
+                <CurveChart key={metric.name} metric={metric} experiments={chosen} />
+              ))}
+            </div>
+          </Panel>
+          <Panel title="What differs in their settings" flush>
+            {data ? <Differences comparison={data} /> : <Skeleton height={80} m="md" w="auto" />}
+          </Panel>
+        </Stack>
+      )}
+    </Page>
+  )
+}
+
+function Warnings({ warnings }: { warnings: readonly string[] }) {
+  return (
+    <Alert
+      color="yellow"
+      variant="light"
+      icon={<IconAlertTriangle size={18} />}
+      title="Before reading too much into this"
+      data-testid="warnings"
+    >
+      <ul style={{ margin: 0, paddingLeft: 18 }}>
+        {warnings.map((warning) => (
+          <li key={warning}>{warning}</li>
+        ))}
+      </ul>
+    </Alert>
+  )
+}
+
+function Figures({ comparison }: { comparison: Comparison }) {
+  return (
+    <Table.ScrollContainer minWidth={820}>
+      <Table className={table.table} data-testid="figures">
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Training</Table.Th>
+            <Table.Th>Success</Table.Th>
+            <Table.Th>Steps to the target</Table.Th>
+            <Table.Th>Reward per episode</Table.Th>
+            <Table.Th ta="right">N</Table.Th>
+            <Table.Th>Suite</Table.Th>
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {comparison.experiments.map((one, color) => (
+            <Table.Tr key={one.id}>
+              <Table.Td className={table.name}>
+                <Group gap={8} wrap="nowrap">
+                  <Swatch color={color} />
+                  <Anchor component={Link} to={`/experiments/${one.id}`} inherit>
+                    {one.name}
+                  </Anchor>
+                </Group>
+              </Table.Td>
+              <Table.Td>
+                <Figure estimate={one.success} format={percent} range={percentRange} />
+              </Table.Td>
+              <Table.Td>
+                <Figure estimate={one.steps_per_target} />
+              </Table.Td>
+              <Table.Td>
+                <Figure estimate={one.reward} />
+              </Table.Td>
+              <Table.Td ta="right" className={ui.number}>
+                {one.seeds === 0
+                  ? '–'
+                  : `${plural(one.seeds, 'seed')} × ${count(one.episodes / one.seeds)} episodes`}
+              </Table.Td>
+              <Table.Td className={ui.quiet} title={one.suite_hash ?? undefined}>
+                {one.suite ?? 'not evaluated yet'}
+              </Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  )
+}
+
+const three = (value: number) => significant(value, 3)
+
+interface FigureProps {
+  estimate: Estimate | null
+  format?: (value: number) => string
+  range?: (low: number, high: number) => string
+}
+
+function Figure({
+  estimate,
+  format = three,
+  range = (low, high) => `${three(low)}–${three(high)}`,
+}: FigureProps) {
+  if (!estimate) return <span className={ui.quiet}>–</span>
+  return (
+    <span className={ui.number}>
+      <strong>{format(estimate.value)}</strong>
+      <span className={ui.quiet}>
+        {'  '}
+        {range(estimate.low, estimate.high)}
+      </span>
+    </span>
+  )
+}
+
+function Differences({ comparison }: { comparison: Comparison }) {
+  const { experiments, differences } = comparison
+  if (experiments.length < 2) {
+    return <Message title="One training alone">Choose another to see what differs.</Message>
+  }
+  if (differences.length === 0) {
+    return (
+      <Message title="Nothing differs">Their settings are the same; only chance sets them apart.</Message>
+    )
+  }
+  return (
+    <Table.ScrollContainer minWidth={240 + 160 * experiments.length}>
+      <Table className={table.table} data-testid="differences">
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Setting</Table.Th>
+            {experiments.map((one, color) => (
+              <Table.Th key={one.id}>
+                <Group gap={8} wrap="nowrap">
+                  <Swatch color={color} />
+                  {one.name}
+                </Group>
+              </Table.Th>
+            ))}
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {differences.map(({ path, values }) => (
+            <Table.Tr key={path}>
+              <Table.Td className={ui.quiet}>{path}</Table.Td>
+              {experiments.map((one, index) => (
+                <Table.Td key={one.id} className={ui.number} fw={550}>
+                  {settingText(values[index])}
+                </Table.Td>
+              ))}
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  )
+}

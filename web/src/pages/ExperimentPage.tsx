@@ -1,0 +1,148 @@
+/** One configuration with all its seeds. */
+import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
+import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '@tabler/icons-react'
+import { Link, useNavigate, useParams } from 'react-router'
+import { useActions } from '../api/actions'
+import { $api } from '../api/client'
+import { isRefusal } from '../api/errors'
+import type { Experiment } from '../api/types'
+import charts from '../charts/MetricChart.module.css'
+import { Configuration } from '../components/Configuration'
+import { COMPARED, CurveChart } from '../components/CurveChart'
+import { ExperimentMenu } from '../components/ExperimentMenu'
+import { RunTable } from '../components/RunTable'
+import { canResume, canStop } from '../components/states'
+import { Page, Panel, QueryError, StateLabel, SuccessEstimate } from '../components/ui'
+import { summaryOf } from '../lib/experiments'
+import { dateTime, plural } from '../lib/format'
+import { useTitle } from '../lib/hooks'
+
+export function ExperimentPage() {
+  const { experimentId = '' } = useParams()
+  const { data, error, refetch } = $api.useQuery('get', '/api/experiments/{experiment_id}', {
+    params: { path: { experiment_id: experimentId } },
+  })
+  useTitle(data?.name ?? 'Training')
+  if (error && (!data || isRefusal(error))) {
+    return (
+      <Page title="Training">
+        <Panel>
+          <QueryError error={error} what="training" retry={refetch} />
+        </Panel>
+      </Page>
+    )
+  }
+  return data ? <LoadedExperiment experiment={data} /> : <LoadingExperiment />
+}
+
+function LoadingExperiment() {
+  return (
+    <Page title={<Skeleton height={24} width={260} />} above={<Text size="xs">&nbsp;</Text>}>
+      <Stack>
+        <Panel>
+          <Skeleton height={120} />
+        </Panel>
+        <Panel>
+          <Skeleton height={260} />
+        </Panel>
+      </Stack>
+    </Page>
+  )
+}
+
+function LoadedExperiment({ experiment }: { experiment: Experiment }) {
+  const navigate = useNavigate()
+  const actions = useActions()
+  const states = experiment.runs.map((run) => run.state)
+  const of = { params: { path: { experiment_id: experiment.id } } }
+  return (
+    <Page
+      title={experiment.name}
+      above={
+        <Anchor component={Link} to="/" size="xs">
+          Trainings
+        </Anchor>
+      }
+      below={
+        <Group gap="md" mt={4}>
+          <Text size="sm">
+            <StateLabel state={experiment.state} />
+          </Text>
+          <Text size="sm" c="dimmed">
+            {summaryOf(experiment.training)}
+          </Text>
+          <Text size="sm" c="dimmed">
+            launched {dateTime(experiment.created_at)}
+          </Text>
+        </Group>
+      }
+      actions={
+        <Group gap="xs">
+          {canStop(states) && (
+            <Button
+              variant="default"
+              leftSection={<IconPlayerStop size={16} />}
+              loading={actions.stopExperiment.isPending}
+              onClick={() => actions.stopExperiment.mutate(of)}
+            >
+              Stop
+            </Button>
+          )}
+          {canResume(states) && (
+            <Button
+              variant="default"
+              leftSection={<IconPlayerPlay size={16} />}
+              loading={actions.resumeExperiment.isPending}
+              onClick={() => actions.resumeExperiment.mutate(of)}
+            >
+              Resume
+            </Button>
+          )}
+          <Button
+            variant="default"
+            leftSection={<IconCopy size={16} />}
+            component={Link}
+            to={`/new?from=${experiment.id}`}
+          >
+            Duplicate
+          </Button>
+          <Button
+            variant="default"
+            leftSection={<IconArrowsDiff size={16} />}
+            component={Link}
+            to={`/compare?experiment=${experiment.id}`}
+          >
+            Compare
+          </Button>
+          <ExperimentMenu experiment={experiment} onDeleted={() => navigate('/')} />
+        </Group>
+      }
+    >
+      <Stack gap="md">
+        <Panel
+          flush
+          title={plural(experiment.runs.length, 'run')}
+          actions={
+            experiment.success && (
+              <Text size="sm" component="div">
+                Success <SuccessEstimate estimate={experiment.success} detail />
+              </Text>
+            )
+          }
+        >
+          <RunTable runs={experiment.runs} />
+        </Panel>
+        <Panel title="Curves">
+          <div className={charts.grid}>
+            {COMPARED.map((metric) => (
+              <CurveChart key={metric.name} metric={metric} experiments={[experiment.id]} />
+            ))}
+          </div>
+        </Panel>
+        <Panel title="Configuration">
+          <Configuration training={experiment.training} />
+        </Panel>
+      </Stack>
+    </Page>
+  )
+}

@@ -1,0 +1,195 @@
+/** The launch form, rendered from the schema that the server derives from its own configuration models. */
+import { Button, Group, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
+import { IconRocket } from '@tabler/icons-react'
+import { useState } from 'react'
+import { useNavigate, useSearchParams } from 'react-router'
+import { $api } from '../api/client'
+import { ApiError, messageOf } from '../api/errors'
+import type { components } from '../api/schema'
+import type { Experiment, Preset } from '../api/types'
+import { Page, Panel, QueryError } from '../components/ui'
+import { fieldsOf } from '../form/layout'
+import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
+import { SeedsInput } from '../form/SeedsInput'
+import type { Json, Schema } from '../form/schema'
+import { useForm } from '../form/useForm'
+import { sameValue, valueAt } from '../form/values'
+import { count, plural } from '../lib/format'
+import { useTitle } from '../lib/hooks'
+import classes from './NewTrainingPage.module.css'
+
+/** Leaves room for what is added, within the server's 120 characters. */
+const LONGEST_COPIED_NAME = 110
+
+type ExperimentCreate = components['schemas']['ExperimentCreate-Input']
+
+export function NewTrainingPage() {
+  useTitle('New training')
+  const [search] = useSearchParams()
+  const from = search.get('from')
+  const form = $api.useQuery('get', '/api/training/form', undefined, { staleTime: Number.POSITIVE_INFINITY })
+  const original = $api.useQuery(
+    'get',
+    '/api/experiments/{experiment_id}',
+    { params: { path: { experiment_id: from ?? '' } } },
+    { enabled: from !== null },
+  )
+  const copied = useCopy(original.data)
+  const initial = from === null ? form.data?.defaults : copied
+  const error = form.isError ? form.error : from === null ? null : original.error
+
+  return (
+    <Page title="New training">
+      {error && !(form.data && initial) ? (
+        <Panel>
+          <QueryError
+            error={error}
+            what={form.isError ? 'form' : 'training'}
+            retry={() => {
+              void form.refetch()
+              if (from !== null) void original.refetch()
+            }}
+          />
+        </Panel>
+      ) : !form.data || !initial ? (
+        <Panel>
+          <Stack aria-busy="true" aria-label="Loading the form">
+            {[60, 40, 80, 50].map((width) => (
+              <Skeleton key={width} height={34} width={`${width}%`} />
+            ))}
+          </Stack>
+        </Panel>
+      ) : (
+        <LaunchForm
+          key={from ?? ''}
+          schema={form.data.schema as Schema}
+          defaults={form.data.defaults as unknown as Json}
+          initial={initial as unknown as Json}
+          presets={form.data.presets}
+        />
+      )}
+    </Page>
+  )
+}
+
+/** What a duplicate starts with; taken once, since its original may go on while the copy is being edited. */
+function useCopy(original: Experiment | undefined): Json | undefined {
+  const [copy, setCopy] = useState<Json>()
+  if (original && copy === undefined) {
+    const { name, runs, training } = original
+    setCopy({
+      name: `${name.slice(0, LONGEST_COPIED_NAME)} (copy)`,
+      seeds: runs.map((run) => run.seed),
+      training: training as unknown as Json,
+    })
+  }
+  return copy
+}
+
+interface LaunchFormProps {
+  schema: Schema
+  defaults: Json
+  initial: Json
+  presets: readonly Preset[]
+}
+
+function LaunchForm({ schema, defaults, initial, presets }: LaunchFormProps) {
+  const navigate = useNavigate()
+  const form = useForm(initial)
+  const launch = $api.useMutation('post', '/api/experiments', {
+    onSuccess: (experiment) => navigate(landing(experiment)),
+    onError: (error) => {
+      if (error instanceof ApiError) form.refuse(error.problems)
+    },
+  })
+  const fields = fieldsOf(schema, schema, form.values)
+  const seeds = fields.find((field) => field.key === 'seeds')
+  const name = fields.filter((field) => field.key === 'name')
+  const main = fields.filter((field) => !field.advanced && field !== seeds && field.key !== 'name')
+  const advanced = fields.filter((field) => field.advanced)
+  const shared = { form, root: schema, initial: defaults }
+
+  const training = valueAt(form.values, ['training']) ?? null
+  const preset = presets.find((one) => sameValue(training, one.training as unknown as Json))
+  const runs = valueAt(form.values, ['seeds'])
+  const steps = valueAt(training, ['steps'])
+  const otherError = launch.error && !(launch.error instanceof ApiError && launch.error.problems.length > 0)
+
+  return (
+    <form
+      className={classes.layout}
+      aria-label="New training"
+      onSubmit={(event) => {
+        event.preventDefault()
+        launch.mutate({ body: form.values as unknown as ExperimentCreate })
+      }}
+    >
+      <Stack gap="md" className={classes.fields}>
+        <ProblemSummary fields={fields} problems={form.problems} />
+        <Panel>
+          <Stack gap="lg">
+            <FieldGrid fields={name} {...shared} />
+            <div>
+              <Text size="sm" fw={500} mb={2} id="preset-label">
+                Start from
+              </Text>
+              <SegmentedControl
+                aria-labelledby="preset-label"
+                className={classes.presets}
+                data={[
+                  ...presets.map(({ id, title }) => ({ value: id, label: title })),
+                  ...(preset ? [] : [{ value: 'own', label: 'Your settings' }]),
+                ]}
+                value={preset?.id ?? 'own'}
+                onChange={(id) => {
+                  const chosen = presets.find((one) => one.id === id)
+                  if (chosen) form.set(['training'], chosen.training as unknown as Json)
+                }}
+              />
+              <Text size="xs" c="dimmed" mt={6} mih={18}>
+                {preset?.description ??
+                  'Changed by you; choosing a preset again sets everything below back to it.'}
+              </Text>
+            </div>
+            <FieldGrid fields={main} {...shared} />
+          </Stack>
+        </Panel>
+        <AdvancedFields fields={advanced} {...shared} />
+      </Stack>
+      <aside className={classes.launch}>
+        <Panel>
+          <Stack gap="md">
+            {seeds && <SeedsInput key={Array.isArray(runs) ? 'list' : 'none'} field={seeds} form={form} />}
+            <Text size="sm" className={classes.sum} data-testid="launch-summary">
+              {Array.isArray(runs) && typeof steps === 'number'
+                ? `${plural(runs.length, 'run')} of ${count(steps)} steps`
+                : ' '}
+            </Text>
+            {otherError && (
+              <Text size="sm" c="red" role="alert">
+                Not launched: {messageOf(launch.error)}
+              </Text>
+            )}
+            <Group>
+              <Button
+                type="submit"
+                fullWidth
+                size="md"
+                leftSection={<IconRocket size={18} />}
+                loading={launch.isPending}
+              >
+                Launch
+              </Button>
+            </Group>
+          </Stack>
+        </Panel>
+      </aside>
+    </form>
+  )
+}
+
+/** A single run is what one wants to watch; several are looked at together. */
+function landing({ id, runs }: Experiment): string {
+  const [only] = runs
+  return only && runs.length === 1 ? `/runs/${only.id}` : `/experiments/${id}`
+}

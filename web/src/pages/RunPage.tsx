@@ -1,0 +1,247 @@
+/** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
+import { Alert, Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
+import { IconCopy, IconPlayerPlay, IconPlayerStop } from '@tabler/icons-react'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useMemo } from 'react'
+import { Link, useNavigate, useParams } from 'react-router'
+import { useActions } from '../api/actions'
+import { $api } from '../api/client'
+import { isRefusal } from '../api/errors'
+import type { RunDetail, Series } from '../api/types'
+import { MetricChart } from '../charts/MetricChart'
+import grid from '../charts/MetricChart.module.css'
+import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
+import { chartOf } from '../charts/shape'
+import { CheckpointTable } from '../components/CheckpointTable'
+import { EventLog } from '../components/EventLog'
+import { ExperimentMenu } from '../components/ExperimentMenu'
+import { LiveView } from '../components/LiveView'
+import { canResume, canStop } from '../components/states'
+import { Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
+import { summaryOf } from '../lib/experiments'
+import { count, duration, percent } from '../lib/format'
+import { useTitle } from '../lib/hooks'
+import classes from './RunPage.module.css'
+
+const POINTS = 600
+
+export function RunPage() {
+  const { runId = '' } = useParams()
+  const { data, error, refetch } = $api.useQuery('get', '/api/runs/{run_id}', {
+    params: { path: { run_id: runId } },
+  })
+  useTitle(data ? `${data.experiment_name}, seed ${data.seed}` : 'Run')
+  if (error && (!data || isRefusal(error))) {
+    return (
+      <Page title="Run">
+        <Panel>
+          <QueryError error={error} what="run" retry={refetch} />
+        </Panel>
+      </Page>
+    )
+  }
+  if (!data) {
+    return (
+      <Page title={<Skeleton height={24} width={280} />} above={<Text size="xs">&nbsp;</Text>}>
+        <Panel>
+          <Skeleton height={460} />
+        </Panel>
+      </Page>
+    )
+  }
+  return <LoadedRun run={data} />
+}
+
+function LoadedRun({ run }: { run: RunDetail }) {
+  const init = { params: { path: { run_id: run.id } } }
+  const metrics = $api.useQuery(
+    'get',
+    '/api/runs/{run_id}/metrics',
+    { params: { ...init.params, query: { points: POINTS } } },
+    { placeholderData: keepPreviousData },
+  )
+  const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', init)
+  const events = $api.useQuery('get', '/api/runs/{run_id}/events', init)
+  const series = metrics.data?.series ?? []
+  const waiting =
+    run.state === 'queued' ? 'Curves start with the training' : metrics.isPending ? '' : 'No value yet'
+
+  return (
+    <Page
+      title={`${run.experiment_name}, seed ${run.seed}`}
+      above={
+        <Text size="xs" c="dimmed">
+          <Anchor component={Link} to="/" inherit>
+            Trainings
+          </Anchor>
+          {' / '}
+          <Anchor component={Link} to={`/experiments/${run.experiment_id}`} inherit>
+            {run.experiment_name}
+          </Anchor>
+        </Text>
+      }
+      below={
+        <Text size="sm" c="dimmed" mt={4}>
+          {summaryOf(run.training)}
+        </Text>
+      }
+      actions={<RunActions run={run} />}
+    >
+      <Stack gap="md">
+        <Vitals run={run} />
+        {run.error && (
+          <Alert
+            color="red"
+            variant="light"
+            title={run.state === 'failed' ? 'This run failed' : 'What happened'}
+          >
+            <Text size="sm" className={classes.error}>
+              {run.error}
+            </Text>
+          </Alert>
+        )}
+        <div className={classes.stage}>
+          <Panel flush>
+            <LiveView runId={run.id} state={run.state} />
+          </Panel>
+          <Panel data-testid="main-curves">
+            <Stack gap="md">
+              {MAIN_CHARTS.map((spec) => (
+                <SpecChart key={spec.title} spec={spec} series={series} height={196} empty={waiting} />
+              ))}
+            </Stack>
+          </Panel>
+        </div>
+        <Panel title="Checkpoints" flush>
+          {checkpoints.data ? (
+            <CheckpointTable checkpoints={checkpoints.data} />
+          ) : checkpoints.error ? (
+            <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
+          ) : (
+            <Skeleton height={120} m="md" w="auto" />
+          )}
+        </Panel>
+        <Panel title="Curves">
+          <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
+            <Tabs.List mb="md">
+              {SECTIONS.map(({ title }) => (
+                <Tabs.Tab key={title} value={title}>
+                  {title}
+                </Tabs.Tab>
+              ))}
+            </Tabs.List>
+            {SECTIONS.map(({ title, charts }) => (
+              <Tabs.Panel key={title} value={title}>
+                <div className={grid.grid}>
+                  {charts.map((spec) => (
+                    <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
+                  ))}
+                </div>
+              </Tabs.Panel>
+            ))}
+          </Tabs>
+        </Panel>
+        <Panel title="Event log" flush>
+          {events.data ? (
+            <EventLog events={events.data} />
+          ) : events.error ? (
+            <QueryError error={events.error} what="event log" retry={events.refetch} />
+          ) : (
+            <Skeleton height={80} m="md" w="auto" />
+          )}
+        </Panel>
+      </Stack>
+    </Page>
+  )
+}
+
+interface SpecChartProps {
+  spec: ChartSpec
+  series: readonly Series[]
+  height: number
+  empty: string
+}
+
+function SpecChart({ spec, series, height, empty }: SpecChartProps) {
+  const data = useMemo(() => chartOf(spec, series), [spec, series])
+  const { metrics: _, ...look } = spec
+  return <MetricChart {...look} data={data} height={height} empty={empty} />
+}
+
+function RunActions({ run }: { run: RunDetail }) {
+  const navigate = useNavigate()
+  const actions = useActions()
+  const of = { params: { path: { run_id: run.id } } }
+  const experiment = $api.useQuery('get', '/api/experiments/{experiment_id}', {
+    params: { path: { experiment_id: run.experiment_id } },
+  })
+  return (
+    <Group gap="xs">
+      {canStop([run.state]) && (
+        <Button
+          variant="default"
+          leftSection={<IconPlayerStop size={16} />}
+          loading={actions.stopRun.isPending}
+          onClick={() => actions.stopRun.mutate(of)}
+        >
+          Stop
+        </Button>
+      )}
+      {canResume([run.state]) && (
+        <Button
+          variant="default"
+          leftSection={<IconPlayerPlay size={16} />}
+          loading={actions.resumeRun.isPending}
+          onClick={() => actions.resumeRun.mutate(of)}
+        >
+          Resume
+        </Button>
+      )}
+      <Button
+        variant="default"
+        leftSection={<IconCopy size={16} />}
+        component={Link}
+        to={`/new?from=${run.experiment_id}`}
+      >
+        Duplicate
+      </Button>
+      {experiment.data && <ExperimentMenu experiment={experiment.data} onDeleted={() => navigate('/')} />}
+    </Group>
+  )
+}
+
+/** The figures that are glanced at: all in one line, with the progress under it. */
+function Vitals({ run }: { run: RunDetail }) {
+  const progress = run.step / run.total_steps
+  const figures: [label: string, value: string][] = [
+    ['Steps', `${count(run.step)} of ${count(run.total_steps)}`],
+    ...(run.seconds_left === null ? [] : [['Time left', duration(run.seconds_left)] as [string, string]]),
+    ...(run.steps_per_second === null ? [] : [['Steps/s', count(run.steps_per_second)] as [string, string]]),
+    ...(run.started_at !== null && run.finished_at !== null
+      ? [['Took', duration(run.finished_at - run.started_at)] as [string, string]]
+      : []),
+    ['Success, training', run.success_rate === null ? '–' : percent(run.success_rate)],
+    ['Success, evaluation', run.eval_success_rate === null ? '–' : percent(run.eval_success_rate)],
+    ...(run.attempt > 1 ? [['Attempt', count(run.attempt)] as [string, string]] : []),
+    ...(run.worker ? [['Worker', run.worker] as [string, string]] : []),
+  ]
+  return (
+    <Panel data-testid="vitals">
+      <dl className={classes.vitals}>
+        <div>
+          <dt>State</dt>
+          <dd>
+            <StateLabel state={run.state} />
+          </dd>
+        </div>
+        {figures.map(([label, value]) => (
+          <div key={label}>
+            <dt>{label}</dt>
+            <dd>{value}</dd>
+          </div>
+        ))}
+      </dl>
+      <ProgressBar value={progress} state={run.state} label="Progress" />
+    </Panel>
+  )
+}

@@ -1,0 +1,81 @@
+/** Colours, type and component defaults: quiet greys, one petrol accent, dense controls. */
+import { type CSSVariablesResolver, createTheme, type MantineColorsTuple } from '@mantine/core'
+
+const petrol: MantineColorsTuple = [
+  '#eaf6f8',
+  '#d3e9ee',
+  '#a6d2dc',
+  '#76bac9',
+  '#50a6b9',
+  '#3899af',
+  '#2792a9',
+  '#177f95',
+  '#0b7186',
+  '#006276',
+]
+
+const dark: MantineColorsTuple = [
+  '#d5dade',
+  '#b3bac0',
+  '#8b949c',
+  '#68717a',
+  '#4a525a',
+  '#353c43',
+  '#262c32',
+  '#1b2025',
+  '#14181c',
+  '#0e1114',
+]
+
+const sans =
+  "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
+
+export const theme = createTheme({
+  primaryColor: 'petrol',
+  primaryShade: { light: 8, dark: 5 },
+  autoContrast: true,
+  colors: { petrol, dark },
+  fontFamily: sans,
+  fontFamilyMonospace: "ui-monospace, 'SF Mono', Menlo, Consolas, 'Liberation Mono', monospace",
+  fontSizes: { xs: '0.75rem', sm: '0.84375rem', md: '0.9375rem', lg: '1.0625rem', xl: '1.25rem' },
+  headings: {
+    fontFamily: sans,
+    fontWeight: '620',
+    sizes: {
+      h1: { fontSize: '1.375rem', lineHeight: '1.3' },
+      h2: { fontSize: '1rem', lineHeight: '1.4' },
+      h3: { fontSize: '0.875rem', lineHeight: '1.4' },
+    },
+  },
+  defaultRadius: 'sm',
+  cursorType: 'pointer',
+  focusRing: 'auto',
+  components: {
+    Button: { defaultProps: { size: 'sm' } },
+    Tooltip: { defaultProps: { openDelay: 300, withArrow: true } },
+    Modal: { defaultProps: { centered: true } },
+    Menu: { defaultProps: { position: 'bottom-end', shadow: 'md', width: 190 } },
+    Table: { defaultProps: { verticalSpacing: 7, horizontalSpacing: 'sm' } },
+  },
+})
+
+/** The page is a shade off the panels that lie on it. */
+export const cssVariables: CSSVariablesResolver = () => ({
+  variables: {},
+  light: {
+    '--mantine-color-body': '#ffffff',
+    '--mapless-page': '#f6f7f7',
+    '--mapless-line': '#e1e5e7',
+    '--mapless-text-quiet': '#5d6870',
+    '--mantine-color-dimmed': '#5d6870',
+    '--mantine-color-text': '#1c2327',
+  },
+  dark: {
+    '--mantine-color-body': '#171b1f',
+    '--mapless-page': '#101316',
+    '--mapless-line': '#2a3036',
+    '--mapless-text-quiet': '#97a1a9',
+    '--mantine-color-dimmed': '#97a1a9',
+    '--mantine-color-text': '#dbe0e4',
+  },
+})

@@ -1,0 +1,25 @@
+/** The build: static files in `dist`, which the server serves; in development, a proxy to a running server. */
+import react from '@vitejs/plugin-react'
+import { defineConfig } from 'vite'
+
+const server = process.env.MAPLESS_SERVER_URL ?? 'http://127.0.0.1:8400'
+
+export default defineConfig({
+  plugins: [react()],
+  build: {
+    target: 'es2022',
+    // The vendors change seldom: a browser keeps them across releases.
+    rolldownOptions: {
+      output: {
+        advancedChunks: {
+          groups: [
+            { name: 'react', test: /node_modules\/(react|react-dom|react-router|scheduler)\// },
+            { name: 'mantine', test: /node_modules\/(@mantine|@floating-ui)\// },
+            { name: 'charts', test: /node_modules\/uplot\// },
+          ],
+        },
+      },
+    },
+  },
+  server: { proxy: { '/api': { target: server, ws: true }, '/live': { target: server, ws: true } } },
+})

@@ -1,0 +1,16 @@
+import { defineConfig, mergeConfig } from 'vitest/config'
+import base from './vite.config'
+
+export default mergeConfig(
+  base,
+  defineConfig({
+    test: {
+      environment: 'jsdom',
+      setupFiles: ['src/testing/setup.ts'],
+      // The pages show local times; tests pin the zone so that they read the same everywhere.
+      env: { TZ: 'UTC' },
+      restoreMocks: true,
+      css: false,
+    },
+  }),
+)
