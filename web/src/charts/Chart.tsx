@@ -152,6 +152,9 @@ function withAlpha(hex: string, alpha: number): string {
     .padStart(2, '0')}`
 }
 
+/** Ticks are round numbers: "75.0 %" -> "75 %". */
+const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
+
 function appearance(
   dark: boolean,
   format: (value: number) => string,
@@ -176,7 +179,8 @@ function appearance(
         gap: 6,
         space: 34,
         // A logarithmic axis hands over null for the ticks that it leaves blank.
-        values: (_, ticks) => ticks.map((tick: number | null) => (tick === null ? '' : format(tick))),
+        values: (_, ticks) =>
+          ticks.map((tick: number | null) => (tick === null ? '' : roundTick(format(tick)))),
       },
     ],
   }

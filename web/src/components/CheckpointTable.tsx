@@ -16,14 +16,14 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
     )
   }
   return (
-    <Table.ScrollContainer minWidth={680} mah={420}>
+    <Table.ScrollContainer type="native" minWidth={680} mah={420}>
       <Table highlightOnHover className={classes.table} data-testid="checkpoints">
         <Table.Thead>
           <Table.Tr>
             <Table.Th ta="right" w={110}>
               Step
             </Table.Th>
-            <Table.Th w={60} aria-label="Best" />
+            <Table.Th w={84} aria-label="Best" />
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th ta="right">Steps to target</Table.Th>
             <Table.Th ta="right">Size</Table.Th>
@@ -39,7 +39,7 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
               </Table.Td>
               <Table.Td>
                 {checkpoint.best && (
-                  <Badge size="sm" variant="light">
+                  <Badge size="sm" variant="light" miw="fit-content">
                     Best
                   </Badge>
                 )}

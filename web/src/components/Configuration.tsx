@@ -5,13 +5,13 @@ import type { TrainingConfig } from '../api/types'
 import { type Field, fieldsOf, grouped } from '../form/layout'
 import type { Json, Schema } from '../form/schema'
 import { sameValue, valueAt } from '../form/values'
-import { significant, words } from '../lib/format'
+import { count, significant, words } from '../lib/format'
 import classes from './Configuration.module.css'
 
 /** A value of a setting as text. */
 export function settingText(value: unknown): string {
   if (value === null || value === undefined) return '–'
-  if (typeof value === 'number') return significant(value, 6)
+  if (typeof value === 'number') return Number.isInteger(value) ? count(value) : significant(value, 6)
   if (typeof value === 'boolean') return value ? 'yes' : 'no'
   if (typeof value === 'string') return words(value)
   if (Array.isArray(value)) return value.map(settingText).join(', ')

@@ -25,7 +25,7 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
   const ids = experiments?.map((experiment) => experiment.id) ?? []
   const tickedHere = ids.filter((id) => ticked.includes(id))
   return (
-    <Table.ScrollContainer minWidth={menu ? 940 : 820}>
+    <Table.ScrollContainer type="native" minWidth={menu ? 940 : 820}>
       <Table highlightOnHover className={classes.table} data-testid="experiments">
         <Table.Thead>
           <Table.Tr>

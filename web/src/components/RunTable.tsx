@@ -12,7 +12,7 @@ const DASH = '–'
 
 export function RunTable({ runs }: { runs: readonly Run[] }) {
   return (
-    <Table.ScrollContainer minWidth={780}>
+    <Table.ScrollContainer type="native" minWidth={780}>
       <Table highlightOnHover className={classes.table} data-testid="runs">
         <Table.Thead>
           <Table.Tr>

@@ -28,11 +28,10 @@ export function significant(value: number, digits = 4): string {
   if (!Number.isFinite(value)) return 'not a number'
   if (value === 0) return '0'
   const size = Math.abs(value)
-  if (size >= 1e6 || size < 1e-4)
-    return value
-      .toExponential(digits - 2)
-      .replace(/\.?0+e/, 'e')
-      .replace('-', MINUS)
+  if (size < 1e-4) {
+    const text = value.toExponential(digits - 2).replace(/\.?0+e/, 'e')
+    return text.replaceAll('-', MINUS)
+  }
   if (size >= 10 ** digits) return count(value)
   return Number(value.toPrecision(digits)).toString().replace('-', MINUS)
 }

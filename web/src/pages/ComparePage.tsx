@@ -164,7 +164,7 @@ function Warnings({ warnings }: { warnings: readonly string[] }) {
 
 function Figures({ comparison }: { comparison: Comparison }) {
   return (
-    <Table.ScrollContainer minWidth={820}>
+    <Table.ScrollContainer type="native" minWidth={820}>
       <Table className={table.table} data-testid="figures">
         <Table.Thead>
           <Table.Tr>
@@ -248,7 +248,7 @@ function Differences({ comparison }: { comparison: Comparison }) {
     )
   }
   return (
-    <Table.ScrollContainer minWidth={240 + 160 * experiments.length}>
+    <Table.ScrollContainer type="native" minWidth={240 + 160 * experiments.length}>
       <Table className={table.table} data-testid="differences">
         <Table.Thead>
           <Table.Tr>

@@ -1,5 +1,5 @@
 /** The launch form, rendered from the schema that the server derives from its own configuration models. */
-import { Button, Group, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
+import { Button, Group, Input, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
 import { IconRocket } from '@tabler/icons-react'
 import { useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
@@ -130,9 +130,9 @@ function LaunchForm({ schema, defaults, initial, presets }: LaunchFormProps) {
           <Stack gap="lg">
             <FieldGrid fields={name} {...shared} />
             <div>
-              <Text size="sm" fw={500} mb={2} id="preset-label">
+              <Input.Label labelElement="div" id="preset-label" mb={2} display="block">
                 Start from
-              </Text>
+              </Input.Label>
               <SegmentedControl
                 aria-labelledby="preset-label"
                 className={classes.presets}

@@ -107,7 +107,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
           <Panel data-testid="main-curves">
             <Stack gap="md">
               {MAIN_CHARTS.map((spec) => (
-                <SpecChart key={spec.title} spec={spec} series={series} height={196} empty={waiting} />
+                <SpecChart key={spec.title} spec={spec} series={series} height={214} empty={waiting} />
               ))}
             </Stack>
           </Panel>
@@ -123,7 +123,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
         </Panel>
         <Panel title="Curves">
           <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
-            <Tabs.List mb="md">
+            <Tabs.List mb="md" className={classes.tabs}>
               {SECTIONS.map(({ title }) => (
                 <Tabs.Tab key={title} value={title}>
                   {title}
