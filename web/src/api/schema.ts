@@ -525,6 +525,172 @@ export interface components {
             steps: number[];
         };
         /**
+         * DdpgConfig
+         * @description Deep Deterministic Policy Gradient (Lillicrap et al. 2016).
+         */
+        "DdpgConfig-Input": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Exploration noise, first
+             * @description Deviation, in halves of an action's range; decays linearly.
+             * @default 0.5
+             */
+            exploration_noise: number;
+            /**
+             * Exploration noise, last
+             * @default 0.05
+             */
+            final_exploration_noise: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ddpg";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
+         * DdpgConfig
+         * @description Deep Deterministic Policy Gradient (Lillicrap et al. 2016).
+         */
+        "DdpgConfig-Output": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Exploration noise, first
+             * @description Deviation, in halves of an action's range; decays linearly.
+             * @default 0.5
+             */
+            exploration_noise: number;
+            /**
+             * Exploration noise, last
+             * @default 0.05
+             */
+            final_exploration_noise: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ddpg";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
          * Difference
          * @description A setting in which the experiments differ.
          */
@@ -1055,9 +1221,8 @@ export interface components {
              */
             minibatch_size: number;
             /**
-             * PPO
-             * @default ppo
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             name: "ppo";
             /** Network */
@@ -1147,9 +1312,8 @@ export interface components {
              */
             minibatch_size: number;
             /**
-             * PPO
-             * @default ppo
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             name: "ppo";
             /** Network */
@@ -1470,6 +1634,174 @@ export interface components {
             step: number;
         };
         /**
+         * SacConfig
+         * @description Soft Actor-Critic with a learned temperature (Haarnoja et al. 2018).
+         */
+        "SacConfig-Input": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * Initial temperature
+             * @description Weight of entropy.
+             * @default 0.1
+             */
+            initial_temperature: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "sac";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target entropy
+             * @description Nats over both actions.
+             * @default -2
+             */
+            target_entropy: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
+         * SacConfig
+         * @description Soft Actor-Critic with a learned temperature (Haarnoja et al. 2018).
+         */
+        "SacConfig-Output": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * Initial temperature
+             * @description Weight of entropy.
+             * @default 0.1
+             */
+            initial_temperature: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "sac";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target entropy
+             * @description Nats over both actions.
+             * @default -2
+             */
+            target_entropy: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
          * SeedCurve
          * @description One run on the common grid; null before its first point and after its last.
          */
@@ -1620,12 +1952,212 @@ export interface components {
             step_limit: number;
         };
         /**
+         * Td3Config
+         * @description Twin Delayed DDPG (Fujimoto et al. 2018).
+         */
+        "Td3Config-Input": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Exploration noise, first
+             * @description Deviation, in halves of an action's range; decays linearly.
+             * @default 0.5
+             */
+            exploration_noise: number;
+            /**
+             * Exploration noise, last
+             * @default 0.05
+             */
+            final_exploration_noise: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "td3";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            /**
+             * Policy delay
+             * @description Critic updates for each of the actor.
+             * @default 2
+             */
+            policy_delay: number;
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target noise
+             * @description Smooths the target, in halves of an action's range.
+             * @default 0.2
+             */
+            target_noise: number;
+            /**
+             * Target noise limit
+             * @default 0.5
+             */
+            target_noise_clip: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
+         * Td3Config
+         * @description Twin Delayed DDPG (Fujimoto et al. 2018).
+         */
+        "Td3Config-Output": {
+            /**
+             * Actor learning rate
+             * @default 0.0003
+             */
+            actor_learning_rate: number;
+            /**
+             * Minibatch
+             * @default 256
+             */
+            batch_size: number;
+            /**
+             * Critic learning rate
+             * @default 0.001
+             */
+            critic_learning_rate: number;
+            /**
+             * Exploration noise, first
+             * @description Deviation, in halves of an action's range; decays linearly.
+             * @default 0.5
+             */
+            exploration_noise: number;
+            /**
+             * Exploration noise, last
+             * @default 0.05
+             */
+            final_exploration_noise: number;
+            /**
+             * Discount (gamma)
+             * @default 0.99
+             */
+            gamma: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "td3";
+            /**
+             * Network
+             * @description Of actor and critics.
+             */
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            /**
+             * Policy delay
+             * @description Critic updates for each of the actor.
+             * @default 2
+             */
+            policy_delay: number;
+            /**
+             * Memory
+             * @description Transitions kept.
+             * @default 200000
+             */
+            replay_size: number;
+            /**
+             * Reward scale
+             * @description Multiplies rewards.
+             * @default 0.01
+             */
+            reward_scale: number;
+            /**
+             * Robots
+             * @description Robots that collect experience side by side.
+             * @default 64
+             */
+            robots: number;
+            /**
+             * Target noise
+             * @description Smooths the target, in halves of an action's range.
+             * @default 0.2
+             */
+            target_noise: number;
+            /**
+             * Target noise limit
+             * @default 0.5
+             */
+            target_noise_clip: number;
+            /**
+             * Target rate (tau)
+             * @description Part of the way that target networks go in each update.
+             * @default 0.01
+             */
+            tau: number;
+            /**
+             * Updates per step
+             * @description For each step of all robots.
+             * @default 4
+             */
+            updates_per_step: number;
+            /**
+             * Warm-up
+             * @description Environment steps of uniform actions before learning starts.
+             * @default 10000
+             */
+            warmup_steps: number;
+        };
+        /**
          * TrainingConfig
          * @description One training, complete but for its seed: the message to a worker and the file in a checkpoint.
          */
         "TrainingConfig-Input": {
             /** Algorithm */
-            algorithm?: components["schemas"]["PpoConfig-Input"];
+            algorithm?: components["schemas"]["PpoConfig-Input"] | components["schemas"]["DdpgConfig-Input"] | components["schemas"]["Td3Config-Input"] | components["schemas"]["SacConfig-Input"];
             /**
              * Device
              * @description Small networks train fastest on a CPU core.
@@ -1650,7 +2182,7 @@ export interface components {
          */
         "TrainingConfig-Output": {
             /** Algorithm */
-            algorithm: components["schemas"]["PpoConfig-Output"];
+            algorithm: components["schemas"]["PpoConfig-Output"] | components["schemas"]["DdpgConfig-Output"] | components["schemas"]["Td3Config-Output"] | components["schemas"]["SacConfig-Output"];
             /**
              * Device
              * @description Small networks train fastest on a CPU core.
