@@ -71,7 +71,7 @@ format: .venv/.dev
 	$(BIN)/python web/build.py run format
 
 types: .venv/.dev
-	$(BIN)/python -m server.openapi
+	$(BIN)/python -m server.openapi web/openapi.json
 	$(BIN)/python web/build.py run generate
 
 # The header that uv writes names the command, and nothing in these files names a host.
