@@ -17,7 +17,9 @@ from collections.abc import AsyncGenerator, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from server.live.settings import LiveSettings, LiveStatus
+from server.live.scoreboard import Score
+from server.live.settings import RECEIVING_SECONDS, LiveSettings, LiveStatus
+from server.live.themes import Theme
 from sim.config import TaskConfig
 from workers.frames import Frame
 from workers.reporting import WatchRequest
@@ -25,9 +27,6 @@ from workers.reporting import WatchRequest
 _T = TypeVar("_T")
 
 WatchCallback = Callable[[WatchRequest | None], None]
-
-# A link that has sent nothing for this long has nothing to show; frames come 30 times a second.
-RECEIVING_SECONDS = 2.0
 
 
 class LiveError(Exception):
@@ -39,7 +38,7 @@ class TooManyViewsError(LiveError):
 
 
 class View(Protocol):
-    """The scene of one run, in a thread and on a port of its own."""
+    """The scene of one run in one theme, in a thread and on a port of its own."""
 
     @property
     def port(self) -> int:
@@ -51,11 +50,23 @@ class View(Protocol):
     def apply(self, settings: LiveSettings, connected: bool) -> None:
         """Changes what is shown; `connected` tells whether a worker is there to send frames."""
 
+    def score(self) -> Score:
+        """What the head-up display shows."""
+
     def close(self) -> None:
         """Stops the thread and the port; blocks until both are gone."""
 
 
-ViewFactory = Callable[[str, TaskConfig, LiveSettings], View]
+ViewFactory = Callable[[TaskConfig, Theme, LiveSettings], View]
+
+
+@dataclass
+class _Screen:
+    """A scene that is being watched, was a moment ago, or is about to be."""
+
+    watchers: int = 0
+    view: View | None = None
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
 @dataclass
@@ -65,13 +76,16 @@ class _Channel:
     settings: LiveSettings = field(default_factory=LiveSettings)
     callbacks: list[WatchCallback] = field(default_factory=list)
     told: WatchRequest | None = None
-    view: View | None = None
-    watchers: int = 0
+    screens: dict[Theme, _Screen] = field(default_factory=dict)
     last_frame: float = float("-inf")
-    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    @property
+    def views(self) -> list[View]:
+        """The scenes that somebody looks at."""
+        return [screen.view for screen in self.screens.values() if screen.watchers and screen.view is not None]
 
     def request(self) -> WatchRequest | None:
-        return self.settings.watch_request() if self.watchers and self.view is not None else None
+        return self.settings.watch_request() if self.views else None
 
 
 class LiveHub:
@@ -88,6 +102,7 @@ class LiveHub:
         self._linger = linger
         self._capacity = capacity
         self._channels: dict[str, _Channel] = {}
+        self._open_scenes = 0
         self._tasks: set[asyncio.Task[Any]] = set()
 
     # -- the worker's side ------------------------------------------------------------------------------------------------
@@ -121,9 +136,11 @@ class LiveHub:
             FrameError: `data` is no frame of this version (checked only while somebody watches).
         """
         channel = self._channels.get(run_id)
-        if channel is None or channel.view is None or not channel.watchers:
+        if channel is None or not (views := channel.views):
             return
-        channel.view.show(data if isinstance(data, Frame) else Frame.decode(data))
+        frame = data if isinstance(data, Frame) else Frame.decode(data)
+        for view in views:
+            view.show(frame)
         channel.last_frame = time.monotonic()
 
     def watch_request(self, run_id: str) -> WatchRequest | None:
@@ -150,31 +167,33 @@ class LiveHub:
         return LiveStatus(
             connected=bool(channel.callbacks),
             receiving=time.monotonic() - channel.last_frame < RECEIVING_SECONDS,
-            watchers=channel.watchers,
+            watchers=sum(screen.watchers for screen in channel.screens.values()),
         )
 
     @contextlib.asynccontextmanager
-    async def watch(self, run_id: str, task: TaskConfig) -> AsyncGenerator[View]:
+    async def watch(self, run_id: str, task: TaskConfig, theme: Theme = "light") -> AsyncGenerator[View]:
         """Counts a watcher of this run for as long as the context lasts.
 
         Raises:
             TooManyViewsError: the cap on scenes is reached.
         """
         channel = self._channel(run_id)
-        channel.watchers += 1
+        screen = channel.screens.setdefault(theme, _Screen())
+        screen.watchers += 1
         try:
             # Shielded: a browser that leaves meanwhile must not leave a scene behind that nobody knows of.
-            yield await asyncio.shield(self._start(self._open(run_id, task, channel)))
+            yield await asyncio.shield(self._start(self._open(channel, screen, task, theme)))
         finally:
-            channel.watchers -= 1
+            screen.watchers -= 1
             self._apply(channel)
-            if not channel.watchers:
-                asyncio.get_running_loop().call_later(self._linger, self._close_if_unwatched, channel)
+            if not screen.watchers:
+                asyncio.get_running_loop().call_later(self._linger, self._close_if_unwatched, screen)
 
     def forget(self, run_id: str) -> None:
         """The run is gone: its scene goes with it."""
         if channel := self._channels.pop(run_id, None):
-            self._start(self._close(channel))
+            for screen in channel.screens.values():
+                self._start(self._close(screen))
 
     async def close(self) -> None:
         """Closes every scene; the hub is of no use afterwards."""
@@ -190,8 +209,8 @@ class LiveHub:
 
     def _apply(self, channel: _Channel) -> None:
         """Tells the scene and the worker's link where they stand, the latter only what is new to it."""
-        if channel.view is not None:
-            channel.view.apply(channel.settings, bool(channel.callbacks))
+        for view in channel.views:
+            view.apply(channel.settings, bool(channel.callbacks))
         request = channel.request()
         if request != channel.told:
             channel.told = request
@@ -205,25 +224,31 @@ class LiveHub:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    async def _open(self, run_id: str, task: TaskConfig, channel: _Channel) -> View:
-        async with channel.lock:
-            if channel.view is None:
-                if sum(other.view is not None for other in self._channels.values()) >= self._capacity:
-                    raise TooManyViewsError(f"{self._capacity} runs are being watched already: close one of their pages")
-                channel.view = await asyncio.to_thread(self._view_factory, run_id, task, channel.settings)
+    async def _open(self, channel: _Channel, screen: _Screen, task: TaskConfig, theme: Theme) -> View:
+        async with screen.lock:
+            if screen.view is None:
+                if self._open_scenes >= self._capacity:
+                    raise TooManyViewsError(f"{self._capacity} live views are open already: close one of their pages")
+                self._open_scenes += 1
+                try:
+                    screen.view = await asyncio.to_thread(self._view_factory, task, theme, channel.settings)
+                except BaseException:
+                    self._open_scenes -= 1
+                    raise
             self._apply(channel)
-            return channel.view
+            return screen.view
 
-    def _close_if_unwatched(self, channel: _Channel) -> None:
-        if not channel.watchers and channel.view is not None:
-            self._start(self._close(channel, unless_watched=True))
+    def _close_if_unwatched(self, screen: _Screen) -> None:
+        if not screen.watchers and screen.view is not None:
+            self._start(self._close(screen, unless_watched=True))
 
-    async def _close(self, channel: _Channel, *, unless_watched: bool = False) -> None:
-        async with channel.lock:
-            if channel.view is None or (unless_watched and channel.watchers):
+    async def _close(self, screen: _Screen, *, unless_watched: bool = False) -> None:
+        async with screen.lock:
+            if screen.view is None or (unless_watched and screen.watchers):
                 return
-            view, channel.view = channel.view, None
+            view, screen.view = screen.view, None
             await asyncio.to_thread(view.close)
+            self._open_scenes -= 1
 
 
 _NOBODY = _Channel()

@@ -10,6 +10,9 @@ from workers.reporting import WatchRequest
 
 MAX_ROBOTS = 64
 
+# A view that has received nothing for this long has nothing to show; frames come 30 times a second.
+RECEIVING_SECONDS = 2.0
+
 
 class LiveSettings(Frozen):
     """What the live view of a run shows; one setting per run, shared by everyone who watches it."""

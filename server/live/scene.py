@@ -1,0 +1,123 @@
+"""The scene of one run: light, floor, walls and obstacles, built once, and the robots that come and go in it."""
+
+import numpy as np
+import viser
+
+from server.live.robots import RobotNodes
+from server.live.themes import COLOURS, Colours, Theme
+from sim.arenas import Arena
+from sim.config import TaskConfig
+from workers.frames import Frame
+
+# Everything hangs below this node, so that one message moves the world under the camera when it follows a robot.
+_WORLD = "/world"
+_WALL_HEIGHT = 0.3
+_WALL_THICKNESS = 0.1
+_OBSTACLE_HEIGHT = 0.45
+
+
+class Scene:
+    """One run's scene; broadcast to every browser that watches it in the same theme.
+
+    Args:
+        server: where the nodes live.
+        arena: the place, in its own coordinates.
+        task: geometry of robot and LiDAR.
+        theme: light or dark.
+    """
+
+    def __init__(self, server: viser.ViserServer, arena: Arena, task: TaskConfig, theme: Theme) -> None:
+        self._server = server
+        self._task = task
+        self._colours = COLOURS[theme]
+        self._rays_visible = True
+        self._robots: RobotNodes | None = None
+        self._shape: tuple[int, ...] = ()
+        self._world = server.scene.add_frame(_WORLD, show_axes=False)
+        _light(server, theme, self._colours)
+        _build(server, arena, self._colours)
+
+    def centre_on(self, x: float, y: float) -> None:
+        """Moves the world so that the point (x, y) of the arena lies where the camera looks."""
+        self._world.position = (-x, -y, 0.0)
+
+    def show_rays(self, visible: bool) -> None:
+        """Shows or hides rays, hits and scanned area."""
+        if visible == self._rays_visible:
+            return
+        self._rays_visible = visible
+        if self._robots is not None:
+            self._robots.show_rays(visible)
+
+    def update(self, frame: Frame, now: float) -> None:
+        """Draws a frame.
+
+        Args:
+            frame: what to draw.
+            now: seconds of the wall clock, for what fades.
+        """
+        if self._robots is None or self._shape != frame.ranges.shape:
+            if self._robots is not None:
+                self._robots.remove()
+            self._shape = frame.ranges.shape
+            self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
+            self._robots.show_rays(self._rays_visible)
+        self._robots.update(frame, now)
+
+
+def _light(server: viser.ViserServer, theme: Theme, colours: Colours) -> None:
+    scene = server.scene
+    scene.world_axes.visible = False
+    scene.set_up_direction("+z")
+    scene.configure_environment_map("studio", environment_intensity=colours.ambient)
+    # viser's own lights are three times as bright as the colours of the theme bear.
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_directional("/sun", intensity=colours.sun, cast_shadow=True, position=(-2.0, -3.0, 8.0))
+    server.gui.configure_theme(dark_mode=theme == "dark", show_logo=False, show_share_button=False)
+
+
+def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
+    scene = server.scene
+    half = arena.half_size
+    side = 2 * half
+    scene.add_grid(
+        f"{_WORLD}/floor",
+        side,
+        side,
+        cell_size=0.5,
+        cell_color=colours.cell,
+        section_size=1.0,
+        section_color=colours.section,
+        plane_color=colours.floor,
+        plane_opacity=1.0,
+        shadow_opacity=colours.shadow,
+        position=(0.0, 0.0, -0.005),
+    )
+    middle = half + _WALL_THICKNESS / 2
+    long = side + 2 * _WALL_THICKNESS
+    for name, x, y, size_x, size_y in (
+        ("east", middle, 0.0, _WALL_THICKNESS, side),
+        ("west", -middle, 0.0, _WALL_THICKNESS, side),
+        ("north", 0.0, middle, long, _WALL_THICKNESS),
+        ("south", 0.0, -middle, long, _WALL_THICKNESS),
+    ):
+        scene.add_box(
+            f"{_WORLD}/walls/{name}", colours.wall, (size_x, size_y, _WALL_HEIGHT), position=(x, y, _WALL_HEIGHT / 2)
+        )
+    for index, (x, y, radius) in enumerate(arena.circles):
+        scene.add_cylinder(
+            f"{_WORLD}/circles/{index}",
+            float(radius),
+            _OBSTACLE_HEIGHT,
+            colours.obstacle,
+            radial_segments=40,
+            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+        )
+    for index, (x, y, half_x, half_y, angle) in enumerate(arena.boxes):
+        scene.add_box(
+            f"{_WORLD}/boxes/{index}",
+            colours.obstacle,
+            (2 * float(half_x), 2 * float(half_y), _OBSTACLE_HEIGHT),
+            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+            wxyz=(float(np.cos(angle / 2)), 0.0, 0.0, float(np.sin(angle / 2))),
+        )

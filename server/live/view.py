@@ -1,0 +1,100 @@
+"""The scene of one watched run on a viser server of its own, drawn by one thread thirty times a second."""
+
+import threading
+import time
+
+import viser
+from viser import _messages
+
+from server.live.camera import CameraRig
+from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
+from server.live.scene import Scene
+from server.live.scoreboard import Score, Scoreboard
+from server.live.settings import RECEIVING_SECONDS, LiveSettings
+from server.live.themes import Theme
+from sim.arenas import build_arenas
+from sim.config import TaskConfig
+from workers.frames import Frame
+
+
+class LiveView:
+    """One run in one theme: a viser server on a free port of 127.0.0.1 and the thread that draws.
+
+    Calls come from any thread and return at once; only the thread of the view touches the scene.
+
+    Args:
+        task: arena, robot and LiDAR to draw.
+        theme: light or dark.
+        settings: what to show.
+    """
+
+    def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
+        arena = build_arenas(task.arena)[0]
+        self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+            # With these, any browser could open a public tunnel to this port.
+            self._server._websock_server.unregister_handler(message)  # noqa: SLF001
+        self._scene = Scene(self._server, arena, task, theme)
+        self._camera = CameraRig(self._server, arena.half_size)
+        self._scoreboard = Scoreboard()
+        self._lock = threading.Lock()
+        self._buffer = PlayoutBuffer()
+        self._settings = settings
+        self._connected = False
+        self._arrived = float("-inf")
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._draw, name="live-view", daemon=True)
+        self._thread.start()
+
+    @property
+    def port(self) -> int:
+        """Port of the scene's WebSocket on 127.0.0.1."""
+        return self._server.get_port()
+
+    def show(self, frame: Frame) -> None:
+        """Queues a frame; returns at once, and drops what cannot be shown in time."""
+        with self._lock:
+            self._buffer.put(frame)
+            self._arrived = time.monotonic()
+
+    def apply(self, settings: LiveSettings, connected: bool) -> None:
+        """Changes what is shown; `connected` tells whether a worker is there to send frames."""
+        with self._lock:
+            if (settings.mode, settings.robots) != (self._settings.mode, self._settings.robots):
+                self._buffer.clear()
+            self._settings = settings
+            self._connected = connected
+
+    def score(self) -> Score:
+        """What the head-up display shows."""
+        with self._lock:
+            if time.monotonic() - self._arrived < RECEIVING_SECONDS:
+                state = "live"
+            else:
+                state = "waiting" if self._connected else "no worker"
+            return self._scoreboard.score(state, self._settings.follow)
+
+    def close(self) -> None:
+        """Stops the thread and the port; blocks until both are gone."""
+        self._stopping.set()
+        self._thread.join()
+        self._server.stop()
+
+    def _draw(self) -> None:
+        tick = time.monotonic()
+        positions: list[tuple[float, float]] = []
+        while not self._stopping.wait(max(0.0, tick - time.monotonic())):
+            now = time.monotonic()
+            tick = max(tick + 1.0 / FRAMES_PER_SECOND, now)
+            with self._lock:
+                frame = self._buffer.take()
+                settings = self._settings
+                if frame is not None:
+                    self._scoreboard.update(frame)
+            with self._server.atomic():
+                self._scene.show_rays(settings.rays)
+                self._camera.follow(settings.follow, now)
+                if frame is not None:
+                    positions = [(float(x), float(y)) for x, y, _ in frame.poses]
+                    self._scene.update(frame, now)
+                self._scene.centre_on(*self._camera.centre(positions, now))
