@@ -16,6 +16,7 @@ from server.database import Database
 from server.events import endpoints as events
 from server.experiments import endpoints as experiments
 from server.files import FileStore
+from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.migrate import upgrade
 from server.problems import UNAUTHORIZED, install_error_handlers
@@ -39,6 +40,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     checkpoints.router,
     comparison.router,
     events.router,
+    live.router,
 )
 
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
@@ -75,6 +77,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with AsyncExitStack() as stack:
             stack.callback(services.database.dispose)
             stack.callback(services.bus.close)
+            stack.push_async_callback(services.live.close)
             await run_in_threadpool(_sweep_files, services)
             for background in BACKGROUND:
                 await stack.enter_async_context(background(services))

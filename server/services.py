@@ -10,6 +10,8 @@ from server.database import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
 from server.files import FileStore
+from server.live.hub import LiveHub
+from server.live.views import open_view
 from server.security.limits import LoginLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
@@ -26,6 +28,7 @@ class Services:
     bus: EventBus = field(default_factory=EventBus)
     doorbell: Doorbell = field(default_factory=NoDoorbell)
     links: Links = field(default_factory=NoLinks)
+    live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     login_limiter: LoginLimiter = field(default_factory=LoginLimiter)
 
 

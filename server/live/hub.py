@@ -2,7 +2,7 @@
 
 The hub lives on the server's event loop, and every method is called from there. For the worker's link:
 
-    hub: LiveHub = app.state.live
+    hub: LiveHub = services.live
     detach = hub.attach(run_id, on_watch)    # `on_watch(WatchRequest | None)`: now, and again whenever it changes
     hub.frames(run_id, data)                 # for every binary message, in order; returns at once
     detach()                                 # when the link ends
@@ -189,16 +189,19 @@ class LiveHub:
             if not screen.watchers:
                 asyncio.get_running_loop().call_later(self._linger, self._close_if_unwatched, screen)
 
-    def forget(self, run_id: str) -> None:
-        """The run is gone: its scene goes with it."""
-        if channel := self._channels.pop(run_id, None):
-            for screen in channel.screens.values():
-                self._start(self._close(screen))
+    def score(self, run_id: str, theme: Theme) -> Score:
+        """What the head-up display of a scene shows."""
+        channel = self._channels.get(run_id, _NOBODY)
+        screen = channel.screens.get(theme)
+        if screen is None or screen.view is None:
+            return Score(state="waiting" if channel.callbacks else "no worker")
+        return screen.view.score()
 
     async def close(self) -> None:
         """Closes every scene; the hub is of no use afterwards."""
-        for run_id in tuple(self._channels):
-            self.forget(run_id)
+        for channel in self._channels.values():
+            for screen in channel.screens.values():
+                self._start(self._close(screen))
         while self._tasks:
             await asyncio.gather(*self._tasks, return_exceptions=True)
 

@@ -9,6 +9,7 @@ from server.live.scoreboard import ended
 from server.live.themes import OUTCOMES, Colours, linear, robot_colours
 from server.live.trails import Trails, trail_colours
 from sim.config import TaskConfig
+from sim.lidar import ray_angles
 from workers.frames import Frame
 
 _SCANNER_HEIGHT = 0.17
@@ -42,7 +43,7 @@ class RobotNodes:
         nowhere = np.zeros((robots, 3), np.float32)
 
         self._range = task.lidar.range
-        self._bearings = np.radians(task.lidar.field_of_view) * (np.linspace(-0.5, 0.5, rays) if rays > 1 else np.zeros(1))
+        self._bearings = ray_angles(task.lidar)
         self._rays_visible = True
         self._ends = np.empty((robots, rays, 2, 3), np.float32)
         self._ends[..., 2] = _SCANNER_HEIGHT
@@ -50,6 +51,7 @@ class RobotNodes:
         self._targets = np.full((robots, 2), np.nan, np.float32)
         self._last_seen = frame.poses[:, :2].copy()
         self._flashes = np.full(robots, -np.inf)
+        self._flashing = False
 
         def batch(name: str, mesh: meshes.Mesh, tint: NDArray[np.uint8], **look: bool | float) -> viser.BatchedMeshHandle:
             return scene.add_batched_meshes_simple(
@@ -68,23 +70,23 @@ class RobotNodes:
         self._halos = batch(
             "halos",
             meshes.prism(meshes.circle(max(task.collision_distance, 1.5 * radius), 32), 0.0, 0.004),
-            linear(own),
-            opacity=0.3,
+            linear(_LIT * own),
+            opacity=0.4,
             cast_shadow=False,
             receive_shadow=False,
         )
         self._goals = batch(
             "targets",
             meshes.ring(0.72 * task.arrival_distance, task.arrival_distance),
-            linear(own),
+            linear(_LIT * own),
             cast_shadow=False,
             receive_shadow=False,
         )
         self._beacons = batch(
             "beacons",
-            meshes.prism(meshes.circle(0.045, 16), 0.0, 0.7),
-            linear(own),
-            opacity=0.55,
+            meshes.prism(meshes.circle(0.04, 16), 0.0, 0.6),
+            linear(_LIT * own),
+            opacity=0.7,
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -108,7 +110,7 @@ class RobotNodes:
             thickness=2.5,
             thickness_units="screen",
         )
-        strength = np.array([0.16, colours.ray_strength])[:, None]
+        strength = np.array([0.5, 1.0])[:, None] * colours.ray_strength
         ray = np.array(colours.ray) * strength + np.array(colours.floor) * (1.0 - strength)
         self._ray_lines = scene.add_line_segments(
             f"{parent}/rays",
@@ -201,7 +203,7 @@ class RobotNodes:
         self._hits.points = hits.reshape(-1, 3)
         if self._fan is not None:
             corners = np.concatenate([self._ends[:, :1, 0], self._ends[:, :, 1]], axis=1)
-            corners[..., 2] = 0.02
+            corners[..., 2] = 0.015
             self._fan.vertices = corners.reshape(-1, 3)
 
     def _draw_targets(self, frame: Frame, now: float) -> None:
@@ -216,21 +218,22 @@ class RobotNodes:
             arrived = frame.outcomes[:, None] == 1
             where = np.where(arrived, self._targets, self._last_seen)
             places[flashing, :2] = where[flashing]
-            places[:, 2] = 0.015
+            places[:, 2] = 0.03
             tints = self._rings.batched_colors.copy()
             tints[flashing] = linear(np.array(OUTCOMES, np.float64))[frame.outcomes[flashing]]
             self._rings.batched_positions = places
             self._rings.batched_colors = tints
             self._flashes[flashing] = now
         self._targets = frame.targets.copy()
-        spots = np.column_stack([frame.targets, np.full(len(frame.targets), 0.01, np.float32)])
+        spots = np.column_stack([frame.targets, np.full(len(frame.targets), 0.025, np.float32)])
         self._goals.batched_positions = spots
         self._beacons.batched_positions = spots
 
     def _draw_flashes(self, now: float) -> None:
         age = (now - self._flashes) / _FLASH_SECONDS
         active = age < 1.0
-        if active.any() or self._rings.batched_opacities.any():
+        if active.any() or self._flashing:
+            self._flashing = bool(active.any())
             self._rings.batched_scales = np.where(active, 0.15 + 0.55 * np.sqrt(np.clip(age, 0, 1)), 1e-3).astype(np.float32)
             self._rings.batched_opacities = np.where(active, 1.0 - age, 0.0).astype(np.float32)
 

@@ -78,12 +78,11 @@ def _light(server: viser.ViserServer, theme: Theme, colours: Colours) -> None:
 
 def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
     scene = server.scene
-    half = arena.half_size
-    side = 2 * half
+    width, height = 2 * arena.half_width, 2 * arena.half_height
     scene.add_grid(
         f"{_WORLD}/floor",
-        side,
-        side,
+        width,
+        height,
         cell_size=0.5,
         cell_color=colours.cell,
         section_size=1.0,
@@ -93,13 +92,14 @@ def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
         shadow_opacity=colours.shadow,
         position=(0.0, 0.0, -0.005),
     )
-    middle = half + _WALL_THICKNESS / 2
-    long = side + 2 * _WALL_THICKNESS
+    side = arena.half_width + _WALL_THICKNESS / 2
+    end = arena.half_height + _WALL_THICKNESS / 2
+    long = width + 2 * _WALL_THICKNESS
     for name, x, y, size_x, size_y in (
-        ("east", middle, 0.0, _WALL_THICKNESS, side),
-        ("west", -middle, 0.0, _WALL_THICKNESS, side),
-        ("north", 0.0, middle, long, _WALL_THICKNESS),
-        ("south", 0.0, -middle, long, _WALL_THICKNESS),
+        ("east", side, 0.0, _WALL_THICKNESS, height),
+        ("west", -side, 0.0, _WALL_THICKNESS, height),
+        ("north", 0.0, end, long, _WALL_THICKNESS),
+        ("south", 0.0, -end, long, _WALL_THICKNESS),
     ):
         scene.add_box(
             f"{_WORLD}/walls/{name}", colours.wall, (size_x, size_y, _WALL_HEIGHT), position=(x, y, _WALL_HEIGHT / 2)

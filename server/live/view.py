@@ -9,7 +9,7 @@ from viser import _messages
 from server.live.camera import CameraRig
 from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
 from server.live.scene import Scene
-from server.live.scoreboard import Score, Scoreboard
+from server.live.scoreboard import Score, Scoreboard, ViewState
 from server.live.settings import RECEIVING_SECONDS, LiveSettings
 from server.live.themes import Theme
 from sim.arenas import build_arenas
@@ -35,7 +35,7 @@ class LiveView:
             # With these, any browser could open a public tunnel to this port.
             self._server._websock_server.unregister_handler(message)  # noqa: SLF001
         self._scene = Scene(self._server, arena, task, theme)
-        self._camera = CameraRig(self._server, arena.half_size)
+        self._camera = CameraRig(self._server, max(arena.half_width, arena.half_height))
         self._scoreboard = Scoreboard()
         self._lock = threading.Lock()
         self._buffer = PlayoutBuffer()
@@ -68,11 +68,9 @@ class LiveView:
     def score(self) -> Score:
         """What the head-up display shows."""
         with self._lock:
-            if time.monotonic() - self._arrived < RECEIVING_SECONDS:
-                state = "live"
-            else:
-                state = "waiting" if self._connected else "no worker"
-            return self._scoreboard.score(state, self._settings.follow)
+            silent: ViewState = "waiting" if self._connected else "no worker"
+            live = time.monotonic() - self._arrived < RECEIVING_SECONDS
+            return self._scoreboard.score("live" if live else silent, self._settings.follow)
 
     def close(self) -> None:
         """Stops the thread and the port; blocks until both are gone."""

@@ -1,0 +1,89 @@
+"""Carries viser's WebSocket between a browser and the scene's own port: everything down, only the camera up.
+
+viser believes every message of a client: some write attributes of its controls unchecked, one opens a public tunnel. So
+what comes from browsers is let through by name.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Coroutine
+from typing import Any
+
+import msgspec
+from fastapi import WebSocket
+from starlette.websockets import WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from server.live.page import VISER_PROTOCOL
+
+ALLOWED_FROM_BROWSERS = frozenset({"ViewerCameraMessage"})
+# A camera's pose takes about 300 bytes.
+_MAX_MESSAGE = 4096
+
+
+# RuntimeError: Starlette's word for sending to a browser that has left.
+_GONE = (ConnectionClosed, WebSocketDisconnect, RuntimeError)
+
+
+class _Envelope(msgspec.Struct):
+    """The only field of a message that the bridge reads."""
+
+    type: str
+
+
+_envelopes = msgspec.msgpack.Decoder(_Envelope)
+
+
+async def bridge(browser: WebSocket, port: int) -> None:
+    """Connects an unaccepted WebSocket of a browser with the scene on a port of 127.0.0.1, until one of them leaves."""
+    async with connect(
+        f"ws://127.0.0.1:{port}",
+        subprotocols=[VISER_PROTOCOL],  # type: ignore[list-item]
+        compression=None,
+        max_size=None,
+        # Frames pile up in the scene, which merges them, and not here.
+        max_queue=4,
+        proxy=None,
+        ping_interval=None,
+    ) as scene:
+        await browser.accept(subprotocol=VISER_PROTOCOL)
+        await until_one_ends(_down(scene, browser), _up(browser, scene))
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+        await browser.close()
+
+
+async def until_one_ends(*ways: Coroutine[Any, Any, None]) -> None:
+    """Runs the ways of a connection side by side until the first ends; a connection that is gone is no error."""
+    tasks = [asyncio.create_task(way) for way in ways]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        results = await asyncio.gather(*tasks, return_exceptions=True)
+    for result in results:
+        if isinstance(result, Exception) and not isinstance(result, _GONE):
+            raise result
+
+
+def may_pass(message: bytes) -> bool:
+    """Whether a browser's message may reach the scene."""
+    if len(message) > _MAX_MESSAGE:
+        return False
+    try:
+        return _envelopes.decode(message).type in ALLOWED_FROM_BROWSERS
+    except msgspec.MsgspecError:
+        return False
+
+
+async def _down(scene: ClientConnection, browser: WebSocket) -> None:
+    async for message in scene:
+        await browser.send_bytes(message if isinstance(message, bytes) else message.encode())
+
+
+async def _up(browser: WebSocket, scene: ClientConnection) -> None:
+    while (message := await browser.receive())["type"] != "websocket.disconnect":
+        data = message.get("bytes")
+        if data is not None and may_pass(data):
+            await scene.send(data)
