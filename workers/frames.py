@@ -1,5 +1,6 @@
 """One moment of the robots that somebody watches, and its bytes on the link (NumPy only: the server decodes them)."""
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import Literal, Self
@@ -59,7 +60,7 @@ class Frame:
         """The frame that `encode` wrote.
 
         Raises:
-            FrameError: `data` is no frame of this version, or is cut short.
+            FrameError: `data` is no frame of this version, is cut short, or holds what is no number.
         """
         if len(data) < _HEADER.size:
             raise FrameError("shorter than a frame's header")
@@ -70,6 +71,11 @@ class Frame:
         if len(data) != _HEADER.size + 4 * sum(sizes) + robots:
             raise FrameError("length does not match the header")
         floats = np.frombuffer(data, "<f4", sum(sizes), _HEADER.size)
+        if not (np.isfinite(floats).all() and math.isfinite(sim_time) and math.isfinite(speed)):
+            raise FrameError("a number is not finite")
+        outcomes = np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes))
+        if (outcomes > 3).any():
+            raise FrameError("an outcome that nobody knows")
         poses, targets, ranges, rewards = np.split(floats, np.cumsum(sizes)[:-1])
         return cls(
             mode=_MODES[mode],
@@ -80,5 +86,5 @@ class Frame:
             targets=targets.reshape(robots, 2),
             ranges=ranges.reshape(robots, rays),
             rewards=rewards,
-            outcomes=np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes)),
+            outcomes=outcomes,
         )
