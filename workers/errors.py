@@ -3,6 +3,7 @@
 WorkerError
 ├── TrainingError          a training cannot go on
 │   └── NonFiniteError     its weights are no longer numbers
+├── ExportError            a policy cannot be taken to another format
 └── ArchiveError           a checkpoint archive is refused
     ├── ArchiveFormatError       not an archive of this project, or of a newer version
     ├── ArchiveIntegrityError    its content is not what its manifest says
@@ -20,6 +21,10 @@ class TrainingError(WorkerError):
 
 class NonFiniteError(TrainingError):
     """The weights of a training are no longer finite numbers."""
+
+
+class ExportError(WorkerError):
+    """A policy cannot be taken to another format without changing it."""
 
 
 class ArchiveError(WorkerError):
