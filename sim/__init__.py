@@ -1,0 +1,1 @@
+"""The world: arenas, robot, LiDAR, rewards, observations, Gymnasium environments and suites."""

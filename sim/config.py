@@ -52,7 +52,12 @@ class RobotConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     max_angular_speed: float = Field(
-        1.0, gt=0.0, le=6.0, title="Top turning rate", description="Radians per second, both ways.", json_schema_extra=ADVANCED
+        1.0,
+        gt=0.0,
+        le=6.0,
+        title="Top turning rate",
+        description="Radians per second, both ways.",
+        json_schema_extra=ADVANCED,
     )
 
 
@@ -86,13 +91,32 @@ class LidarConfig(Frozen):
 
 
 class RewardConfig(Frozen):
-    """The basic reward of the paper (Eq. 4): arrival, collision, or progress towards the target."""
+    """The paper's rewards: on arrival, on collision, and in between progress c_r * (d_before - d_after).
 
-    name: Literal["basic"] = Field("basic", title="Reward", description="Arrival +, collision -, progress in between.")
+    The advanced ones multiply the progress by 2^(d_before / d_after) and subtract penalty * (1 - hd). The paper leaves hd
+    open; here it is the free distance ahead over the LiDAR's range (`clearance`) or 1 - |bearing of the target| / pi
+    (`alignment`).
+    """
+
+    name: Literal["basic", "clearance", "alignment"] = Field(
+        "basic",
+        title="Reward",
+        description=(
+            "Basic: arrival, collision, progress. Clearance and alignment are readings of the advanced reward: "
+            "exponential progress, less a penalty for little room ahead or for facing away from the target."
+        ),
+    )
     arrival: float = Field(120.0, title="Arrival reward", json_schema_extra=ADVANCED)
     collision: float = Field(-100.0, title="Collision reward", json_schema_extra=ADVANCED)
     progress: float = Field(
         500.0, title="Progress coefficient", description="Reward per metre gained.", json_schema_extra=ADVANCED
+    )
+    penalty: float = Field(
+        5.0,
+        ge=0.0,
+        title="Penalty coefficient",
+        description="Largest penalty per step; the basic reward has none.",
+        json_schema_extra=ADVANCED,
     )
 
 

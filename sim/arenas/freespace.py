@@ -1,0 +1,103 @@
+"""Where robots may start and targets may stand: the connected free space of an arena, as a list of square cells.
+
+A grid of cells is kept rather than a bounding rectangle so that sampling stays quick and never picks a pocket that the robot
+cannot leave, in a maze or an imported map as much as in an empty hall.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arenas.geometry import Arena, free_distance
+from sim.errors import ArenaError
+
+CELL = 0.1
+"""Edge of a cell, metres. A gap that is wider than the robot needs by less than this may count as closed."""
+
+MAX_CELLS = 4_000_000
+"""Cells of the largest grid: 200 x 200 m."""
+
+_HALF_DIAGONAL = CELL * 0.5**0.5
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSpace:
+    """Cells of one connected region; a point drawn in one of them needs only its exact clearance checked.
+
+    Attributes:
+        starts, targets: (n, 2) lower left corners of the cells, metres.
+        clearance: metres that a start or target keeps from everything.
+    """
+
+    starts: NDArray[np.float32]
+    targets: NDArray[np.float32]
+    clearance: float
+
+
+def grid_centres(arena: Arena) -> NDArray[np.float64]:
+    """Centres of the cells that cover an arena, (rows, columns, 2).
+
+    Raises:
+        ArenaError: the arena needs more than `MAX_CELLS`.
+    """
+    columns = max(1, round(2.0 * arena.half_width / CELL))
+    rows = max(1, round(2.0 * arena.half_height / CELL))
+    if columns * rows > MAX_CELLS:
+        raise ArenaError(f"arena {arena.name!r} is too large: at most {MAX_CELLS * CELL**2:,.0f} square metres")
+    x = (np.arange(columns) + 0.5) * CELL - 0.5 * columns * CELL
+    y = (np.arange(rows) + 0.5) * CELL - 0.5 * rows * CELL
+    return np.stack(np.meshgrid(x, y), axis=-1)
+
+
+def largest_region(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The largest 4-connected region of a (rows, columns) mask; all False when nothing is free."""
+    rows, columns = free.shape
+    padded = np.zeros((rows + 2, columns + 2), dtype=np.bool_)
+    padded[1:-1, 1:-1] = free
+    unseen = padded.ravel().copy()
+    stride = columns + 2
+    best: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    while np.count_nonzero(unseen) > len(best):
+        seed = np.array([int(np.argmax(unseen))])
+        unseen[seed] = False
+        region = [seed]
+        frontier = seed
+        while len(frontier):
+            neighbours = (frontier[:, None] + np.array([-stride, -1, 1, stride])).ravel()
+            frontier = np.unique(neighbours[unseen[neighbours]])
+            unseen[frontier] = False
+            region.append(frontier)
+        if sum(map(len, region)) > len(best):
+            best = np.concatenate(region)
+    mask = np.zeros(padded.size, dtype=np.bool_)
+    mask[best] = True
+    return mask.reshape(padded.shape)[1:-1, 1:-1]
+
+
+def free_space(arena: Arena, *, passable: float, clearance: float) -> FreeSpace:
+    """The cells in which robots start and targets stand.
+
+    Args:
+        arena: the place.
+        passable: clearance that the robot needs on its way, metres; the region is connected at this clearance.
+        clearance: clearance that starts and targets keep, metres, at least `passable`.
+
+    Raises:
+        ArenaError: nothing is left to start from or to drive to.
+    """
+    centres = grid_centres(arena)
+    distance = free_distance(arena, centres)
+    # A cell counts when any point of it may have the clearance: the exact check is made on the point drawn.
+    candidates = largest_region(distance >= passable) & (distance >= clearance - _HALF_DIAGONAL)
+    wall = np.minimum(arena.half_width - np.abs(centres[..., 0]), arena.half_height - np.abs(centres[..., 1]))
+    cells = []
+    for what, inset in (("start", arena.start_inset), ("target", arena.target_inset)):
+        chosen = candidates & (wall > inset)
+        if not (chosen & (distance >= clearance)).any():
+            raise ArenaError(
+                f"arena {arena.name!r} has no free space for a {what} with {clearance:.2f} m clearance; "
+                "use a smaller robot or a more open arena"
+            )
+        cells.append((centres[chosen] - 0.5 * CELL).astype(np.float32))
+    return FreeSpace(starts=cells[0], targets=cells[1], clearance=clearance)

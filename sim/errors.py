@@ -1,0 +1,23 @@
+"""Everything that can go wrong in the simulator.
+
+SimError
+├── ArenaError       an arena cannot be built or driven in
+├── PlacementError   a requested pose or target is not in the arena's free space
+└── SuiteError       a suite is unknown, or its content is not what its hash says
+"""
+
+
+class SimError(Exception):
+    """Base of the simulator's errors; the message says what to do."""
+
+
+class ArenaError(SimError):
+    """An arena cannot be built, read or driven in."""
+
+
+class PlacementError(SimError):
+    """A requested pose or target does not fit into the arena."""
+
+
+class SuiteError(SimError):
+    """A suite is unknown, does not fit the task, or has changed since its hash was taken."""

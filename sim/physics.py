@@ -1,0 +1,111 @@
+"""All robots in one pymunk Space: each arena is a tile of it, and poses and commands pass through in bulk.
+
+The robots of a tile do not see one another, so a tile is as good as a world of its own; one Space instead of many is what
+makes a step cheap (benchmarks/sim_throughput.py).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+from pymunk import batch
+
+from sim.arenas import Arena
+
+ROBOTS_PER_TILE = 64
+"""Robots that share a tile: few enough that the broad phase finds few pairs, enough that thousands need few shapes."""
+
+TILE_COLUMNS = 64
+"""Tiles in a row. Fixed, so that a robot's tile, and with it every rounding, is independent of the number of robots."""
+
+GAP = 2.0
+"""Metres between two tiles."""
+
+_WALL = 0.05  # half the thickness of the outer walls, whose inner faces stand on the arena's bounds
+_HASH_CELL = 3.0  # m; the spatial hash at this size is 1.3 times as fast as Chipmunk's tree
+_HASH_SLOTS_PER_SHAPE = 10
+_ROBOT, _OBSTACLE = 0b01, 0b10
+_READ = batch.BodyFields.POSITION | batch.BodyFields.ANGLE
+_WRITE = _READ | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+
+
+def tile_origins(arenas: Sequence[Arena], replicas: int) -> NDArray[np.float64]:
+    """Centres of the tiles, (replicas * arenas, 2) metres: all arenas once, then all again, row by row."""
+    pitch = GAP + 2.0 * max(max(arena.half_width, arena.half_height) for arena in arenas)
+    tiles = np.arange(replicas * len(arenas))
+    return pitch * np.stack([tiles % TILE_COLUMNS, tiles // TILE_COLUMNS], axis=1).astype(np.float64)
+
+
+def add_arena(space: pymunk.Space, arena: Arena, x: float, y: float) -> list[pymunk.Shape]:
+    """Put an arena's walls and obstacles into a Space around (x, y), metres; returns the shapes."""
+    body = space.static_body
+    width, height = arena.half_width + _WALL, arena.half_height + _WALL
+    corners = [(x - width, y - height), (x + width, y - height), (x + width, y + height), (x - width, y + height)]
+    # The ends of a thick segment answer ray queries wrongly, but those of the walls stand outside the corners.
+    shapes: list[pymunk.Shape] = [
+        pymunk.Segment(body, corners[k], corners[(k + 1) % 4], _WALL) for k in range(4)
+    ]  # fmt: skip
+    for cx, cy, radius in arena.circles.tolist():
+        shapes.append(pymunk.Circle(body, radius, (x + cx, y + cy)))
+    for cx, cy, length, breadth, angle in arena.boxes.tolist():
+        cos, sin = math.cos(angle), math.sin(angle)
+        vertices = [
+            (x + cx + cos * u - sin * v, y + cy + sin * u + cos * v)
+            for u, v in ((-length, -breadth), (length, -breadth), (length, breadth), (-length, breadth))
+        ]
+        shapes.append(pymunk.Poly(body, vertices))
+    for shape in shapes:
+        shape.filter = pymunk.ShapeFilter(categories=_OBSTACLE, mask=_ROBOT)
+    space.add(*shapes)
+    return shapes
+
+
+class TiledSpace:
+    """A Space with every arena in its tile and all robots, driven by velocities and read as poses.
+
+    Attributes:
+        space: the pymunk Space.
+        state: (bodies, 3) float64 x, y, angle in the Space, in the order robots, static body. `step` refills it; what is
+            written to it stands after the next `step` with the command for that body.
+        command: (bodies, 6) float64 x, y, angle, vx, vy, angular velocity that the next `step` starts from.
+    """
+
+    def __init__(self, arenas: Sequence[Arena], origins: NDArray[np.float64], robots: int, radius: float) -> None:
+        space = pymunk.Space()
+        space.gravity = 0.0, 0.0
+        # Chipmunk lets shapes overlap by 0.1 m unless told otherwise: a robot's radius.
+        space.collision_slop = 0.0
+        # No push-out velocity: it would leak into the first step after a robot is put elsewhere.
+        space.collision_bias = 1.0
+        shapes = sum(4 + len(arena.circles) + len(arena.boxes) for arena in arenas)
+        shapes = shapes * (len(origins) // len(arenas)) + robots
+        space.use_spatial_hash(_HASH_CELL, _HASH_SLOTS_PER_SHAPE * shapes)
+        for tile, (x, y) in enumerate(origins.tolist()):
+            add_arena(space, arenas[tile % len(arenas)], x, y)
+        for _ in range(robots):
+            body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0.0, radius))
+            shape = pymunk.Circle(body, radius)
+            shape.filter = pymunk.ShapeFilter(group=1, categories=_ROBOT, mask=_OBSTACLE)
+            space.add(body, shape)
+        self.space = space
+
+        # Rows follow the order of insertion, the static body last; they stay so since no body is ever removed.
+        rows = robots + 1
+        self.command: NDArray[np.float64] = np.zeros((rows, 6))
+        self._written = batch.Buffer()
+        self._written.set_float_buf(self.command)
+        self._read = batch.Buffer()
+        batch.get_space_bodies(space, _READ, self._read)
+        # A view of pymunk's own memory, which stays where it is while the number of rows does.
+        self.state: NDArray[np.float64] = np.frombuffer(self._read.float_buf(), np.float64).reshape(-1, 3)
+        if self.state.shape != (rows, 3):
+            raise AssertionError(f"pymunk.batch gave {self.state.shape[0]} bodies instead of {rows}")
+
+    def step(self, period: float) -> None:
+        """Put every body where `command` says, let it drive for `period` seconds, and read `state`."""
+        batch.set_space_bodies(self.space, _WRITE, self._written)
+        self.space.step(period)
+        self._read.clear()
+        batch.get_space_bodies(self.space, _READ, self._read)

@@ -1,0 +1,164 @@
+"""The task written plainly: one robot, one pymunk Space, public queries, no compiled code.
+
+This is what the compiled kernels must agree with (tests/sim/test_agreement.py), and the loop that
+benchmarks/sim_throughput.py compares them with. It follows the paper's equations line by line.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+
+from sim.arenas import Arena
+from sim.config import TaskConfig
+from sim.lidar import ray_angles
+from sim.observations import near_distance
+from sim.physics import add_arena
+
+Outcome = Literal["none", "arrival", "collision", "timeout"]
+
+_AHEAD = math.radians(30.0)
+_MAX_RATIO = 8.0
+
+
+def exact_arc(pose: tuple[float, float, float], linear: float, angular: float, time: float) -> tuple[float, float, float]:
+    """Where a differential drive ends that keeps its velocities, in m/s and rad/s, for `time` seconds from `pose`."""
+    x, y, heading = pose
+    if abs(angular) < 1e-12:
+        return x + linear * time * math.cos(heading), y + linear * time * math.sin(heading), heading
+    after = heading + angular * time
+    radius = linear / angular
+    return x + radius * (math.sin(after) - math.sin(heading)), y - radius * (math.cos(after) - math.cos(heading)), after
+
+
+def wrapped(angle: float) -> float:
+    """The same direction in [-pi, pi]."""
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@dataclass
+class Step:
+    """What one step gave: the observation before any new target, the reward and how the attempt ended."""
+
+    observation: NDArray[np.float64]
+    reward: float
+    outcome: Outcome
+
+
+class ReferenceWorld:
+    """One robot that drives to one target.
+
+    Args:
+        task: arena's limits, robot, LiDAR, observation, reward.
+        arena: where it drives.
+        pose: x, y, heading at the start, metres and radians.
+        target: x, y, metres.
+    """
+
+    def __init__(
+        self, task: TaskConfig, arena: Arena, pose: tuple[float, float, float], target: tuple[float, float]
+    ) -> None:
+        self.task = task
+        self.arena = arena
+        self.space = pymunk.Space()
+        self.space.collision_slop = 0.0
+        self.space.collision_bias = 1.0
+        self.obstacles = add_arena(self.space, arena, 0.0, 0.0)
+        self.body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0.0, task.robot.radius))
+        self.disc = pymunk.Circle(self.body, task.robot.radius)
+        self.disc.filter = pymunk.ShapeFilter(group=1)
+        self.space.add(self.body, self.disc)
+        self.body.position = pose[:2]
+        self.body.angle = pose[2]
+        self.target = target
+        self.steps = 0
+        self.velocities = (0.0, 0.0)
+        self.distance = math.dist(pose[:2], target)
+        self._angles = ray_angles(task.lidar).tolist()
+
+    def scan(self) -> NDArray[np.float64]:
+        """(rays,) metres, by Chipmunk's ray queries."""
+        limit = self.task.lidar.range
+        here = self.body.position
+        ranges = np.full(len(self._angles), limit)
+        for k, angle in enumerate(self._angles):
+            direction = self.body.angle + angle
+            end = (here.x + limit * math.cos(direction), here.y + limit * math.sin(direction))
+            hit = self.space.segment_query_first(here, end, 0.0, self.disc.filter)
+            if hit is not None:
+                ranges[k] = hit.alpha * limit
+        return ranges
+
+    def clearance(self) -> float:
+        """Distance from the body to the nearest shape by Chipmunk's point query, metres; negative in contact."""
+        reach = self.arena.diagonal
+        hit = self.space.point_query_nearest(self.body.position, reach, self.disc.filter)
+        return (hit.distance if hit is not None else reach) - self.task.robot.radius
+
+    def bearing(self) -> float:
+        """Direction of the target against the heading, radians, left positive."""
+        here = self.body.position
+        return wrapped(math.atan2(self.target[1] - here.y, self.target[0] - here.x) - self.body.angle)
+
+    def observe(self, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The task's observation, see `sim.observations`."""
+        task = self.task
+        nearest = ranges.reshape(task.lidar.batches, -1).min(axis=1)
+        bearing, heading = self.bearing(), wrapped(self.body.angle)
+        if task.observation == "paper":
+            scan = nearest / task.lidar.range
+            polar = (
+                self.distance / self.arena.diagonal,
+                (bearing + heading) % math.tau / math.tau,
+                heading % math.tau / math.tau,
+            )
+        else:
+            near = near_distance(task)
+            scan = near / np.maximum(nearest, near)
+            polar = (self.distance / (self.distance + 1.0), bearing / math.pi, heading / math.pi)
+        return np.array([*scan, *self.velocities, *polar, abs(bearing) / math.pi])
+
+    def reward(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> float:
+        """The task's reward for a step that began `before` metres from the target (paper, Eq. 4 and 5)."""
+        reward = self.task.reward
+        if outcome == "arrival":
+            return reward.arrival
+        if outcome == "collision":
+            return reward.collision
+        progress = reward.progress * (before - self.distance)
+        if reward.name == "basic":
+            return progress
+        if reward.name == "clearance":
+            hd = (
+                min(r for r, angle in zip(ranges, self._angles, strict=True) if abs(angle) <= _AHEAD) / self.task.lidar.range
+            )
+        else:
+            hd = 1.0 - abs(self.bearing()) / math.pi
+        return float(progress * 2.0 ** min(before / self.distance, _MAX_RATIO) - reward.penalty * (1.0 - hd))
+
+    def step(self, linear: float, angular: float) -> Step:
+        """Drive for one control period; `linear` in [0, 1] and `angular` in [-1, 1] are fractions of the limits."""
+        task = self.task
+        turn = angular * task.robot.max_angular_speed
+        half = turn * task.control_period / 2.0
+        speed = linear * task.robot.max_linear_speed * (math.sin(half) / half if half else 1.0)
+        direction = self.body.angle + half
+        self.body.velocity = speed * math.cos(direction), speed * math.sin(direction)
+        self.body.angular_velocity = turn
+        self.space.step(task.control_period)
+
+        self.steps += 1
+        self.velocities = (linear, angular)
+        before, self.distance = self.distance, math.dist(self.body.position, self.target)
+        ranges = self.scan()
+        outcome: Outcome = "none"
+        if self.distance < task.arrival_distance:
+            outcome = "arrival"
+        elif self.clearance() < 0.0 or ranges.min() < task.collision_distance:
+            outcome = "collision"
+        elif self.steps >= task.step_limit:
+            outcome = "timeout"
+        return Step(self.observe(ranges), self.reward(before, ranges, outcome), outcome)

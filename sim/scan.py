@@ -1,0 +1,46 @@
+"""Scans and clearances at any poses of an arena: for pictures and checks, by the same kernel as the training."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.arenas import Arena
+from sim.config import LidarConfig
+from sim.kernels.sensing import clearance_points, scan_poses
+from sim.lidar import ray_angles
+from sim.shapes import pack_shapes
+
+
+def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None) -> NDArray[np.float32]:
+    """Ranges from poses.
+
+    Args:
+        arena: the place.
+        poses: (N, 3) x, y in metres, heading in radians.
+        lidar: the scanner, by default the default one.
+
+    Returns:
+        (N, rays) metres, at most the LiDAR's range; 0 from inside an obstacle.
+    """
+    lidar = lidar or LidarConfig()
+    where = np.ascontiguousarray(poses, dtype=np.float32).reshape(-1, 3)
+    angles = ray_angles(lidar)
+    ranges = np.empty((len(where), lidar.rays), dtype=np.float32)
+    scan_poses(
+        where,
+        np.zeros(len(where), dtype=np.int32),
+        *pack_shapes((arena,)),
+        np.cos(angles).astype(np.float32),
+        np.sin(angles).astype(np.float32),
+        np.float32(lidar.range),
+        np.int32(lidar.field_of_view <= 180.0),
+        ranges,
+    )
+    return ranges
+
+
+def clearances(arena: Arena, points: ArrayLike) -> NDArray[np.float32]:
+    """Signed distances (N,) from points (N, 2) to the nearest surface, metres."""
+    where = np.ascontiguousarray(points, dtype=np.float32).reshape(-1, 2)
+    result = np.empty(len(where), dtype=np.float32)
+    clearance_points(where, np.zeros(len(where), dtype=np.int32), *pack_shapes((arena,)), result)
+    return result

@@ -1,0 +1,22 @@
+"""Arenas as the kernels read them: one float32 table of each kind of shape for a whole pool."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arenas import Arena
+from sim.kernels.records import BOX_COLUMNS, CIRCLE_COLUMNS
+
+
+def pack_shapes(arenas: Sequence[Arena]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Bounds (M, 2), circles (M, C, 3) and boxes (M, B, 6) of a pool of arenas, padded with empty slots."""
+    bounds = np.array([(arena.half_width, arena.half_height) for arena in arenas], dtype=np.float32)
+    circles = np.full((len(arenas), max(len(a.circles) for a in arenas), CIRCLE_COLUMNS), -1.0, dtype=np.float32)
+    boxes = np.full((len(arenas), max(len(a.boxes) for a in arenas), BOX_COLUMNS), -1.0, dtype=np.float32)
+    for k, arena in enumerate(arenas):
+        circles[k, : len(arena.circles)] = arena.circles
+        boxes[k, : len(arena.boxes), :4] = arena.boxes[:, :4]
+        boxes[k, : len(arena.boxes), 4] = np.cos(arena.boxes[:, 4])
+        boxes[k, : len(arena.boxes), 5] = np.sin(arena.boxes[:, 4])
+    return bounds, circles, boxes
