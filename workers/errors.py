@@ -4,10 +4,14 @@ WorkerError
 ├── TrainingError          a training cannot go on
 │   └── NonFiniteError     its weights are no longer numbers
 ├── ExportError            a policy cannot be taken to another format
-└── ArchiveError           a checkpoint archive is refused
-    ├── ArchiveFormatError       not an archive of this project, or of a newer version
-    ├── ArchiveIntegrityError    its content is not what its manifest says
-    └── ArchiveMismatchError     it belongs to another training
+├── ArchiveError           a checkpoint archive is refused
+│   ├── ArchiveFormatError       not an archive of this project, or of a newer version
+│   ├── ArchiveIntegrityError    its content is not what its manifest says
+│   └── ArchiveMismatchError     it belongs to another training
+└── ServerError            the server does not do what a worker asks of it
+    ├── ServerUnavailableError   not reached, or not able to answer: ask again later
+    ├── RunRefusedError          the run is not this worker's (any more)
+    └── RequestRefusedError      it would refuse the same request again
 """
 
 
@@ -41,3 +45,19 @@ class ArchiveIntegrityError(ArchiveError):
 
 class ArchiveMismatchError(ArchiveError):
     """An archive belongs to another training than the one that it should resume."""
+
+
+class ServerError(WorkerError):
+    """The server does not do what a worker asks of it."""
+
+
+class ServerUnavailableError(ServerError):
+    """The server is not reached, or cannot answer now; the same request may succeed later."""
+
+
+class RunRefusedError(ServerError):
+    """The run is not this worker's: somebody else has it, or it has ended."""
+
+
+class RequestRefusedError(ServerError):
+    """The server would refuse the same request again; the message says why."""

@@ -1,0 +1,235 @@
+"""One attempt of a run: from the claim to the server's last acknowledgement, with everything in between wired together."""
+
+import logging
+import shutil
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from workers.client import ServerClient
+from workers.errors import ServerUnavailableError
+from workers.link import Link
+from workers.pipe import CheckpointReport, Control, Ended, EventReport, FrameReport, Job, MetricsReport, Report
+from workers.protocol import Claim, Final, FinalOutcome, Orders
+from workers.reporting import EvaluationResult
+from workers.settings import WorkerSettings
+from workers.spool import Spool
+from workers.trainer_handle import TrainerHandle
+from workers.uploads import Uploads
+
+logger = logging.getLogger(__name__)
+
+_POLL_SECONDS = 0.1
+_RETRY_SECONDS = 1.0
+# A trainer that has said its last word has nothing left to do.
+_EXIT_SECONDS = 5.0
+
+
+class Attempt:
+    """A claimed run on its way.
+
+    Args:
+        settings: of the worker.
+        client: to the server.
+        run_id: the run.
+        claim: what the server granted.
+        directory: a fresh directory for the spool and the archives; removed at the end.
+        shutting_down: whether the worker should hand the run back.
+    """
+
+    def __init__(
+        self,
+        settings: WorkerSettings,
+        client: ServerClient,
+        run_id: str,
+        claim: Claim,
+        directory: Path,
+        shutting_down: Callable[[], bool],
+    ) -> None:
+        self._settings = settings
+        self._client = client
+        self._run_id = run_id
+        self._claim = claim
+        self._directory = directory
+        self._shutting_down = shutting_down
+        self._changed = threading.Event()
+        self._orders = Orders(ack=claim.last_seq)
+        self._told = Control(stop=False, watch=None)
+        self._telling = threading.Lock()
+        self._ended: Ended | None = None
+        self._trainer: TrainerHandle | None = None
+        self._last_call: float | None = None
+        self._step = claim.checkpoint.step if claim.checkpoint else 0
+        directory.mkdir(parents=True)
+        self._spool = Spool(directory / "spool.jsonl", claim.last_seq)
+        self._uploads = Uploads(client, run_id, claim.attempt, self._spool)
+        self._link = Link(
+            settings.server_url,
+            settings.worker_token.get_secret_value(),
+            run_id,
+            claim.attempt,
+            self._spool,
+            claim.lease_seconds,
+            self._on_orders,
+        )
+
+    def run(self, trainer: TrainerHandle) -> FinalOutcome | None:
+        """Train, and return how that ended once the server knows it too; None where it fenced the attempt out or is gone.
+
+        The trainer has ended when this returns, in every case.
+        """
+        try:
+            final = self._train(trainer)
+            if final is None:
+                return None
+            self._link.finish(final)
+            return final.outcome if self._until_acknowledged() else None
+        finally:
+            trainer.close()
+            self._uploads.close()
+            self._link.close()
+            self._spool.close()
+            shutil.rmtree(self._directory, ignore_errors=True)
+
+    # -- the trainer ------------------------------------------------------------------------------------------------------
+
+    def _train(self, trainer: TrainerHandle) -> Final | None:
+        try:
+            resume = self._fetch_checkpoint()
+        except ServerUnavailableError:
+            return Final(outcome="released")
+        if self._link.fenced():
+            return None
+        trainer.train(
+            Job(
+                training=self._claim.training.model_dump_json(),
+                seed=self._claim.seed,
+                directory=str(self._directory),
+                resume=str(resume) if resume else None,
+            ),
+            self._on_report,
+        )
+        self._trainer = trainer
+        self._tell(trainer)
+        killed = self._until_trained(trainer)
+        if self._link.fenced():
+            logger.warning("run %s: attempt %d was fenced out", self._run_id, self._claim.attempt)
+            return None
+        trainer.close()
+        final = self._final(trainer, killed)
+        while final.outcome != "failed" and not self._uploads.idle and not self._link.fenced():
+            self._changed.wait(_POLL_SECONDS)
+            if self._given_up():
+                return None
+        if self._uploads.refusal is not None:
+            return Final(outcome="failed", error=self._uploads.refusal)
+        return None if self._link.fenced() else final
+
+    def _fetch_checkpoint(self) -> Path | None:
+        checkpoint = self._claim.checkpoint
+        if checkpoint is None:
+            return None
+        path = self._directory / "resume.zip"
+        while not self._link.fenced():
+            try:
+                self._client.download(checkpoint, path)
+            except ServerUnavailableError as error:
+                logger.warning("checkpoint %s waits: %s", checkpoint.id, error)
+                if self._shutting_down():
+                    raise
+                time.sleep(_RETRY_SECONDS)
+            else:
+                return path
+        return None
+
+    def _until_trained(self, trainer: TrainerHandle) -> bool:
+        """Wait for the trainer's end, or bring it about; returns whether it had to be killed after a stop."""
+        deadline: float | None = None
+        while self._ended is None and trainer.alive:
+            if self._link.fenced() or self._uploads.refusal is not None:
+                trainer.kill()
+                return False
+            if self._stop_wanted():
+                self._tell(trainer)
+                limit = time.monotonic() + (
+                    self._settings.release_grace_seconds if self._shutting_down() else self._settings.stop_grace_seconds
+                )
+                deadline = limit if deadline is None else min(deadline, limit)
+            if deadline is not None and time.monotonic() > deadline:
+                trainer.kill()
+                return True
+            self._changed.wait(_POLL_SECONDS)
+            self._changed.clear()
+        trainer.wait(_EXIT_SECONDS)
+        return False
+
+    def _final(self, trainer: TrainerHandle, killed: bool) -> Final:
+        """What the end of the trainer means for the run."""
+        ended = self._ended
+        if ended is not None and ended.outcome == "completed":
+            return Final(outcome="completed")
+        if ended is not None and ended.outcome == "failed":
+            return Final(outcome="failed", error=ended.error)
+        if killed:
+            self._spool.event(
+                self._step, "warning", "The trainer did not end in time and was killed: it goes on from its last checkpoint."
+            )
+        if killed or ended is not None:
+            return Final(outcome="stopped" if self._orders.stop else "released")
+        return Final(outcome="lost", error=trainer.cause_of_death()[-9_000:])
+
+    # -- what comes in, on other threads ----------------------------------------------------------------------------------
+
+    def _on_report(self, report: Report) -> None:
+        match report:
+            case MetricsReport():
+                self._step = report.step
+                self._spool.metrics(report.step, report.at, report.values)
+                self._link.notify()
+            case EventReport():
+                self._spool.event(report.step, report.level, report.message[:10_000])
+                self._link.notify()
+            case CheckpointReport():
+                evaluation = EvaluationResult.model_validate_json(report.evaluation) if report.evaluation else None
+                self._uploads.put(report.step, Path(report.archive), evaluation)
+            case FrameReport():
+                if self._orders.watch is not None:
+                    self._link.frame(report.data)
+            case Ended():
+                self._ended = report
+                self._changed.set()
+
+    def _on_orders(self, orders: Orders) -> None:
+        self._orders = orders
+        self._uploads.notify()
+        if self._trainer is not None:
+            self._tell(self._trainer)
+        self._changed.set()
+
+    # ---------------------------------------------------------------------------------------------------------------------
+
+    def _stop_wanted(self) -> bool:
+        return self._orders.stop or self._shutting_down()
+
+    def _tell(self, trainer: TrainerHandle) -> None:
+        with self._telling:
+            watch = self._orders.watch
+            control = Control(stop=self._stop_wanted(), watch=watch.model_dump_json() if watch else None)
+            if control != self._told:
+                self._told = control
+                trainer.control(control)
+
+    def _until_acknowledged(self) -> bool:
+        while not self._link.wait(_POLL_SECONDS):
+            if self._given_up():
+                return False
+        return not self._link.fenced()
+
+    def _given_up(self) -> bool:
+        """Whether the worker must go although the server does not answer: the lease will run out, the run goes on later."""
+        if not self._shutting_down():
+            return False
+        if self._last_call is None:
+            self._last_call = time.monotonic() + self._settings.release_grace_seconds
+        return time.monotonic() > self._last_call

@@ -1,0 +1,120 @@
+"""The worker's side of the server's worker API over HTTP: claim, heartbeat, checkpoints down and up."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import httpx
+
+from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, Queue
+from workers.reporting import EvaluationResult
+
+_BLOCK = 256 * 1024
+# Connecting is quick or hopeless; an answer may wait for a busy database.
+_TIMEOUT = httpx.Timeout(30.0, connect=5.0)
+
+
+class ServerClient:
+    """One connection pool to the server, with the workers' token. Thread-safe.
+
+    Every method raises, unless it says otherwise:
+        ServerUnavailableError: not reached, or the server cannot answer now.
+        RunRefusedError: the run is not (or no longer) this worker's.
+        RequestRefusedError: the server would refuse the same request again.
+    """
+
+    def __init__(self, server_url: str, token: str) -> None:
+        self._http = httpx.Client(
+            base_url=server_url, headers={"Authorization": f"Bearer {token}"}, timeout=_TIMEOUT, trust_env=False
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def heartbeat(self, worker: str, queue: Queue) -> None:
+        """Tell that this worker is there."""
+        self._send("POST", "/api/worker/heartbeat", content=Heartbeat(worker=worker, queue=queue).model_dump_json())
+
+    def claim(self, run_id: str, worker: str, published_attempt: int) -> Claim:
+        """Take up a run."""
+        request = ClaimRequest(worker=worker, published_attempt=published_attempt)
+        response = self._send("POST", f"/api/worker/runs/{run_id}/claim", content=request.model_dump_json())
+        return Claim.model_validate_json(response.content)
+
+    def download(self, checkpoint: CheckpointReference, path: Path) -> None:
+        """Fetch an archive to `path`; bytes that are not what the server registered count as an unavailable server."""
+        digest = hashlib.sha256()
+        try:
+            with self._http.stream("GET", f"/api/worker/checkpoints/{checkpoint.id}") as response, path.open("wb") as file:
+                if response.is_error:
+                    response.read()
+                _check(response)
+                for block in response.iter_bytes(_BLOCK):
+                    digest.update(block)
+                    file.write(block)
+        except httpx.TransportError as error:
+            raise _unavailable(error) from error
+        if digest.hexdigest() != checkpoint.sha256:
+            raise ServerUnavailableError(f"checkpoint {checkpoint.id} arrived damaged")
+
+    def upload(
+        self, run_id: str, attempt: int, step: int, archive: Path, after_seq: int, evaluation: EvaluationResult | None
+    ) -> None:
+        """Bring an archive; the server registers it once it is complete and has item `after_seq`."""
+        with archive.open("rb") as file:
+            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+        head = CheckpointUpload(after_seq=after_seq, sha256=sha256, evaluation=evaluation)
+        self._send(
+            "PUT",
+            f"/api/worker/runs/{run_id}/checkpoints/{step}",
+            params={"attempt": attempt},
+            content=_upload_body(head, archive),
+        )
+
+    def _send(
+        self, method: str, url: str, *, content: str | Iterator[bytes], params: dict[str, int] | None = None
+    ) -> httpx.Response:
+        try:
+            response = self._http.request(
+                method, url, params=params, content=content, headers={"Content-Type": "application/json"}
+            )
+        except httpx.TransportError as error:
+            raise _unavailable(error) from error
+        _check(response)
+        return response
+
+
+def _upload_body(head: CheckpointUpload, archive: Path) -> Iterator[bytes]:
+    yield head.model_dump_json().encode() + b"\n"
+    with archive.open("rb") as file:
+        while block := file.read(_BLOCK):
+            yield block
+
+
+def _unavailable(error: httpx.TransportError) -> ServerUnavailableError:
+    return ServerUnavailableError(f"the server does not answer ({type(error).__name__}: {error})")
+
+
+def _check(response: httpx.Response) -> None:
+    if response.is_success:
+        return
+    detail = f"{response.status_code} {response.text[:500]}"
+    if response.status_code in (404, 409, 410):
+        raise RunRefusedError(detail)
+    if response.status_code >= 500 or response.status_code in (408, 425, 429):
+        raise ServerUnavailableError(f"the server cannot answer now: {detail}")
+    if response.status_code in (401, 403):
+        raise RequestRefusedError(f"{detail}: is MAPLESS_WORKER_TOKEN the server's?")
+    raise RequestRefusedError(detail)

@@ -1,0 +1,155 @@
+"""What a worker and the server say to one another: bodies of HTTP requests, and JSON messages on the link of a run.
+
+The worker claims a run, opens its link, and then tells everything that the training reports as *items*: numbered from the
+claim's `last_seq` on, without a gap, sent again until the server has acknowledged that they are in the database. An item
+that comes twice is the same item. Binary messages on the link are frames (`workers.frames`), neither numbered nor kept.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+
+from sim.config import Frozen
+from workers.config import TrainingConfig
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+
+CLOSE_FENCED = 4409
+"""WebSocket close code: this attempt is over for the server (a newer one runs, its lease ran out, the run ended)."""
+CLOSE_UNAUTHORIZED = 4401
+"""WebSocket close code: the worker's token is wrong."""
+
+MAX_BATCH_ITEMS = 500
+"""Items in one message, at most: half a megabyte of JSON."""
+MAX_MESSAGE_BYTES = 4 * 2**20
+"""A message on the link, at most: a frame of 64 robots with 360 rays has 100 kB."""
+MAX_ITEM_VALUES = 256
+"""Series in one item of metrics, at most."""
+
+Queue = Literal["cpu", "gpu"]
+"""The Celery queue that a worker listens to."""
+
+FinalOutcome = Literal["completed", "stopped", "failed", "released", "lost"]
+"""How an attempt ended.
+
+completed: all steps are done. stopped: as asked to, with a checkpoint. failed: an error that would come again.
+released: the worker shuts down, and the run waits for the next one. lost: the trainer died; another attempt may do better.
+"""
+
+
+def queue_of(training: TrainingConfig) -> Queue:
+    """The queue whose workers can run this training."""
+    return "gpu" if training.device == "cuda" else "cpu"
+
+
+class ClaimRequest(Frozen):
+    """A worker wants to run a training.
+
+    Attributes:
+        worker: its name.
+        published_attempt: the attempt that the message which woke it was published for.
+    """
+
+    worker: str = Field(min_length=1, max_length=120)
+    published_attempt: int = Field(ge=0)
+
+
+class CheckpointReference(Frozen):
+    """A registered checkpoint: its archive is at `GET /api/worker/checkpoints/{id}`."""
+
+    id: str
+    step: int
+    sha256: str
+
+
+class Claim(Frozen):
+    """The run is the worker's for as long as it keeps the lease.
+
+    Attributes:
+        attempt: the fencing token of everything that follows.
+        last_seq: the number of the last item that the server has; the next one has the next number.
+        checkpoint: what to go on from; None for a fresh start.
+        lease_seconds: a worker not heard of for this long loses the run.
+    """
+
+    attempt: int
+    seed: int
+    training: TrainingConfig
+    last_seq: int
+    checkpoint: CheckpointReference | None
+    lease_seconds: float
+
+
+class Heartbeat(Frozen):
+    """A worker is there, busy or not."""
+
+    worker: str = Field(min_length=1, max_length=120)
+    queue: Queue
+
+
+class MetricItem(Frozen):
+    """Numbers at an environment step; None stands for one that is not finite, which JSON cannot say."""
+
+    kind: Literal["metrics"] = "metrics"
+    seq: int = Field(ge=1)
+    step: int = Field(ge=0)
+    at: float
+    values: dict[str, float | None] = Field(max_length=MAX_ITEM_VALUES)
+
+
+class EventItem(Frozen):
+    """One line for the run's event log."""
+
+    kind: Literal["event"] = "event"
+    seq: int = Field(ge=1)
+    step: int = Field(ge=0)
+    at: float
+    level: EventLevel
+    message: str = Field(max_length=10_000)
+
+
+Item = Annotated[MetricItem | EventItem, Field(discriminator="kind")]
+ITEM: TypeAdapter[MetricItem | EventItem] = TypeAdapter(Item)
+
+
+class Final(Frozen):
+    """The attempt is over, and everything it had to say has been said."""
+
+    outcome: FinalOutcome
+    error: str | None = Field(None, max_length=10_000)
+
+
+class Batch(Frozen):
+    """Worker to server. Every message renews the lease, an empty one does nothing else."""
+
+    items: tuple[Item, ...] = Field((), max_length=MAX_BATCH_ITEMS)
+    final: Final | None = None
+
+
+class Orders(Frozen):
+    """Server to worker: how things stand, whole in every message.
+
+    Attributes:
+        ack: the number of the last item that is in the database.
+        stop: write a checkpoint and end.
+        watch: what somebody wants to see; None while nobody watches.
+        over: the final message is in the database.
+    """
+
+    ack: int
+    stop: bool = False
+    watch: WatchRequest | None = None
+    over: bool = False
+
+
+class CheckpointUpload(Frozen):
+    """The first line of a checkpoint's upload, as JSON; the archive's bytes follow after the line feed.
+
+    Attributes:
+        after_seq: the checkpoint is not registered before this item is in the database.
+        sha256: of the archive.
+        evaluation: of exactly these weights.
+    """
+
+    after_seq: int = Field(ge=0)
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    evaluation: EvaluationResult | None = None

@@ -1,0 +1,33 @@
+"""What a worker is told from outside: environment variables with the prefix MAPLESS_, set by `mapless worker`."""
+
+import socket
+import tempfile
+from pathlib import Path
+
+from pydantic import Field, SecretStr
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from workers.protocol import Queue
+
+
+class WorkerSettings(BaseSettings):
+    """Where a worker finds its work and brings its results: two URLs and a token, no database and no shared disk."""
+
+    model_config = SettingsConfigDict(env_prefix="MAPLESS_", frozen=True, extra="ignore", env_ignore_empty=True)
+
+    server_url: str = Field("http://127.0.0.1:8400", description="The server.")
+    broker_url: str = Field(description="The Celery broker that rings for work.")
+    worker_token: SecretStr = Field(description="The workers' token, as the server has it.")
+    worker_queue: Queue = Field("cpu", description="The queue to listen to.")
+    worker_name: str = Field("worker", description="Tells workers of one machine apart.")
+    work_dir: Path = Field(
+        Path(tempfile.gettempdir()) / "mapless-work", description="Reports and checkpoints on their way to the server."
+    )
+    stop_grace_seconds: float = Field(
+        20.0, gt=0.0, description="A trainer that was asked to stop is killed after this long."
+    )
+    release_grace_seconds: float = Field(6.0, gt=0.0, description="The same, while the worker itself shuts down.")
+
+    def name(self, slot: int) -> str:
+        """The name under which the server knows the `slot`-th process of this worker."""
+        return f"{self.worker_name}@{socket.gethostname()}/{slot}"

@@ -1,0 +1,143 @@
+"""One process of a Celery worker: tells the server that it is there, keeps a trainer process ready, and knows when to go."""
+
+import logging
+import os
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from workers.client import ServerClient
+from workers.errors import ServerError
+from workers.settings import WorkerSettings
+from workers.trainer_handle import TrainerHandle
+
+logger = logging.getLogger(__name__)
+
+HEARTBEAT_SECONDS = 5.0
+_TICK_SECONDS = 0.5
+# Between two trials to keep a trainer ready, where it dies on its own.
+_FIRST_RETRY_SECONDS = 1.0
+_LAST_RETRY_SECONDS = 60.0
+
+
+class Slot:
+    """A place in which one training at a time runs. Its keeper thread lives as long as the process.
+
+    Importing PyTorch and numba takes seconds, more than a person wants to wait for the first point of a curve: so a trainer
+    process waits with all imports done while the slot is idle, and none does while the slot trains.
+
+    Args:
+        settings: of the worker.
+        number: of this process among the worker's, from 0.
+        shutting_down: whether the worker has been asked to end.
+    """
+
+    def __init__(self, settings: WorkerSettings, number: int, shutting_down: Callable[[], bool]) -> None:
+        self.settings = settings
+        self.name = settings.name(number)
+        self.client = ServerClient(settings.server_url, settings.worker_token.get_secret_value())
+        self._parent = os.getppid()
+        self._worker_shutting_down = shutting_down
+        self._condition = threading.Condition()
+        self._busy = False
+        self._wanted = False
+        self._closed = threading.Event()
+        self._spare: TrainerHandle | None = None
+        self._patience = _FIRST_RETRY_SECONDS
+        threading.Thread(target=self._keep, name="keeper", daemon=True).start()
+        threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
+
+    def shutting_down(self) -> bool:
+        """Whether a training should be handed back: the worker ends, or has been killed and left this process behind."""
+        return self._worker_shutting_down() or os.getppid() != self._parent
+
+    def directory(self, run_id: str, attempt: int) -> Path:
+        """Where an attempt keeps its files; named after this process, so that what a killed one leaves behind is found."""
+        return self.settings.work_dir / f"{os.getpid()}-{run_id}-{attempt}"
+
+    def take_trainer(self) -> TrainerHandle:
+        """The trainer process that waits, or a new one; `give_back` must follow once it has ended."""
+        with self._condition:
+            self._wanted = True
+            self._condition.notify_all()
+            self._condition.wait_for(lambda: self._spare is not None and self._spare.alive)
+            spare, self._spare = self._spare, None
+            assert spare is not None
+            self._wanted, self._busy = False, True
+            return spare
+
+    def give_back(self) -> None:
+        """The training has ended: keep another process ready."""
+        with self._condition:
+            self._busy = False
+            self._condition.notify_all()
+
+    def close(self) -> None:
+        """The process ends: so does the trainer that waits, and there are no more heartbeats."""
+        self._closed.set()
+        with self._condition:
+            if self._spare is not None:
+                self._spare.close()
+                self._spare = None
+
+    def _keep(self) -> None:
+        """Linux ends a trainer with the thread that started it, so they are all started on this one."""
+        while not self._closed.is_set():
+            with self._condition:
+                died = self._bury_spare()
+                if self._spare is None and (self._wanted or not (self._busy or died or self.shutting_down())):
+                    self._spare = TrainerHandle()
+                    self._condition.notify_all()
+                if os.getppid() != self._parent and not self._busy:
+                    self._leave()
+                self._condition.wait(self._patience if died else _TICK_SECONDS)
+
+    def _bury_spare(self) -> bool:
+        """Whether the waiting trainer has died; another one is tried after a while that doubles each time."""
+        if self._spare is None or self._spare.alive:
+            return False
+        self._spare.close()
+        logger.error("no trainer is ready. %s", self._spare.cause_of_death())
+        self._spare = None
+        self._patience = min(2 * self._patience, _LAST_RETRY_SECONDS)
+        return True
+
+    def _leave(self) -> None:
+        """The worker was killed and left this idle process behind."""
+        if self._spare is not None:
+            self._spare.close()
+        os._exit(1)
+
+    def _beat(self) -> None:
+        while not self._closed.wait(HEARTBEAT_SECONDS if self._beaten() else _TICK_SECONDS):
+            pass
+
+    def _beaten(self) -> bool:
+        """Whether the server has heard that this worker is there."""
+        try:
+            self.client.heartbeat(self.name, self.settings.worker_queue)
+        except ServerError as error:
+            logger.warning("heartbeat: %s", error)
+            return False
+        return True
+
+
+def remove_leftovers(work_dir: Path) -> None:
+    """Remove what killed processes of this machine have left: their runs go on from their checkpoints."""
+    if not work_dir.is_dir():
+        return
+    for directory in work_dir.iterdir():
+        pid, _, rest = directory.name.partition("-")
+        if rest and pid.isdigit() and not _exists(int(pid)):
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+def _exists(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

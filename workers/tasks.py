@@ -1,0 +1,88 @@
+"""The Celery task: claim the run that a message names, and see it through. It imports nothing slow."""
+
+import logging
+import multiprocessing
+import time
+from typing import Any
+
+import billiard
+from celery import shared_task
+from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_shutting_down
+
+from workers.app import TRAIN_TASK
+from workers.attempt import Attempt
+from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.protocol import Claim
+from workers.settings import WorkerSettings
+from workers.slot import Slot, remove_leftovers
+
+logger = logging.getLogger(__name__)
+
+# A server that is away this long rings again when it is back.
+_CLAIM_PATIENCE_SECONDS = 60.0
+_CLAIM_RETRY_SECONDS = 0.5
+
+# Set in the worker's main process, seen in the processes that it forks.
+_shutting_down = multiprocessing.get_context("fork").Event()
+_slot: Slot | None = None
+
+
+def _prepare_worker(**_: Any) -> None:
+    settings = WorkerSettings()
+    settings.work_dir.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(settings.work_dir)
+
+
+def _open_slot(**_: Any) -> None:
+    global _slot  # one a process, made after the fork
+    _slot = Slot(WorkerSettings(), billiard.current_process().index, _shutting_down.is_set)
+
+
+def _announce_shutdown(**_: Any) -> None:
+    _shutting_down.set()
+
+
+def _close_slot(**_: Any) -> None:
+    if _slot is not None:
+        _slot.close()
+
+
+worker_init.connect(_prepare_worker)
+worker_process_init.connect(_open_slot)
+worker_shutting_down.connect(_announce_shutdown)
+worker_process_shutdown.connect(_close_slot)
+
+
+@shared_task(name=TRAIN_TASK)
+def train(run_id: str, attempt: int) -> None:
+    """Train a run, if it is still to be had at `attempt`; every other message is one too many, and dropped."""
+    assert _slot is not None
+    claim = _claim(_slot, run_id, attempt)
+    if claim is None:
+        return
+    logger.info("run %s: attempt %d begins", run_id, claim.attempt)
+    # The attempt's link opens first: it keeps the lease while a trainer is being started.
+    work = Attempt(_slot.settings, _slot.client, run_id, claim, _slot.directory(run_id, claim.attempt), _slot.shutting_down)
+    trainer = _slot.take_trainer()
+    try:
+        outcome = work.run(trainer)
+    finally:
+        _slot.give_back()
+    logger.info("run %s: attempt %d ended: %s", run_id, claim.attempt, outcome or "given up")
+
+
+def _claim(slot: Slot, run_id: str, attempt: int) -> Claim | None:
+    deadline = time.monotonic() + _CLAIM_PATIENCE_SECONDS
+    while time.monotonic() < deadline and not slot.shutting_down():
+        try:
+            return slot.client.claim(run_id, slot.name, attempt)
+        except RunRefusedError as refusal:
+            logger.info("run %s is not to be had at attempt %d: %s", run_id, attempt, refusal)
+            return None
+        except RequestRefusedError:
+            logger.exception("run %s cannot be claimed", run_id)
+            return None
+        except ServerUnavailableError as error:
+            logger.warning("run %s waits: %s", run_id, error)
+            time.sleep(_CLAIM_RETRY_SECONDS)
+    return None

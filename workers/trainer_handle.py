@@ -1,0 +1,138 @@
+"""The trainer process as the Celery task sees it: started, given a job, listened to, asked to stop, killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+
+from workers.pipe import Control, Job, Order, Report, Sender, reports
+
+_ROOT = Path(__file__).resolve().parent.parent
+# What a crash is explained with.
+_STDERR_LINES = 15
+# One thread a process: seeds train side by side, one a core, and small networks gain nothing from more.
+_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
+
+
+class TrainerHandle:
+    """A trainer process in a session of its own. It imports what it needs at once and waits for a job.
+
+    Start it from a thread that lives as long as the worker: Linux ends the process when the thread that started it ends.
+    """
+
+    def __init__(self) -> None:
+        read_end, write_end = os.pipe()
+        path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "workers.trainer_process", str(write_end), str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                pass_fds=(write_end,),
+                start_new_session=True,
+                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path},
+            )
+        except BaseException:
+            os.close(read_end)
+            raise
+        finally:
+            os.close(write_end)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._reports = os.fdopen(read_end, "rb")
+        self._orders = Sender(self._process.stdin)
+        self._orders_lock = threading.Lock()
+        self._output: deque[str] = deque(maxlen=_STDERR_LINES)
+        self._output_thread = threading.Thread(
+            target=self._read_output, args=(self._process.stdout,), name="trainer output", daemon=True
+        )
+        self._output_thread.start()
+        self._report_thread: threading.Thread | None = None
+
+    @property
+    def pid(self) -> int:
+        """Process id, which is its process group too."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still runs."""
+        return self._process.poll() is None
+
+    def train(self, job: Job, on_report: Callable[[Report], None]) -> None:
+        """Give it its one job; `on_report` is called with all that it reports, in order, on a thread of its own."""
+        self._report_thread = threading.Thread(
+            target=self._read_reports, args=(on_report,), name="trainer reports", daemon=True
+        )
+        self._report_thread.start()
+        self._send(job)
+
+    def control(self, control: Control) -> None:
+        """Tell it what it should know now; one that has ended is told nothing."""
+        self._send(control)
+
+    def wait(self, seconds: float) -> bool:
+        """Whether it has ended within that time."""
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def kill(self) -> None:
+        """End it and whatever it has started, at once."""
+        try:
+            os.killpg(self._process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            return
+
+    def close(self) -> None:
+        """Kill it if it still runs, and hear the last of its reports."""
+        self.kill()
+        self._process.wait()
+        if self._report_thread is not None:
+            self._report_thread.join()
+        self._output_thread.join()
+        self._reports.close()
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            try:
+                stream.close()
+            except BrokenPipeError:
+                continue
+
+    def cause_of_death(self) -> str:
+        """How it ended and what it printed last; call it after `close`."""
+        code = self._process.returncode
+        if code < 0:
+            how = f"was killed by {signal.Signals(-code).name}"
+            if code == -signal.SIGKILL:
+                how += " (out of memory, perhaps)"
+        else:
+            how = f"ended with exit code {code}"
+        tail = "\n".join(self._output)
+        return f"The trainer process {how}." + (f" It printed last:\n{tail}" if tail else "")
+
+    def _send(self, order: Order) -> None:
+        with self._orders_lock:
+            try:
+                self._orders.send(order)
+            except (BrokenPipeError, ValueError):
+                return  # it has ended, and whoever waits for it notices
+
+    def _read_reports(self, on_report: Callable[[Report], None]) -> None:
+        receiver = reports(self._reports)
+        while (report := receiver.receive()) is not None:
+            on_report(report)
+
+    def _read_output(self, stream: IO[bytes]) -> None:
+        for line in stream:
+            text = line.decode(errors="replace").rstrip()
+            self._output.append(text)
+            sys.stderr.write(f"trainer {self._process.pid}: {text}\n")
