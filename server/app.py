@@ -27,8 +27,10 @@ from server.security.headers import SecurityHeadersMiddleware
 from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
+from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.version import version
+from server.worker_api import endpoints as worker_api
 
 # A new domain's routes go here.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -41,12 +43,13 @@ ROUTERS: tuple[APIRouter, ...] = (
     comparison.router,
     events.router,
     live.router,
+    worker_api.router,
 )
 
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = ()
+BACKGROUND: tuple[Background, ...] = (dispatch,)
 
 
 def create_services(settings: Settings) -> Services:

@@ -2,12 +2,14 @@
 
 from typing import Protocol
 
+from workers.protocol import Queue
+
 
 class Doorbell(Protocol):
     """Wakes a worker. A ring may be lost or heard twice: the rows say what is to be done, the sweeper rings again."""
 
-    def ring(self, run_id: str, attempt: int) -> None:
-        """Say that a run is queued; `attempt` is the one that it was queued at. Never raises for a broker that is away."""
+    def ring(self, run_id: str, attempt: int, queue: Queue) -> None:
+        """Say that a run is queued at `attempt`, to the workers of `queue`. Never raises for a broker that is away."""
 
 
 class Links(Protocol):
@@ -23,7 +25,7 @@ class Links(Protocol):
 class NoDoorbell:
     """No worker is to be woken: for the API on its own, and for tests."""
 
-    def ring(self, run_id: str, attempt: int) -> None:
+    def ring(self, run_id: str, attempt: int, queue: Queue) -> None:
         """Do nothing: the run stays queued."""
 
 

@@ -6,6 +6,7 @@ from typing import Any, Literal
 from sqlalchemy import JSON, BigInteger, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
+from workers.protocol import Queue
 from workers.reporting import EventLevel
 
 RunState = Literal["queued", "running", "stopping", "stopped", "completed", "failed"]
@@ -145,4 +146,5 @@ class Worker(Base):
     __tablename__ = "workers"
 
     name: Mapped[str] = mapped_column(String(120), primary_key=True)
+    queue: Mapped[Queue] = mapped_column(String(8))
     last_seen: Mapped[float] = mapped_column(Float)

@@ -15,8 +15,9 @@ from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
 CLOSE_FENCED = 4409
 """WebSocket close code: this attempt is over for the server (a newer one runs, its lease ran out, the run ended)."""
-CLOSE_UNAUTHORIZED = 4401
-"""WebSocket close code: the worker's token is wrong."""
+
+HEARTBEAT_SECONDS = 5.0
+"""A worker tells this often that it is there, busy or not."""
 
 MAX_BATCH_ITEMS = 500
 """Items in one message, at most: half a megabyte of JSON."""

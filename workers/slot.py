@@ -9,12 +9,12 @@ from pathlib import Path
 
 from workers.client import ServerClient
 from workers.errors import ServerError
+from workers.protocol import HEARTBEAT_SECONDS
 from workers.settings import WorkerSettings
 from workers.trainer_handle import TrainerHandle
 
 logger = logging.getLogger(__name__)
 
-HEARTBEAT_SECONDS = 5.0
 _TICK_SECONDS = 0.5
 # Between two trials to keep a trainer ready, where it dies on its own.
 _FIRST_RETRY_SECONDS = 1.0

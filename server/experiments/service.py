@@ -18,6 +18,7 @@ from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
 from server.services import Services
 from workers.config import TrainingConfig
+from workers.protocol import queue_of
 
 
 class ExperimentService:
@@ -34,7 +35,7 @@ class ExperimentService:
         with self._services.database.write() as session:
             ExperimentRepository(session).add(experiment)
         for run in experiment.runs:
-            self._services.doorbell.ring(run.id, run.attempt)
+            self._services.doorbell.ring(run.id, run.attempt, queue_of(request.training))
         self._publish(experiment.id, "experiment")
         return self.get(experiment.id)
 

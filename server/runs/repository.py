@@ -3,11 +3,12 @@
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session, joinedload
 
 from server import models
 from server.errors import NotFoundError
+from server.runs.states import ACTIVE
 from workers.reporting import EventLevel
 
 
@@ -49,6 +50,27 @@ class RunRepository:
     def add_event(self, run_id: str, level: EventLevel, message: str, step: int = 0) -> None:
         """Append a line to the run's event log."""
         self._session.add(models.RunEvent(run_id=run_id, level=level, message=message, step=step))
+
+    def queued(self) -> Sequence[models.Run]:
+        """The runs that wait for a worker, with their experiments, the longest first."""
+        query = select(models.Run).where(models.Run.state == "queued").options(joinedload(models.Run.experiment))
+        return self._session.scalars(query.order_by(models.Run.queued_at, models.Run.id)).all()
+
+    def with_expired_lease(self, now: float) -> Sequence[models.Run]:
+        """The runs whose worker has not been heard of for longer than its lease, with their experiments, locked."""
+        query = (
+            select(models.Run)
+            .where(models.Run.state.in_(ACTIVE), models.Run.lease_until < now)
+            .options(joinedload(models.Run.experiment))
+            .with_for_update(of=models.Run)
+        )
+        return self._session.scalars(query).all()
+
+    def extend_leases(self, until: float) -> None:
+        """Let every lease last until then at least."""
+        self._session.execute(
+            update(models.Run).where(models.Run.state.in_(ACTIVE), models.Run.lease_until < until).values(lease_until=until)
+        )
 
     def count_by_state(self) -> dict[str, int]:
         """How many runs are in each state; a state without any is absent."""

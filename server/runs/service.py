@@ -10,6 +10,8 @@ from server.runs import states, views
 from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail, RunEvent
 from server.services import Services
+from workers.config import TrainingConfig
+from workers.protocol import queue_of
 
 
 class RunService:
@@ -76,7 +78,8 @@ class RunService:
 
     def announce_queued(self, run: models.Run) -> None:
         """After the commit of a run that waits for a worker: wake one, and tell whoever looks on."""
-        self._services.doorbell.ring(run.id, run.attempt)
+        queue = queue_of(TrainingConfig.model_validate(run.experiment.training))
+        self._services.doorbell.ring(run.id, run.attempt, queue)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
 
 

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from server import models
+from server.runs.states import ACTIVE
+from workers.protocol import Queue
 
 
 class WorkerRepository:
@@ -19,6 +21,16 @@ class WorkerRepository:
         query = select(models.Worker).where(models.Worker.last_seen >= moment).order_by(models.Worker.name)
         return self._session.scalars(query).all()
 
-    def seen(self, name: str, moment: float) -> None:
-        """Note that a worker has just been heard of."""
-        self._session.merge(models.Worker(name=name, last_seen=moment))
+    def seen(self, name: str, queue: Queue, moment: float) -> None:
+        """Note that a worker of this queue has just been heard of."""
+        self._session.merge(models.Worker(name=name, queue=queue, last_seen=moment))
+
+    def idle_by_queue(self, moment: float) -> dict[Queue, int]:
+        """How many workers heard of since `moment` train nothing, by queue; a queue without any is absent."""
+        busy = select(models.Run.worker).where(models.Run.state.in_(ACTIVE), models.Run.worker.is_not(None))
+        query = (
+            select(models.Worker.queue, func.count())
+            .where(models.Worker.last_seen >= moment, models.Worker.name.not_in(busy))
+            .group_by(models.Worker.queue)
+        )
+        return {row[0]: row[1] for row in self._session.execute(query)}

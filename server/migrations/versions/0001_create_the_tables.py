@@ -24,6 +24,7 @@ def upgrade() -> None:
     op.create_table(
         "workers",
         sa.Column("name", sa.String(length=120), nullable=False),
+        sa.Column("queue", sa.String(length=8), nullable=False),
         sa.Column("last_seen", sa.Float(), nullable=False),
         sa.PrimaryKeyConstraint("name"),
     )

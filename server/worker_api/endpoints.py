@@ -1,0 +1,144 @@
+"""Routes for workers; the access checks let nobody in here without the workers' token."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, WebSocket
+from fastapi.responses import StreamingResponse
+from pydantic import ValidationError
+from starlette.concurrency import run_in_threadpool
+from starlette.websockets import WebSocketDisconnect
+
+from server.errors import TooLargeError
+from server.ids import new_id
+from server.services import Services, ServicesDep
+from server.worker_api.attempts import FencedError
+from server.worker_api.errors import MalformedUploadError
+from server.worker_api.links import OpenLink, OpenLinks
+from server.worker_api.service import WorkerService
+from workers.frames import FrameError
+from workers.protocol import CLOSE_FENCED, Batch, CheckpointUpload, Claim, ClaimRequest, Heartbeat
+
+# Pages have no business here, so the routes stay out of the OpenAPI description that their types are made from.
+router = APIRouter(prefix="/api/worker", tags=["worker"], include_in_schema=False)
+
+_UNSUPPORTED_DATA = 1003
+
+
+def _service(services: ServicesDep) -> WorkerService:
+    return WorkerService(services)
+
+
+WorkerServiceDep = Annotated[WorkerService, Depends(_service)]
+AttemptQuery = Annotated[int, Query(ge=1)]
+
+
+@router.post("/heartbeat", status_code=204)
+def heartbeat(body: Heartbeat, service: WorkerServiceDep) -> None:
+    """A worker is there."""
+    service.heartbeat(body)
+
+
+@router.post("/runs/{run_id}/claim")
+def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep) -> Claim:
+    """Take up a run; 409 where it is not to be had."""
+    return service.claim(run_id, body)
+
+
+@router.put("/runs/{run_id}/checkpoints/{step}", status_code=204)
+async def put_checkpoint(
+    run_id: str, step: int, attempt: AttemptQuery, request: Request, services: ServicesDep, service: WorkerServiceDep
+) -> None:
+    """One line of JSON (`CheckpointUpload`), then the archive."""
+    stream = request.stream()
+    upload, archive = await _split(stream, services.settings.max_body_bytes)
+    await run_in_threadpool(service.check, run_id, attempt, upload.after_seq)
+    file = await services.files.write(new_id(), archive, upload.sha256)
+    registered = False
+    try:
+        registered = await run_in_threadpool(service.register, run_id, attempt, step, file, upload)
+    finally:
+        if not registered:
+            await run_in_threadpool(services.files.delete, file.id)
+
+
+@router.get("/checkpoints/{checkpoint_id}")
+def get_checkpoint(checkpoint_id: str, service: WorkerServiceDep) -> StreamingResponse:
+    """The archive of a checkpoint."""
+    return StreamingResponse(service.download(checkpoint_id), media_type="application/zip")
+
+
+@router.websocket("/runs/{run_id}/link")
+async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, services: ServicesDep) -> None:
+    """The link of a run: batches and frames come in, orders go out (`workers.protocol`)."""
+    await websocket.accept()
+    service = WorkerService(services)
+    opened = OpenLink(websocket)
+    try:
+        opened.tell(await run_in_threadpool(service.receive, run_id, attempt, Batch()))
+    except FencedError:
+        await websocket.close(CLOSE_FENCED, "this attempt is over")
+        return
+    assert isinstance(services.links, OpenLinks)
+    services.links.add(run_id, opened)
+    detach = services.live.attach(run_id, opened.watch)
+    writer = asyncio.create_task(opened.write())
+    try:
+        await _receive(websocket, run_id, attempt, services, opened)
+    finally:
+        detach()
+        services.links.remove(run_id, opened)
+        writer.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await writer
+
+
+async def _receive(websocket: WebSocket, run_id: str, attempt: int, services: Services, opened: OpenLink) -> None:
+    """Take in what the worker sends until the link ends."""
+    service = WorkerService(services)
+    try:
+        while True:
+            message = await websocket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            if (frame := message.get("bytes")) is not None:
+                services.live.frames(run_id, frame)
+            else:
+                batch = Batch.model_validate_json(message["text"])
+                opened.tell(await run_in_threadpool(service.receive, run_id, attempt, batch))
+    except FencedError:
+        opened.fence()
+        # The worker answers the close; waiting for that lets it arrive.
+        while (await websocket.receive())["type"] != "websocket.disconnect":
+            pass
+    except (ValidationError, FrameError) as error:
+        await websocket.close(_UNSUPPORTED_DATA, str(error)[:100])
+    except (WebSocketDisconnect, RuntimeError):
+        return
+
+
+async def _split(stream: AsyncIterator[bytes], limit: int) -> tuple[CheckpointUpload, AsyncIterator[bytes]]:
+    """The first line of a body, and the rest."""
+    head = b""
+    async for block in stream:
+        head += block
+        if b"\n" in head:
+            break
+        if len(head) > limit:
+            raise TooLargeError(f"The description of a checkpoint is larger than {limit} bytes.")
+    line, found, start = head.partition(b"\n")
+    try:
+        upload = CheckpointUpload.model_validate_json(line)
+    except ValidationError as error:
+        raise MalformedUploadError(f"The first line does not describe a checkpoint: {error}") from error
+    if not found:
+        raise MalformedUploadError("There is nothing after the first line.")
+
+    async def rest() -> AsyncIterator[bytes]:
+        yield start
+        async for block in stream:
+            yield block
+
+    return upload, rest()

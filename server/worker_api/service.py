@@ -1,0 +1,182 @@
+"""What workers may do, each in one transaction, and what follows from it for everybody else."""
+
+import time
+from collections.abc import Iterator
+
+from sqlalchemy.orm import Session
+
+from server import models
+from server.checkpoints.repository import CheckpointRepository
+from server.errors import NotFoundError
+from server.events.bus import Change, ChangeKind
+from server.files import StoredFile
+from server.metrics.repository import MetricRepository, ReportedRow
+from server.runs.repository import RunRepository
+from server.runs.service import RunService
+from server.services import Services
+from server.system.repository import WorkerRepository
+from server.worker_api import attempts
+from server.worker_api.attempts import FencedError
+from server.worker_api.errors import TooEarlyError
+from workers.config import TrainingConfig
+from workers.protocol import (
+    Batch,
+    CheckpointReference,
+    CheckpointUpload,
+    Claim,
+    ClaimRequest,
+    EventItem,
+    Heartbeat,
+    MetricItem,
+    Orders,
+)
+
+# Compaction is looked at once in so many items: counting rows costs a query.
+_COMPACT_EVERY = 64
+
+
+class WorkerService:
+    """The worker API's transactions. Synchronous: call it on a thread."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._lease_seconds = services.settings.lease_seconds
+
+    def heartbeat(self, heartbeat: Heartbeat) -> None:
+        """Note that a worker is there."""
+        with self._services.database.write() as session:
+            WorkerRepository(session).seen(heartbeat.worker, heartbeat.queue, time.time())
+
+    def claim(self, run_id: str, request: ClaimRequest) -> Claim:
+        """Give a run to a worker, if it is still to be had.
+
+        Raises:
+            NotFoundError: there is no such run.
+            ConflictError: it is not to be had at this attempt.
+        """
+        with self._services.database.write() as session:
+            run = RunRepository(session).get(run_id, for_update=True)
+            checkpoint = attempts.begin(session, run, request.worker, request.published_attempt, self._lease_seconds)
+            claim = Claim(
+                attempt=run.attempt,
+                seed=run.seed,
+                training=TrainingConfig.model_validate(run.experiment.training),
+                last_seq=run.last_seq,
+                checkpoint=CheckpointReference(id=checkpoint.id, step=checkpoint.step, sha256=checkpoint.sha256)
+                if checkpoint
+                else None,
+                lease_seconds=self._lease_seconds,
+            )
+        self._publish(run, "run")
+        return claim
+
+    def receive(self, run_id: str, attempt: int, batch: Batch) -> Orders:
+        """Store what a worker reports, once, and renew its lease.
+
+        Raises:
+            FencedError: the attempt is over.
+        """
+        with self._services.database.write() as session:
+            run = self._renewed(session, run_id, attempt)
+            fresh = [item for item in batch.items if item.seq > run.last_seq]
+            self._store(session, run, fresh)
+            if batch.final is not None:
+                attempts.end(session, run, batch.final)
+            orders = Orders(ack=run.last_seq, stop=run.state == "stopping", over=batch.final is not None)
+        if any(isinstance(item, MetricItem) for item in fresh):
+            self._publish(run, "metrics")
+        if batch.final is not None:
+            self._announce(run)
+        elif any(isinstance(item, EventItem) for item in fresh):
+            self._publish(run, "run")
+        return orders
+
+    def check(self, run_id: str, attempt: int, after_seq: int) -> None:
+        """Before a checkpoint's bytes are taken in: whether it would be registered.
+
+        Raises:
+            FencedError: the attempt is over.
+            TooEarlyError: the metrics before the checkpoint have not arrived.
+        """
+        with self._services.database.write() as session:
+            run = self._renewed(session, run_id, attempt)
+            if run.last_seq < after_seq:
+                raise TooEarlyError(f"Item {after_seq} must be here before this checkpoint; the last one is {run.last_seq}.")
+
+    def register(self, run_id: str, attempt: int, step: int, file: StoredFile, upload: CheckpointUpload) -> bool:
+        """Register an archive that is complete in the store; one that comes again is registered once.
+
+        Returns:
+            Whether it is new; the file of one that is not can be removed.
+
+        Raises:
+            FencedError: the attempt is over.
+        """
+        with self._services.database.write() as session:
+            run = self._renewed(session, run_id, attempt)
+            checkpoints = CheckpointRepository(session)
+            if checkpoints.at_step(run_id, step) is not None:
+                return False
+            checkpoints.add(run_id, step, file, upload.evaluation)
+            attempts.progressed(run)
+        self._publish(run, "checkpoint")
+        return True
+
+    def lose_expired(self, now: float) -> None:
+        """Take the runs whose lease has run out away from their workers."""
+        with self._services.database.write() as session:
+            runs = list(RunRepository(session).with_expired_lease(now))
+            for run in runs:
+                reason = f"worker {run.worker} was not heard of for {self._lease_seconds:g} s."
+                attempts.lose(session, run, reason)
+        for run in runs:
+            self._services.links.cut(run.id)
+            self._announce(run)
+
+    def download(self, checkpoint_id: str) -> Iterator[bytes]:
+        """A checkpoint's archive.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or its file is gone.
+        """
+        with self._services.database.read() as session:
+            CheckpointRepository(session).get(checkpoint_id)
+        return self._services.files.read(checkpoint_id)
+
+    def _renewed(self, session: Session, run_id: str, attempt: int) -> models.Run:
+        try:
+            run = RunRepository(session).get(run_id, for_update=True)
+        except NotFoundError as error:
+            raise FencedError(error.message) from error
+        attempts.renew(run, attempt, self._lease_seconds)
+        return run
+
+    def _store(self, session: Session, run: models.Run, items: list[MetricItem | EventItem]) -> None:
+        if not items:
+            return
+        rows = [
+            ReportedRow(item.seq, item.step, item.at, {k: float("nan") if v is None else v for k, v in item.values.items()})
+            for item in items
+            if isinstance(item, MetricItem)
+        ]
+        metrics = MetricRepository(session)
+        metrics.append_rows(run.id, rows)
+        session.add_all(
+            models.RunEvent(run_id=run.id, at=item.at, step=item.step, level=item.level, message=item.message)
+            for item in items
+            if isinstance(item, EventItem)
+        )
+        before, run.last_seq = run.last_seq, items[-1].seq
+        run.step = max([run.step, *(row.step for row in rows)])
+        if before // _COMPACT_EVERY != run.last_seq // _COMPACT_EVERY and metrics.needs_compaction(run.id):
+            metrics.compact(run.id)
+
+    def _announce(self, run: models.Run) -> None:
+        """After an attempt's end: tell whoever looks on, and wake another worker where the run waits for one."""
+        if run.state == "queued":
+            RunService(self._services).announce_queued(run)
+        else:
+            self._publish(run, "run")
+
+    def _publish(self, run: models.Run, kind: ChangeKind) -> None:
+        self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))
