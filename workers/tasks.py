@@ -28,6 +28,8 @@ _slot: Slot | None = None
 
 
 def _prepare_worker(**_: Any) -> None:
+    # A line for every heartbeat would bury what matters.
+    logging.getLogger("httpx").setLevel(logging.WARNING)
     settings = WorkerSettings()
     settings.work_dir.mkdir(parents=True, exist_ok=True)
     remove_leftovers(settings.work_dir)

@@ -1,0 +1,90 @@
+"""`mapless worker`: a Celery worker for a server, here or on another machine."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import ValidationError
+
+from workers.protocol import Queue
+from workers.settings import WorkerSettings
+from workers.supervised import end_with_supervisor
+
+
+def worker(
+    server: Annotated[
+        str | None, typer.Option(help="URL of the server [MAPLESS_SERVER_URL, http://127.0.0.1:8400].")
+    ] = None,
+    broker: Annotated[str | None, typer.Option(help="URL of the Celery broker [MAPLESS_BROKER_URL].")] = None,
+    token: Annotated[
+        str | None, typer.Option(help="The workers' token; better given as MAPLESS_WORKER_TOKEN, which nobody can list.")
+    ] = None,
+    queue: Annotated[Queue | None, typer.Option(help="Trainings to take [MAPLESS_WORKER_QUEUE, cpu].")] = None,
+    concurrency: Annotated[
+        int | None, typer.Option("--concurrency", "-c", min=1, help="Trainings side by side; one a core if not given.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Tells workers of one machine apart.")] = None,
+) -> None:
+    """Start a worker for a server, here or on another machine."""
+    given = {
+        "server_url": server,
+        "broker_url": broker,
+        "worker_token": token,
+        "worker_queue": queue,
+        "worker_name": name or os.environ.get("MAPLESS_WORKER_NAME") or f"worker{os.getpid()}",
+    }
+    try:
+        settings = WorkerSettings.model_validate({key: value for key, value in given.items() if value is not None})
+    except ValidationError as error:
+        for problem in error.errors():
+            variable = f"MAPLESS_{problem['loc'][0]}".upper()
+            reason = "is needed (mapless worker --help)" if problem["type"] == "missing" else problem["msg"]
+            sys.stderr.write(f"mapless: {variable} {reason}\n")
+        raise typer.Exit(1) from None
+    run_worker(settings, concurrency or usable_cores())
+
+
+def run_worker(settings: WorkerSettings, concurrency: int) -> None:
+    """Work until SIGTERM or SIGINT; trainings under way are then handed back, with a checkpoint."""
+    # The processes that Celery forks read the settings anew.
+    os.environ.update(_environment(settings))
+    end_with_supervisor()
+
+    # Late, so that `mapless worker --help` does not wait for Celery.
+    import workers.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
+    from workers.app import create_app
+
+    app = create_app(settings.broker_url)
+    app.worker_main(
+        [
+            "worker",
+            f"--queues={settings.worker_queue}",
+            f"--concurrency={concurrency}",
+            f"--hostname={settings.worker_name}@%h",
+            "--pool=prefork",
+            "--loglevel=INFO",
+            # Workers need not know of one another.
+            "--without-gossip",
+            "--without-mingle",
+            "--without-heartbeat",
+        ]
+    )
+
+
+def usable_cores() -> int:
+    """The processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
+def _environment(settings: WorkerSettings) -> dict[str, str]:
+    values = {
+        "SERVER_URL": settings.server_url.rstrip("/"),
+        "BROKER_URL": settings.broker_url,
+        "WORKER_TOKEN": settings.worker_token.get_secret_value(),
+        "WORKER_QUEUE": settings.worker_queue,
+        "WORKER_NAME": settings.worker_name,
+        "WORK_DIR": str(Path(settings.work_dir).resolve()),
+    }
+    return {f"MAPLESS_{name}": value for name, value in values.items()}
