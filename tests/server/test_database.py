@@ -28,19 +28,19 @@ def names(database: Database) -> list[str]:
 
 def test_a_reader_cannot_write(database: Database) -> None:
     with database.read() as session:
-        session.add(models.Worker(name="w", last_seen=0.0))
+        session.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
         with pytest.raises(DBAPIError, match=r"read-?only"):
             session.flush()
 
     with database.write() as session:
-        session.add(models.Worker(name="allowed again", last_seen=0.0))
+        session.add(models.Worker(name="allowed again", queue="cpu", last_seen=0.0))
     assert names(database) == ["allowed again"]
 
 
 def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
     def fail_midway() -> None:
         with database.write() as session:
-            session.add(models.Worker(name="w", last_seen=0.0))
+            session.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
             session.flush()
             raise RuntimeError
 
@@ -53,7 +53,7 @@ def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
 def test_writers_wait_for_one_another(database: Database) -> None:
     """Eight threads count in one row; deferred transactions would lose counts or fail."""
     with database.write() as session:
-        session.add(models.Worker(name="counter", last_seen=0.0))
+        session.add(models.Worker(name="counter", queue="cpu", last_seen=0.0))
 
     def count() -> None:
         for _ in range(20):

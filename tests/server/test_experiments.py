@@ -17,6 +17,7 @@ from server.migrate import upgrade
 from server.models import RunState
 from server.services import Services
 from workers.config import TrainingConfig
+from workers.protocol import Queue
 
 
 class RecordingDoorbell:
@@ -25,7 +26,7 @@ class RecordingDoorbell:
     def __init__(self) -> None:
         self.rings: list[tuple[str, int]] = []
 
-    def ring(self, run_id: str, attempt: int) -> None:
+    def ring(self, run_id: str, attempt: int, queue: Queue) -> None:
         self.rings.append((run_id, attempt))
 
 

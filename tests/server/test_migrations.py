@@ -33,7 +33,7 @@ def test_migrations_and_models_agree(database: Database) -> None:
 def test_a_second_start_finds_nothing_to_do(database: Database) -> None:
     upgrade(database)
     with database.write() as session:
-        session.execute(text("INSERT INTO workers (name, last_seen) VALUES ('kept', 1.0)"))
+        session.execute(text("INSERT INTO workers (name, queue, last_seen) VALUES ('kept', 'cpu', 1.0)"))
     upgrade(database)
 
     with database.read() as session:
