@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 
 from sqlalchemy import ColumnElement, case, func, select
-from sqlalchemy.orm import Session, selectinload
+from sqlalchemy.orm import Session, joinedload, selectinload
 
 from server import models
 from server.errors import NotFoundError
@@ -67,13 +67,19 @@ class ExperimentRepository:
         return [found[experiment_id] for experiment_id in experiment_ids]
 
     def lock_runs(self, experiment_id: str) -> Sequence[models.Run]:
-        """The experiment's runs, by seed, locked where the database has row locks.
+        """The experiment's runs with the experiment itself, by seed, locked where the database has row locks.
 
         Raises:
             NotFoundError: there is no such experiment.
         """
-        query = select(models.Run).where(models.Run.experiment_id == experiment_id).order_by(models.Run.seed)
-        runs = self._session.scalars(query.with_for_update()).all()
+        query = (
+            select(models.Run)
+            .where(models.Run.experiment_id == experiment_id)
+            .options(joinedload(models.Run.experiment))
+            .order_by(models.Run.seed)
+            .with_for_update(of=models.Run)
+        )
+        runs = self._session.scalars(query).all()
         if not runs:
             raise NotFoundError.of("experiment", experiment_id)
         return runs
