@@ -1,8 +1,8 @@
 /** Experiments as rows; ticking some chooses them for comparison. */
-import { Anchor, Checkbox, Table } from '@mantine/core'
+import { Anchor, Checkbox, Table, Text } from '@mantine/core'
 import { Link } from 'react-router'
 import type { Experiment } from '../api/types'
-import { algorithmOf, progressOf, secondsLeftOf } from '../lib/experiments'
+import { algorithmOf, progressOf, secondsLeftOf, summaryOf } from '../lib/experiments'
 import { age, dateTime, duration, percent, words } from '../lib/format'
 import { useNow } from '../lib/hooks'
 import { ExperimentMenu } from './ExperimentMenu'
@@ -25,7 +25,7 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
   const ids = experiments?.map((experiment) => experiment.id) ?? []
   const tickedHere = ids.filter((id) => ticked.includes(id))
   return (
-    <Table.ScrollContainer type="native" minWidth={menu ? 940 : 820}>
+    <Table.ScrollContainer type="native" minWidth={330}>
       <Table highlightOnHover className={classes.table} data-testid="experiments">
         <Table.Thead>
           <Table.Tr>
@@ -40,15 +40,23 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
               />
             </Table.Th>
             <Table.Th>Name</Table.Th>
-            <Table.Th w={170}>State</Table.Th>
-            <Table.Th w={60} ta="right">
+            <Table.Th className={classes.state}>State</Table.Th>
+            <Table.Th visibleFrom="md" w={60} ta="right">
               Seeds
             </Table.Th>
-            <Table.Th w={90}>Arena</Table.Th>
-            <Table.Th w={130}>Algorithm</Table.Th>
-            <Table.Th w={80}>Reward</Table.Th>
-            <Table.Th w={230}>Success, 95 % interval</Table.Th>
-            <Table.Th w={100} ta="right">
+            <Table.Th visibleFrom="md" w={90}>
+              Arena
+            </Table.Th>
+            <Table.Th visibleFrom="md" w={130}>
+              Algorithm
+            </Table.Th>
+            <Table.Th visibleFrom="md" w={80}>
+              Reward
+            </Table.Th>
+            <Table.Th visibleFrom="md" w={230}>
+              Success, 95 % interval
+            </Table.Th>
+            <Table.Th visibleFrom="md" w={100} ta="right">
               Launched
             </Table.Th>
             {menu && <Table.Th w={44} aria-label="Actions" />}
@@ -80,20 +88,33 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
                 <Anchor component={Link} to={`/experiments/${experiment.id}`} inherit>
                   {experiment.name}
                 </Anchor>
+                <Text hiddenFrom="md" size="xs" component="div" c="dimmed" fw={400} mt={2}>
+                  {summaryOf(experiment.training)}
+                  {experiment.success && (
+                    <div>
+                      <SuccessEstimate estimate={experiment.success} />
+                    </div>
+                  )}
+                </Text>
               </Table.Td>
               <Table.Td>
                 <Progress experiment={experiment} />
               </Table.Td>
-              <Table.Td ta="right" className={ui.number}>
+              <Table.Td visibleFrom="md" ta="right" className={ui.number}>
                 {experiment.runs.length}
               </Table.Td>
-              <Table.Td>{words(experiment.training.task.arena.name)}</Table.Td>
-              <Table.Td>{algorithmOf(experiment.training)}</Table.Td>
-              <Table.Td>{words(experiment.training.task.reward.name)}</Table.Td>
-              <Table.Td>
+              <Table.Td visibleFrom="md">{words(experiment.training.task.arena.name)}</Table.Td>
+              <Table.Td visibleFrom="md">{algorithmOf(experiment.training)}</Table.Td>
+              <Table.Td visibleFrom="md">{words(experiment.training.task.reward.name)}</Table.Td>
+              <Table.Td visibleFrom="md">
                 <SuccessEstimate estimate={experiment.success} />
               </Table.Td>
-              <Table.Td ta="right" className={ui.number} title={dateTime(experiment.created_at)}>
+              <Table.Td
+                visibleFrom="md"
+                ta="right"
+                className={ui.number}
+                title={dateTime(experiment.created_at)}
+              >
                 {age(experiment.created_at, now)}
               </Table.Td>
               {menu && (

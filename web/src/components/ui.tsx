@@ -1,5 +1,6 @@
 /** The small parts that every page is made of. */
-import { Button, Skeleton, Title, Tooltip, useComputedColorScheme } from '@mantine/core'
+import { Alert, Button, Skeleton, Title, Tooltip, useComputedColorScheme } from '@mantine/core'
+import { IconAlertCircle, IconAlertTriangle } from '@tabler/icons-react'
 import type { CSSProperties, ReactNode } from 'react'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
 import type { Estimate, ExperimentState } from '../api/types'
@@ -61,6 +62,33 @@ export function Panel({
       )}
       {flush ? children : <div className={classes.panelBody}>{children}</div>}
     </section>
+  )
+}
+
+/** A word of warning, or of bad news. */
+export function Notice({
+  title,
+  bad = false,
+  children,
+  ...rest
+}: {
+  title: string
+  bad?: boolean
+  children: ReactNode
+  role?: 'alert'
+  'data-testid'?: string
+}) {
+  return (
+    <Alert
+      className={classes.notice}
+      data-tone={bad ? 'bad' : 'warn'}
+      icon={bad ? <IconAlertCircle size={18} /> : <IconAlertTriangle size={18} />}
+      title={title}
+      variant="default"
+      {...rest}
+    >
+      {children}
+    </Alert>
   )
 }
 

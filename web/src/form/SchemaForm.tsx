@@ -1,7 +1,8 @@
 /** The fields of a form in two parts: what most people set, and everything else under *Advanced*. */
-import { Accordion, Alert, Text, Title } from '@mantine/core'
+import { Accordion, Anchor, Text, Title } from '@mantine/core'
 import { IconAdjustmentsHorizontal } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
+import { Notice } from '../components/ui'
 import { FieldInput, fieldId } from './FieldInput'
 import classes from './form.module.css'
 import { type Field, grouped } from './layout'
@@ -31,7 +32,7 @@ export function FieldGrid({ fields, ...rest }: FieldGridProps) {
 export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
   const { form, initial } = rest
   const [open, setOpen] = useState<string | null>(null)
-  const troubled = fields.some((field) => fieldOf([field], form.problems).length > 0)
+  const troubled = fields.some((field) => Object.keys(form.problems).some((path) => isAt(field, path)))
   useEffect(() => {
     if (troubled) setOpen('advanced')
   }, [troubled])
@@ -39,7 +40,7 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
     (field) => !sameValue(valueAt(form.values, field.path), valueAt(initial, field.path)),
   ).length
   return (
-    <Accordion variant="contained" value={open} onChange={setOpen}>
+    <Accordion variant="contained" className={classes.advanced} value={open} onChange={setOpen}>
       <Accordion.Item value="advanced">
         <Accordion.Control icon={<IconAdjustmentsHorizontal size={18} stroke={1.6} />}>
           Advanced
@@ -62,13 +63,17 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
   )
 }
 
-/** The paths of the problems that belong to `fields`. */
-function fieldOf(fields: readonly Field[], problems: Problems): string[] {
-  return Object.keys(problems).filter((path) =>
-    fields.some(
-      (field) => path === field.key || (field.kind !== 'union' && path.startsWith(`${field.key}.`)),
-    ),
-  )
+/** Whether a problem's path leads to this field: to itself, or into its list. */
+function isAt(field: Field, path: string): boolean {
+  return path === field.key || (field.kind !== 'union' && path.startsWith(`${field.key}.`))
+}
+
+function focusField(field: Field): void {
+  const control = document.getElementById(fieldId(field.key))
+  control?.scrollIntoView({ block: 'center' })
+  // A group of radio buttons takes the focus through the chosen one.
+  const input = control?.querySelector<HTMLInputElement>('input:checked') ?? control
+  input?.focus({ preventScroll: true })
 }
 
 /** All that the server refused, each leading to its field; what belongs to no field stands here in words. */
@@ -76,25 +81,23 @@ export function ProblemSummary({ fields, problems }: { fields: readonly Field[];
   const entries = Object.entries(problems)
   if (entries.length === 0) return null
   return (
-    <Alert
-      color="red"
-      variant="light"
-      title="Not launched: some values were refused"
-      role="alert"
-      data-testid="problems"
-    >
+    <Notice bad title="Not launched: some values were refused" role="alert" data-testid="problems">
       <ul style={{ margin: 0, paddingLeft: 18 }}>
         {entries.map(([path, message]) => {
-          const field = fields.find((one) => fieldOf([one], { [path]: message }).length > 0)
+          const field = fields.find((one) => isAt(one, path))
           return (
             <li key={path}>
-              {field ? <a href={`#${fieldId(field.key)}`}>{field.label}</a> : null}
+              {field ? (
+                <Anchor component="button" type="button" inherit onClick={() => focusField(field)}>
+                  {field.label}
+                </Anchor>
+              ) : null}
               {field ? ': ' : ''}
               {message}
             </li>
           )
         })}
       </ul>
-    </Alert>
+    </Notice>
   )
 }

@@ -1,6 +1,5 @@
 /** Experiments side by side: curves, final figures with what stands behind them, and what differs in their settings. */
-import { Alert, Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
-import { IconAlertTriangle } from '@tabler/icons-react'
+import { Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
@@ -11,8 +10,10 @@ import { settingText } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import { ExperimentTable } from '../components/ExperimentTable'
 import table from '../components/ExperimentTable.module.css'
-import { Message, Page, Panel, QueryError, Swatch } from '../components/ui'
+import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { labelsOf } from '../form/labels'
+import type { Schema } from '../form/schema'
 import { count, percent, percentRange, plural, significant } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -146,19 +147,13 @@ function Chosen({ chosen, onChange }: { chosen: readonly string[]; onChange: () 
 
 function Warnings({ warnings }: { warnings: readonly string[] }) {
   return (
-    <Alert
-      color="yellow"
-      variant="light"
-      icon={<IconAlertTriangle size={18} />}
-      title="Before reading too much into this"
-      data-testid="warnings"
-    >
+    <Notice title="Before reading too much into this" data-testid="warnings">
       <ul style={{ margin: 0, paddingLeft: 18 }}>
         {warnings.map((warning) => (
           <li key={warning}>{warning}</li>
         ))}
       </ul>
-    </Alert>
+    </Notice>
   )
 }
 
@@ -239,6 +234,7 @@ function Figure({
 
 function Differences({ comparison }: { comparison: Comparison }) {
   const { experiments, differences } = comparison
+  const form = $api.useQuery('get', '/api/training/form', undefined, { staleTime: Number.POSITIVE_INFINITY })
   if (experiments.length < 2) {
     return <Message title="One training alone">Choose another to see what differs.</Message>
   }
@@ -266,7 +262,15 @@ function Differences({ comparison }: { comparison: Comparison }) {
         <Table.Tbody>
           {differences.map(({ path, values }) => (
             <Table.Tr key={path}>
-              <Table.Td className={ui.quiet}>{path}</Table.Td>
+              <Table.Td title={path}>
+                <SettingName
+                  labels={
+                    form.data
+                      ? labelsOf(form.data.schema as Schema, ['training', ...path.split('.')])
+                      : [path]
+                  }
+                />
+              </Table.Td>
               {experiments.map((one, index) => (
                 <Table.Td key={one.id} className={ui.number} fw={550}>
                   {settingText(values[index])}
@@ -277,5 +281,17 @@ function Differences({ comparison }: { comparison: Comparison }) {
         </Table.Tbody>
       </Table>
     </Table.ScrollContainer>
+  )
+}
+
+/** "Network, Hidden layers": the setting, with the innermost heading that it stands under. */
+function SettingName({ labels }: { labels: readonly string[] }) {
+  const name = labels.at(-1)
+  const heading = labels.slice(1, -1).at(-1)
+  return (
+    <>
+      {name}
+      {heading && <span className={`${ui.quiet} ${ui.aside}`}>{heading}</span>}
+    </>
   )
 }

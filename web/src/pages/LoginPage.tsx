@@ -15,7 +15,7 @@ export function LoginPage() {
     <Paper
       component="form"
       withBorder
-      maw={420}
+      w="min(420px, 100% - 28px)"
       mx="auto"
       mt="12vh"
       p="xl"

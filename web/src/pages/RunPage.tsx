@@ -1,5 +1,5 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
-import { Alert, Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
+import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '@tabler/icons-react'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo } from 'react'
@@ -17,7 +17,7 @@ import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { LiveView } from '../components/LiveView'
 import { canResume, canStop } from '../components/states'
-import { Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
+import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -90,15 +90,11 @@ function LoadedRun({ run }: { run: RunDetail }) {
       <Stack gap="md">
         <Vitals run={run} />
         {run.error && (
-          <Alert
-            color="red"
-            variant="light"
-            title={run.state === 'failed' ? 'This run failed' : 'What happened'}
-          >
+          <Notice bad title={run.state === 'failed' ? 'This run failed' : 'What happened'}>
             <Text size="sm" className={classes.error}>
               {run.error}
             </Text>
-          </Alert>
+          </Notice>
         )}
         <div className={classes.stage}>
           <Panel flush>
