@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
+from server.experiments.form import form_schema
 from server.experiments.schemas import (
     Experiment,
     ExperimentCreate,
@@ -32,7 +33,7 @@ ExperimentServiceDep = Annotated[ExperimentService, Depends(_service)]
 @router.get("/api/training/form")
 def get_training_form() -> TrainingForm:
     """What the launch form is made of: schema, defaults and presets."""
-    return TrainingForm(schema=ExperimentCreate.model_json_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
+    return TrainingForm(schema=form_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
 
 
 @router.post("/api/experiments", status_code=status.HTTP_201_CREATED)

@@ -285,10 +285,16 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Live */
-        get: operations["live_api_runs__run_id__live_get"];
-        /** Live Put */
-        put: operations["live_put_api_runs__run_id__live_put"];
+        /**
+         * Get Live
+         * @description What the live view of a run shows, and whether it has anything to show.
+         */
+        get: operations["get_live_api_runs__run_id__live_get"];
+        /**
+         * Change Live
+         * @description Change what the live view of a run shows, for everyone who watches it.
+         */
+        put: operations["change_live_api_runs__run_id__live_put"];
         post?: never;
         delete?: never;
         options?: never;
@@ -1023,18 +1029,25 @@ export interface components {
              */
             rays: number;
         };
-        /** LiveSettings */
+        /**
+         * LiveSettings
+         * @description What the live view of a run shows; one setting per run, shared by everyone who watches it.
+         */
         LiveSettings: {
-            /** Follow */
+            /**
+             * Follow
+             * @description Index of the robot to stay with.
+             */
             follow?: number | null;
             /**
-             * Mode
+             * Show
+             * @description Training: what the training robots do, time-lapsed. Policy: the newest weights.
              * @default policy
              * @enum {string}
              */
             mode: "training" | "policy";
             /**
-             * Rays
+             * LiDAR rays
              * @default true
              */
             rays: boolean;
@@ -1045,23 +1058,31 @@ export interface components {
             robots: number;
             /**
              * Speed
+             * @description Simulated seconds per second, in policy mode.
              * @default 1
              * @enum {integer}
              */
             speed: 1 | 2 | 5 | 10;
         };
-        /** LiveState */
+        /**
+         * LiveState
+         * @description The settings of a run's live view together with its status.
+         */
         LiveState: {
-            /** Follow */
-            follow?: number | null;
             /**
-             * Mode
+             * Follow
+             * @description Index of the robot to stay with.
+             */
+            follow: number | null;
+            /**
+             * Show
+             * @description Training: what the training robots do, time-lapsed. Policy: the newest weights.
              * @default policy
              * @enum {string}
              */
             mode: "training" | "policy";
             /**
-             * Rays
+             * LiDAR rays
              * @default true
              */
             rays: boolean;
@@ -1072,13 +1093,22 @@ export interface components {
             robots: number;
             /**
              * Speed
+             * @description Simulated seconds per second, in policy mode.
              * @default 1
              * @enum {integer}
              */
             speed: 1 | 2 | 5 | 10;
             status: components["schemas"]["LiveStatus"];
         };
-        /** LiveStatus */
+        /**
+         * LiveStatus
+         * @description Whether the live view of a run has anything to show.
+         *
+         *     Attributes:
+         *         connected: a worker that runs this training is linked to the server.
+         *         receiving: frames have arrived within the last seconds.
+         *         watchers: browsers that watch this run now.
+         */
         LiveStatus: {
             /** Connected */
             connected: boolean;
@@ -3045,7 +3075,7 @@ export interface operations {
             };
         };
     };
-    live_api_runs__run_id__live_get: {
+    get_live_api_runs__run_id__live_get: {
         parameters: {
             query?: never;
             header?: never;
@@ -3094,7 +3124,7 @@ export interface operations {
             };
         };
     };
-    live_put_api_runs__run_id__live_put: {
+    change_live_api_runs__run_id__live_put: {
         parameters: {
             query?: never;
             header?: never;

@@ -142,7 +142,7 @@ function Progress({ experiment }: { experiment: Experiment }) {
       <div>
         <StateLabel state={state} />
         {isActive(state) && (
-          <span className={`${ui.number} ${ui.quiet}`}>
+          <span className={`${ui.number} ${ui.quiet} ${classes.left}`}>
             {left === null ? percent(progress) : `${duration(left)} left`}
           </span>
         )}

@@ -60,7 +60,10 @@ export interface Branch {
 export function branches(schema: Schema, root: Schema): Branch[] {
   const { discriminator } = schema
   if (!discriminator) return []
-  return Object.entries(discriminator.mapping).map(([tag, $ref]) => {
+  // The mapping is sorted by tag; the union itself keeps the model's order.
+  const place = ($ref: string) => schema.oneOf?.findIndex((one) => one.$ref === $ref) ?? 0
+  const mapping = Object.entries(discriminator.mapping).sort(([, a], [, b]) => place(a) - place(b))
+  return mapping.map(([tag, $ref]) => {
     const branch = resolve({ $ref }, root)
     return {
       tag,
