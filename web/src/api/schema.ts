@@ -1407,7 +1407,11 @@ export interface components {
         };
         /**
          * RewardConfig
-         * @description The basic reward of the paper (Eq. 4): arrival, collision, or progress towards the target.
+         * @description The paper's rewards: on arrival, on collision, and in between progress c_r * (d_before - d_after).
+         *
+         *     The advanced ones multiply the progress by 2^(d_before / d_after) and subtract penalty * (1 - hd). The paper leaves hd
+         *     open; here it is the free distance ahead over the LiDAR's range (`clearance`) or 1 - |bearing of the target| / pi
+         *     (`alignment`).
          */
         "RewardConfig-Input": {
             /**
@@ -1422,11 +1426,17 @@ export interface components {
             collision: number;
             /**
              * Reward
-             * @description Arrival +, collision -, progress in between.
+             * @description Basic: arrival, collision, progress. Clearance and alignment are readings of the advanced reward: exponential progress, less a penalty for little room ahead or for facing away from the target.
              * @default basic
-             * @constant
+             * @enum {string}
              */
-            name: "basic";
+            name: "basic" | "clearance" | "alignment";
+            /**
+             * Penalty coefficient
+             * @description Largest penalty per step; the basic reward has none.
+             * @default 5
+             */
+            penalty: number;
             /**
              * Progress coefficient
              * @description Reward per metre gained.
@@ -1436,7 +1446,11 @@ export interface components {
         };
         /**
          * RewardConfig
-         * @description The basic reward of the paper (Eq. 4): arrival, collision, or progress towards the target.
+         * @description The paper's rewards: on arrival, on collision, and in between progress c_r * (d_before - d_after).
+         *
+         *     The advanced ones multiply the progress by 2^(d_before / d_after) and subtract penalty * (1 - hd). The paper leaves hd
+         *     open; here it is the free distance ahead over the LiDAR's range (`clearance`) or 1 - |bearing of the target| / pi
+         *     (`alignment`).
          */
         "RewardConfig-Output": {
             /**
@@ -1451,11 +1465,17 @@ export interface components {
             collision: number;
             /**
              * Reward
-             * @description Arrival +, collision -, progress in between.
+             * @description Basic: arrival, collision, progress. Clearance and alignment are readings of the advanced reward: exponential progress, less a penalty for little room ahead or for facing away from the target.
              * @default basic
-             * @constant
+             * @enum {string}
              */
-            name: "basic";
+            name: "basic" | "clearance" | "alignment";
+            /**
+             * Penalty coefficient
+             * @description Largest penalty per step; the basic reward has none.
+             * @default 5
+             */
+            penalty: number;
             /**
              * Progress coefficient
              * @description Reward per metre gained.
