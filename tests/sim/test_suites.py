@@ -1,0 +1,136 @@
+"""Frozen suites, shortest paths, driving side by side, baselines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim
+from sim.arenas import Arena, free_distance
+from sim.arenas.paths import PathPlanner
+from sim.baselines import bearings, go_to_goal, random_policy
+from sim.config import ArenaConfig, ObservationName, TaskConfig
+from sim.errors import SuiteError
+from sim.suite_builder import build_suite
+from sim.suites import Suite, content_hash, load_suite, run_suite, suite_for, suite_names
+from sim.vector_env import NavigationVectorEnv
+
+SIMPLE = TaskConfig()
+COMPLEX = TaskConfig(arena=ArenaConfig(name="complex"))
+
+HASHES = {
+    "simple-200": "a4a8d01a0e689b5e6d55e0a0b51fe56ba9d967ed21afd1b68b8447c69b417016",
+    "complex-200": "4ea595e6f5bd05aa3742b0bf3085c453155c1b4a6bb04dbfe97fe83299a446b6",
+}
+
+
+@pytest.mark.parametrize("name", HASHES)
+def test_a_suite_is_what_it_was_and_its_procedure_makes_it_again(name: str) -> None:
+    suite = load_suite(name)
+    assert suite.hash == HASHES[name]
+    assert build_suite(name) == (Path(sim.__path__[0]) / "suite_data" / f"{name}.json").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", HASHES)
+def test_scenarios_fit_and_their_shortest_paths_are_no_shorter_than_a_crow_flies(name: str) -> None:
+    suite = load_suite(name)
+    assert len(suite) == 200
+    for index, arena in enumerate(suite.arenas):
+        here = suite.arena_indices == index
+        assert free_distance(arena, suite.starts[here, :2]).min() >= 0.4
+        assert free_distance(arena, suite.targets[here]).min() >= 0.4
+    crow = np.hypot(*(suite.starts[:, :2] - suite.targets).T)
+    assert crow.min() >= 0.5
+    assert (suite.shortest_paths >= crow - 1e-4).all()
+    assert (suite.shortest_paths <= 2.0 * crow).all()
+
+
+def test_any_change_is_another_hash() -> None:
+    arena, scenarios = Arena("a", circles=np.array([[1.0, 1.0, 0.3]])), [[0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0]]
+    hashes = {
+        content_hash((arena,), scenarios),
+        content_hash((Arena("a", circles=np.array([[1.0, 1.0, 0.3001]])),), scenarios),
+        content_hash((Arena("a", half_width=5.1, circles=arena.circles),), scenarios),
+        content_hash((arena,), [[0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0001]]),
+    }
+    assert len(hashes) == 4
+
+
+def test_an_unknown_suite_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(SuiteError, match="complex-200"):
+        load_suite("hard-200")
+    assert set(HASHES) <= set(suite_names())
+    assert suite_for(COMPLEX).name == "complex-200"
+
+
+def test_go_to_goal_always_arrives_where_nothing_is_in_the_way() -> None:
+    table = run_suite(go_to_goal(SIMPLE), SIMPLE, load_suite("simple-200"))
+    assert (table.outcomes == 1).all()
+    # It ends 0.2 m before the target, and turns on the way.
+    assert (table.path_lengths >= table.shortest_paths - 0.2).all()
+    assert (table.path_lengths <= table.shortest_paths + 0.5).all()
+    assert (table.steps * 0.05 >= table.path_lengths - 1e-9).all()
+
+
+def test_the_baselines_are_far_from_solving_complex() -> None:
+    suite = load_suite("complex-200")
+    assert 0.2 < (run_suite(go_to_goal(COMPLEX), COMPLEX, suite).outcomes == 1).mean() < 0.5
+    assert (run_suite(random_policy(), COMPLEX, suite).outcomes == 1).mean() < 0.1
+
+
+def test_a_suite_run_side_by_side_is_each_scenario_on_its_own() -> None:
+    suite = load_suite("complex-200")
+    policy = go_to_goal(COMPLEX)
+    table = run_suite(policy, COMPLEX, suite)
+    for index in (0, 17, 199):
+        envs = NavigationVectorEnv(COMPLEX, 1, seed=1)
+        observations, _ = envs.reset(options={"poses": suite.starts[index], "targets": suite.targets[index]})
+        while not envs.outcomes[0]:
+            observations, *_ = envs.step(policy(observations))
+        assert envs.outcomes[0] == table.outcomes[index]
+        assert envs.attempt_steps[0] == table.steps[index]
+        assert envs.attempt_rewards[0] == pytest.approx(table.rewards[index], rel=1e-5)
+        assert envs.attempt_path_lengths[0] == pytest.approx(table.path_lengths[index], rel=1e-6)
+        assert envs.attempt_min_clearances[0] == pytest.approx(table.min_clearances[index], abs=1e-5)
+
+
+@pytest.mark.parametrize("observation", ["paper", "improved"])
+def test_the_bearing_can_be_read_from_an_observation(observation: ObservationName) -> None:
+    task = TaskConfig(observation=observation)
+    envs = NavigationVectorEnv(task, 300, seed=0)
+    observations, _ = envs.reset()
+    dx, dy = (envs.targets - envs.poses[:, :2]).T
+    expected = np.arctan2(dy, dx) - envs.poses[:, 2]
+    assert np.cos(bearings(task, observations) - expected).min() > 1.0 - 1e-6
+
+
+def test_a_shortest_path_worked_by_hand() -> None:
+    # Around a disc of radius 1 in the middle, from (-2, 0) to (2, 0), for a disc of 0.
+    planner = PathPlanner(Arena("disc", circles=np.array([[0.0, 0.0, 1.0]])), 1e-9)
+    tangent, arc = np.sqrt(3.0), np.pi / 3
+    assert planner.length(np.array([-2.0, 0.0]), np.array([2.0, 0.0])) == pytest.approx(2 * tangent + arc, rel=5e-3)
+    assert planner.length(np.array([-2.0, 0.0]), np.array([-2.0, 3.0])) == pytest.approx(3.0)
+    # Around the end of a wall from (0, -1) to (0, 5), 0.2 m thick, at 0.5 m: two quarter circles of 0.5 m.
+    wall = Arena("wall", boxes=np.array([[0.0, 2.0, 0.1, 3.0, 0.0]]))
+    planner = PathPlanner(wall, 0.5)
+    straight = planner.length(np.array([-1.0, -1.5]), np.array([1.0, -1.5]))
+    assert straight == pytest.approx(2.0)
+    assert planner.length(np.array([-0.6, 0.0]), np.array([0.6, 0.0])) == pytest.approx(2.0 + 0.2 + np.pi / 2, rel=1e-2)
+
+
+def test_there_is_no_path_through_a_wall() -> None:
+    wall = Arena("closed", boxes=np.array([[0.0, 0.0, 0.1, 5.0, 0.0]]))
+    assert PathPlanner(wall, 0.1).length(np.array([-2.0, 0.0]), np.array([2.0, 0.0])) == np.inf
+
+
+def test_a_suite_that_was_tampered_with_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "suite_data").mkdir()
+    text = build_suite("simple-200").replace("1.", "2.", 1)
+    (tmp_path / "suite_data" / "simple-200.json").write_text(text, "utf-8")
+    monkeypatch.setattr("sim.suites.resources.files", lambda _: tmp_path)
+    load_suite.cache_clear()
+    with pytest.raises(SuiteError, match="have changed"):
+        load_suite("simple-200")
+    monkeypatch.undo()
+    load_suite.cache_clear()
+    assert isinstance(load_suite("simple-200"), Suite)
