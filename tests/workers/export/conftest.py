@@ -1,0 +1,165 @@
+"""Checkpoints with untrained policies, and a fake ROS 2 for machines without one."""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from sim.config import TaskConfig
+from sim.observations import observation_layout
+from workers.checkpoints import Checkpoint, write_checkpoint
+from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
+from workers.layout import layout
+from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.networks import build_network
+
+MakeCheckpoint = Callable[..., Path]
+
+
+@pytest.fixture
+def make_checkpoint(tmp_path: Path) -> MakeCheckpoint:
+    """Writes an archive with random weights, large enough for actions to be spread over their range."""
+
+    def make(network: Network | None = None, task: TaskConfig | None = None) -> Path:
+        network, task = network or MlpNetwork(hidden_sizes=(16,)), task or TaskConfig()
+        numbers = observation_layout(task)
+        torch.manual_seed(4)
+        module = build_network(network, numbers.size, 2)
+        manifest = Manifest(
+            training=TrainingConfig(task=task, algorithm=PpoConfig(network=network)),
+            seed=4,
+            step=81_920,
+            observation=Observation(
+                name=numbers.name,
+                version=numbers.version,
+                numbers=tuple(
+                    Number(index=index, name=number.name, meaning=number.formula, low=number.low, high=number.high)
+                    for index, number in enumerate(numbers.numbers)
+                ),
+            ),
+            action=(),
+            network=layout(network),
+            evaluation=EvaluationSummary(suite="simple-200", suite_hash="0f" * 32, episodes=200, arrivals=198),
+            versions={},
+            files={},
+        )
+        weights = {name: 2.0 * tensor.numpy() for name, tensor in module.state_dict().items()}
+        archive = tmp_path / "checkpoint.zip"
+        counters = TrainingCounters(step=81_920, updates=20, evaluations=1)
+        write_checkpoint(archive, Checkpoint(manifest, weights, {"none": np.zeros(1)}, counters))
+        return archive
+
+    return make
+
+
+class FakeClock:
+    """A ROS clock that stands still until a test moves it."""
+
+    seconds = 1000.0
+
+    def now(self) -> Any:
+        return SimpleNamespace(nanoseconds=round(self.seconds * 1e9), to_msg=lambda: FakeClock.stamp(self.seconds))
+
+    @staticmethod
+    def stamp(seconds: float) -> Any:
+        return SimpleNamespace(sec=int(seconds), nanosec=round(seconds % 1 * 1e9))
+
+
+class FakeNode:
+    """What the navigator uses of `rclpy.node.Node`; keeps what was published and logged."""
+
+    parameters: dict[str, Any] = {}  # noqa: RUF012 (a test sets it before a node exists)
+
+    def __init__(self, name: str) -> None:
+        self.name, self.clock = name, FakeClock()
+        self.subscriptions: dict[str, tuple[type, Callable[[Any], None]]] = {}
+        self.published: list[tuple[str, Any]] = []
+        self.log: list[str] = []
+        self.timers: list[tuple[float, Callable[[], None]]] = []
+
+    def declare_parameter(self, name: str, default: Any) -> Any:
+        return SimpleNamespace(value=self.parameters.get(name, default))
+
+    def create_publisher(self, _kind: type, topic: str, _qos: Any) -> Any:
+        return SimpleNamespace(publish=lambda message: self.published.append((topic, message)))
+
+    def create_subscription(self, kind: type, topic: str, callback: Callable[[Any], None], _qos: Any) -> None:
+        self.subscriptions[topic] = (kind, callback)
+
+    def create_timer(self, period: float, callback: Callable[[], None]) -> None:
+        self.timers.append((period, callback))
+
+    def get_clock(self) -> FakeClock:
+        return self.clock
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(info=self.log.append, error=self.log.append)
+
+    def destroy_node(self) -> None:
+        self.log.append("destroyed")
+
+
+def _message(**fields: Callable[[], Any]) -> type:
+    """A message class whose fields start at their default."""
+    return type("Message", (), {"__init__": lambda self: self.__dict__.update({k: make() for k, make in fields.items()})})
+
+
+def _module(name: str, **contents: Any) -> ModuleType:
+    module = ModuleType(name)
+    module.__dict__.update(contents)
+    return module
+
+
+@pytest.fixture
+def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+    """A `rclpy` and the messages that the node names, with the fields that it reads, as their definitions have them."""
+
+    def vector() -> Any:
+        return SimpleNamespace(x=0.0, y=0.0, z=0.0)
+
+    def orientation() -> Any:
+        return SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0)
+
+    def header() -> Any:
+        return SimpleNamespace(frame_id="", stamp=FakeClock.stamp(0.0))
+
+    def pose() -> Any:
+        return SimpleNamespace(position=vector(), orientation=orientation())
+
+    twist = _message(linear=vector, angular=vector)
+    stamped = _message(header=header, twist=twist)
+    goal = _message(header=header, pose=pose)
+    odometry = _message(header=header, pose=lambda: SimpleNamespace(pose=pose()))
+    scan = _message(
+        header=header,
+        angle_min=float,
+        angle_increment=float,
+        range_min=float,
+        range_max=float,
+        ranges=list,
+    )
+    rclpy = _module("rclpy")
+    modules = (
+        rclpy,
+        _module("rclpy.node", Node=FakeNode),
+        _module("rclpy.qos", qos_profile_sensor_data="sensor data"),
+        _module("rclpy.signals", SignalHandlerOptions=SimpleNamespace(NO="no handlers")),
+        _module("geometry_msgs"),
+        _module("geometry_msgs.msg", PoseStamped=goal, Twist=twist, TwistStamped=stamped),
+        _module("nav_msgs"),
+        _module("nav_msgs.msg", Odometry=odometry),
+        _module("sensor_msgs"),
+        _module("sensor_msgs.msg", LaserScan=scan),
+    )
+    for module in modules:
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    name = "workers.export.ros2.mapless_navigator.node"
+    monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setattr(FakeNode, "parameters", {})
+    yield SimpleNamespace(rclpy=rclpy, Node=FakeNode, LaserScan=scan, Odometry=odometry, PoseStamped=goal, Twist=twist)
+    sys.modules.pop(name, None)

@@ -1,0 +1,199 @@
+"""An exported policy computes what was trained, in every form that leaves the house, or it does not leave."""
+
+import io
+import json
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from sim.config import LidarConfig, RobotConfig, TaskConfig
+from workers.checkpoints import read_policy
+from workers.config import MlpNetwork, Network, ResBlockNetwork
+from workers.errors import ArchiveFormatError, ExportError
+from workers.export.bundle import bundle, export_checkpoint
+from workers.export.check import check_export, run_graph
+from workers.export.command import export as export_command
+from workers.export.graph import observation_graph
+from workers.export.ros2.mapless_navigator.policy import Policy, PolicyFileError, read_safetensors
+from workers.manifest import Manifest
+from workers.policy import torch_policy
+
+NETWORKS: list[Network] = [ResBlockNetwork(), MlpNetwork(), MlpNetwork(hidden_sizes=(8, 4, 4), activation="tanh")]
+TASKS = [
+    TaskConfig(),
+    TaskConfig(observation="paper"),
+    TaskConfig(
+        lidar=LidarConfig(rays=24, batches=24, field_of_view=360.0, range=5.0),
+        robot=RobotConfig(max_linear_speed=0.5, max_angular_speed=2.5),
+    ),
+]
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=repr)
+@pytest.mark.parametrize("task", TASKS, ids=["improved", "paper", "full circle"])
+def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
+    archive = make_checkpoint(network, task)
+    exported = export_checkpoint(archive)
+
+    assert exported.report.policy_difference <= 1e-5
+    assert exported.report.observation_difference <= 1e-5
+    _, policy = read_policy(archive)
+    size = len(exported.manifest.observation.numbers)
+    observations = np.random.default_rng(1).normal(size=(300, size)).astype(np.float32)
+    expected = torch_policy(policy.network, policy.weights)(observations)
+    found = run_graph(exported.by_observation, {"observation": observations})
+    np.testing.assert_allclose(found["action"], expected, rtol=0, atol=1e-5)
+    limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)
+    np.testing.assert_allclose(found["velocity"], expected * limits, rtol=0, atol=1e-5)
+
+
+def test_velocities_stay_within_the_limits_whatever_comes_in(make_checkpoint: Callable[..., Path]) -> None:
+    exported = export_checkpoint(make_checkpoint())
+    wild = np.random.default_rng(2).normal(scale=1e6, size=(500, 16)).astype(np.float32)
+    velocity = run_graph(exported.by_observation, {"observation": wild})["velocity"]
+    assert velocity.min(axis=0)[0] >= 0.0
+    assert velocity.max(axis=0)[0] <= np.float32(0.25)
+    assert np.abs(velocity[:, 1]).max() <= 1.0
+
+
+def test_graph_carries_its_manifest(make_checkpoint: Callable[..., Path]) -> None:
+    exported = export_checkpoint(make_checkpoint())
+    (entry,) = onnx.load_model_from_string(exported.by_scan).metadata_props
+    assert Manifest.model_validate_json(entry.value) == exported.manifest
+
+
+def test_an_export_that_differs_is_refused(make_checkpoint: Callable[..., Path]) -> None:
+    exported = export_checkpoint(make_checkpoint())
+    manifest, policy = read_policy(make_checkpoint())
+    trained = torch_policy(policy.network, policy.weights)
+    shipped = Policy(exported.specification, read_safetensors(exported.weights))
+    policy.weights["head.bias"] = policy.weights["head.bias"] + np.float32(1e-3)
+    wrong = observation_graph(policy, exported.specification, manifest)
+    with pytest.raises(ExportError, match="do not use it"):
+        check_export(trained, shipped, manifest, wrong, exported.by_scan)
+
+
+def test_an_export_that_is_not_a_number_is_refused(make_checkpoint: Callable[..., Path]) -> None:
+    exported = export_checkpoint(make_checkpoint())
+    manifest, policy = read_policy(make_checkpoint())
+    shipped = Policy(exported.specification, read_safetensors(exported.weights))
+    policy.weights["head.bias"] = np.full_like(policy.weights["head.bias"], np.nan)
+    broken = observation_graph(policy, exported.specification, manifest)
+    with pytest.raises(ExportError, match="nan off"):
+        check_export(torch_policy(policy.network, policy.weights), shipped, manifest, broken, exported.by_scan)
+
+
+@pytest.fixture
+def unpacked(make_checkpoint: Callable[..., Path], tmp_path: Path) -> Path:
+    data = bundle(export_checkpoint(make_checkpoint(ResBlockNetwork())))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path)
+    return tmp_path / "mapless-policy"
+
+
+def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[..., Path]) -> None:
+    archive = make_checkpoint()
+    assert bundle(export_checkpoint(archive)) == bundle(export_checkpoint(archive))
+
+
+def test_readme_examples_run_and_agree(unpacked: Path) -> None:
+    readme = (unpacked / "README.md").read_text()
+    numpy_example, onnx_example = (part.split("```")[0] for part in readme.split("```python\n")[1:])
+
+    said = [
+        subprocess.run(
+            [sys.executable, "-I", "-c", example], cwd=unpacked, capture_output=True, text=True, check=True
+        ).stdout
+        for example in (numpy_example, onnx_example)
+    ]
+    assert said[0] == said[1]
+    assert "m/s" in said[0]
+
+
+def test_numpy_runner_is_one_file_that_needs_numpy_only(unpacked: Path, tmp_path: Path) -> None:
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    (unpacked / "run_policy.py").rename(alone / "run_policy.py")
+    program = (
+        "import sys, json; sys.path.insert(0, '.'); import numpy as np; from run_policy import Policy; "
+        f"policy = Policy.load({str(unpacked / 'policy')!r}); "
+        "print(json.dumps(policy.velocities(np.full((2, 16), 0.5, np.float32)).tolist())); "
+        "print(sorted(m for m in sys.modules if m.split('.')[0] in ('torch', 'onnx', 'safetensors', 'workers', 'sim')))"
+    )
+    run = subprocess.run([sys.executable, "-I", "-c", program], cwd=alone, capture_output=True, text=True, check=True)
+    velocities, imported = run.stdout.splitlines()
+    assert imported == "[]"
+    expected = run_graph((unpacked / "policy.onnx").read_bytes(), {"observation": np.full((2, 16), 0.5, np.float32)})
+    np.testing.assert_allclose(json.loads(velocities), expected["velocity"], rtol=0, atol=1e-6)
+
+
+def test_damaged_weights_are_refused(unpacked: Path) -> None:
+    weights = unpacked / "policy" / "policy.safetensors"
+    weights.write_bytes(weights.read_bytes()[:-4] + b"\0\0\0\1")
+    with pytest.raises(PolicyFileError, match="does not belong"):
+        Policy.load(unpacked / "policy")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\x02\0\0\0\0\0\0\0[]",
+        b"\xff" * 16,
+        (48).to_bytes(8, "little") + b'{"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}}'[:48],
+        (53).to_bytes(8, "little") + b'{"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}}' + b"1234",
+        (53).to_bytes(8, "little") + b'{"a":{"dtype":"F64","shape":[1],"data_offsets":[0,8]}}' + b"12345678",
+    ],
+)
+def test_what_is_not_a_float32_safetensors_file_is_refused(data: bytes) -> None:
+    with pytest.raises(PolicyFileError):
+        read_safetensors(data)
+
+
+def test_a_specification_of_another_version_is_refused(unpacked: Path) -> None:
+    path = unpacked / "policy" / "policy.json"
+    path.write_text(path.read_text().replace('"observation_version": 1', '"observation_version": 2'))
+    with pytest.raises(PolicyFileError, match="another version"):
+        Policy.load(unpacked / "policy")
+
+
+def test_shipped_code_is_of_the_oldest_python_that_a_supported_ros_has() -> None:
+    import ast
+
+    from workers.export.bundle import ROS2_PACKAGE
+
+    for path in ROS2_PACKAGE.rglob("*.py"):
+        ast.parse(path.read_text(), feature_version=(3, 10))
+
+
+def command_line() -> typer.Typer:
+    app = typer.Typer()
+    app.command()(export_command)
+    return app
+
+
+@pytest.mark.parametrize(("name", "file"), [("onnx", "c.onnx"), ("onnx-scan", "c-scan.onnx"), ("bundle", "c-bundle.zip")])
+def test_command_writes_beside_the_checkpoint(make_checkpoint: Callable[..., Path], name: str, file: str) -> None:
+    archive = make_checkpoint()
+    archive = archive.rename(archive.with_name("c.zip"))
+    result = CliRunner().invoke(command_line(), [str(archive), "--format", name])
+    assert result.exit_code == 0, result.output
+    assert "equal to torch within" in result.output
+    assert archive.with_name(file).stat().st_size > 1000
+
+
+def test_command_refuses_what_is_no_checkpoint(tmp_path: Path) -> None:
+    (tmp_path / "c.zip").write_bytes(b"no")
+    result = CliRunner().invoke(command_line(), [str(tmp_path / "c.zip")])
+    assert result.exit_code == 1
+    assert "not a readable archive" in result.output
+    with pytest.raises(ArchiveFormatError):
+        export_checkpoint(tmp_path / "c.zip")

@@ -1,0 +1,162 @@
+"""The navigator drives as the policy says while all is well, and stands still in every other case."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.config import ArenaConfig, TaskConfig
+from sim.vector_env import NavigationVectorEnv
+from workers.export.bundle import export_checkpoint
+from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, State
+from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles
+from workers.export.ros2.mapless_navigator.policy import Policy, read_safetensors
+
+
+@pytest.fixture
+def policy(make_checkpoint: Callable[..., Path]) -> Policy:
+    exported = export_checkpoint(make_checkpoint())
+    return Policy(exported.specification, read_safetensors(exported.weights))
+
+
+@pytest.fixture
+def navigator(policy: Policy) -> Navigator:
+    """At the origin, heading along x, nothing near, a goal 2 m away; all of it measured at time 10."""
+    navigator = Navigator(policy, Safety.of(policy.specification))
+    navigator.set_scan(10.0, scan(3.0))
+    navigator.set_odometry(10.0, 0.0, 0.0, 0.0)
+    navigator.set_goal(2.0, 0.5)
+    return navigator
+
+
+def scan(everywhere: float, **beams: float) -> Scan:
+    """A full circle of 360 beams, beam k at k degrees to the left; `beams` are those that differ, as 'at_<degrees>'."""
+    ranges = np.full(360, everywhere)
+    for name, value in beams.items():
+        ranges[int(name.removeprefix("at_"))] = value
+    return Scan(0.0, math.radians(1.0), 0.05, 3.5, ranges)
+
+
+def test_it_drives_when_all_is_well(navigator: Navigator) -> None:
+    command = navigator.command(10.1)
+    assert command.state is State.DRIVING
+    assert 0.0 < command.linear <= 0.25
+    assert abs(command.angular) <= 1.0
+
+
+def test_it_commands_what_the_policy_does_in_the_simulator(policy: Policy) -> None:
+    env = NavigationVectorEnv(TaskConfig(arena=ArenaConfig(name="complex")), 1, seed=3)
+    observations, _ = env.reset(seed=3)
+    safety = replace(Safety.of(policy.specification), stop_distance=0.0, body_distance=0.0, goal_tolerance=0.0)
+    navigator = Navigator(policy, safety)
+    angles = ray_angles(policy.specification)
+    for step in range(60):
+        now = 0.2 * step
+        ranges = env.ranges[0].astype(np.float64)
+        navigator.set_scan(now, Scan(angles[0], angles[1] - angles[0], 0.0, 3.5, ranges))
+        navigator.set_odometry(now, *env.poses[0].astype(np.float64))
+        navigator.set_goal(*env.targets[0].astype(np.float64))
+        command = navigator.command(now)
+        np.testing.assert_allclose((command.linear, command.angular), policy.velocities(observations)[0], rtol=0, atol=1e-5)
+        observations, _, terminations, truncations, _ = env.step(policy.actions(observations))
+        if terminations[0] or truncations[0]:
+            break
+    assert step > 5
+
+
+def test_it_waits_for_everything_it_needs(policy: Policy) -> None:
+    navigator = Navigator(policy, Safety.of(policy.specification))
+    assert navigator.command(0.0).state is State.NO_GOAL
+    navigator.set_goal(1.0, 1.0)
+    assert navigator.command(0.0).state is State.NO_ODOMETRY
+    navigator.set_odometry(0.0, 0.0, 0.0, 0.0)
+    assert navigator.command(0.0).state is State.NO_SCAN
+    navigator.set_scan(0.0, scan(2.0))
+    assert navigator.command(0.0).state is State.DRIVING
+    navigator.cancel()
+    assert navigator.command(0.0).state is State.NO_GOAL
+
+
+def test_stale_scan_stops_until_a_fresh_one_comes(navigator: Navigator) -> None:
+    navigator.set_odometry(10.6, 0.0, 0.0, 0.0)
+    stopped = navigator.command(10.6)
+    assert (stopped.linear, stopped.angular, stopped.state) == (0.0, 0.0, State.STALE_SCAN)
+    navigator.set_scan(10.6, scan(3.0))
+    assert navigator.command(10.6).state is State.DRIVING
+
+
+def test_stale_odometry_stops(navigator: Navigator) -> None:
+    navigator.set_scan(10.6, scan(3.0))
+    stopped = navigator.command(10.6)
+    assert (stopped.linear, stopped.angular, stopped.state) == (0.0, 0.0, State.STALE_ODOMETRY)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "distance", "state"),
+    [
+        (0, 0.19, State.TOO_NEAR),
+        (0, 0.21, State.DRIVING),
+        (90, 0.19, State.TOO_NEAR),
+        (270, -math.inf, State.TOO_NEAR),
+        (180, 0.19, State.DRIVING),  # behind, in training only contact counted
+        (180, 0.12, State.TOO_NEAR),
+    ],
+)
+def test_a_single_near_beam_stops(navigator: Navigator, degrees: int, distance: float, state: State) -> None:
+    navigator.set_scan(10.0, scan(3.0, **{f"at_{degrees}": distance}))
+    command = navigator.command(10.1)
+    assert command.state is state
+    if state is State.TOO_NEAR:
+        assert (command.linear, command.angular) == (0.0, 0.0)
+
+
+def test_after_a_near_obstacle_it_drives_again_only_with_a_margin(navigator: Navigator) -> None:
+    states = []
+    for distance in (0.19, 0.22, 0.24, 0.26, 0.22):
+        navigator.set_scan(10.0, scan(3.0, at_5=distance))
+        states.append(navigator.command(10.0).state)
+    assert states == [State.TOO_NEAR, State.TOO_NEAR, State.TOO_NEAR, State.DRIVING, State.DRIVING]
+
+
+def test_a_blind_sector_stops(navigator: Navigator) -> None:
+    navigator.set_scan(10.0, scan(3.0, **{f"at_{degrees}": math.nan for degrees in range(20, 50)}))
+    assert navigator.command(10.0).state is State.BLIND
+    # Behind, where the policy does not look, the same is no reason to stop.
+    navigator.set_scan(10.0, scan(3.0, **{f"at_{degrees}": math.nan for degrees in range(150, 180)}))
+    assert navigator.command(10.0).state is State.DRIVING
+
+
+def test_arrival_ends_the_goal(navigator: Navigator) -> None:
+    navigator.set_odometry(10.0, 1.9, 0.4, 0.3)
+    assert navigator.command(10.0).state is State.ARRIVED
+    navigator.set_odometry(10.0, 0.0, 0.0, 0.0)
+    stopped = navigator.command(10.0)
+    assert (stopped.linear, stopped.angular, stopped.state) == (0.0, 0.0, State.ARRIVED)
+    navigator.set_goal(3.0, 0.0)
+    assert navigator.command(10.0).state is State.DRIVING
+
+
+@pytest.mark.parametrize("pose", [(math.nan, 0.0, 0.0), (0.0, 0.0, math.inf)])
+def test_odometry_that_is_no_number_stops(navigator: Navigator, pose: tuple[float, float, float]) -> None:
+    navigator.set_odometry(10.0, *pose)
+    stopped = navigator.command(10.0)
+    assert (stopped.linear, stopped.angular, stopped.state) == (0.0, 0.0, State.NOT_FINITE)
+
+
+def test_lower_limits_drive_the_same_arc_slower(policy: Policy) -> None:
+    fast = Safety.of(policy.specification)
+    commands = []
+    for safety in (fast, replace(fast, max_linear_speed=0.01), replace(fast, max_angular_speed=0.001)):
+        navigator = Navigator(policy, safety)
+        navigator.set_scan(0.0, scan(3.0))
+        navigator.set_odometry(0.0, 0.0, 0.0, 0.0)
+        navigator.set_goal(-1.0, 2.0)
+        commands.append(navigator.command(0.0))
+    full, slow, straight = commands
+    assert slow.linear == pytest.approx(0.01)
+    assert abs(straight.angular) == pytest.approx(0.001)
+    for command in (slow, straight):
+        assert command.angular / command.linear == pytest.approx(full.angular / full.linear, rel=1e-6)

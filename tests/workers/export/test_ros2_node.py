@@ -1,0 +1,195 @@
+"""The ROS 2 node, driven by fake messages: what comes in on its topics, and what goes out."""
+
+import importlib
+import io
+import math
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from workers.export.bundle import bundle, export_checkpoint
+
+MODULE = "workers.export.ros2.mapless_navigator.node"
+
+
+@pytest.fixture
+def package(make_checkpoint: Callable[..., Path], tmp_path: Path) -> Path:
+    """The ROS 2 package of an unpacked bundle."""
+    with zipfile.ZipFile(io.BytesIO(bundle(export_checkpoint(make_checkpoint())))) as archive:
+        archive.extractall(tmp_path)
+    return tmp_path / "mapless-policy" / "ros2" / "mapless_navigator"
+
+
+@pytest.fixture
+def node(ros: SimpleNamespace, package: Path) -> Any:
+    ros.Node.parameters = {"policy_directory": str(package / "policy")}
+    return importlib.import_module(MODULE).NavigatorNode()
+
+
+def receive(node: Any, ros: SimpleNamespace, *, age: float = 0.0, nearest: float = 3.0, frame: str = "odom") -> None:
+    """A scan and an odometry message, both measured `age` seconds ago."""
+    stamp = node.clock.stamp(node.clock.seconds - age)
+    scan = ros.LaserScan()
+    scan.header.stamp = stamp
+    scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max = 0.0, math.radians(1.0), 0.05, 3.5
+    scan.ranges = np.full(360, 3.0, np.float32)
+    scan.ranges[3] = nearest
+    node.subscriptions["scan"][1](scan)
+    odometry = ros.Odometry()
+    odometry.header.stamp, odometry.header.frame_id = stamp, frame
+    odometry.pose.pose.position.x = 0.5
+    odometry.pose.pose.orientation.z, odometry.pose.pose.orientation.w = math.sin(0.4), math.cos(0.4)
+    node.subscriptions["odom"][1](odometry)
+
+
+def send_goal(node: Any, ros: SimpleNamespace, x: float, y: float, frame: str = "odom") -> None:
+    goal = ros.PoseStamped()
+    goal.header.frame_id = frame
+    goal.pose.position.x, goal.pose.position.y = x, y
+    node.subscriptions["goal_pose"][1](goal)
+
+
+def tick(node: Any) -> list[tuple[float, float]]:
+    """What the timer's next call publishes: linear and angular velocities."""
+    before = len(node.published)
+    node.timers[0][1]()
+    return [(message.linear.x, message.angular.z) for _, message in node.published[before:]]
+
+
+def test_it_listens_and_speaks_as_documented(node: Any, ros: SimpleNamespace) -> None:
+    assert {topic: kind for topic, (kind, _) in node.subscriptions.items()} == {
+        "scan": ros.LaserScan,
+        "odom": ros.Odometry,
+        "goal_pose": ros.PoseStamped,
+    }
+    assert [period for period, _ in node.timers] == [0.2]
+
+
+def test_it_drives_to_a_goal_and_stops_once_there(node: Any, ros: SimpleNamespace) -> None:
+    receive(node, ros)
+    assert tick(node) == [(0.0, 0.0)]
+    assert tick(node) == []
+    send_goal(node, ros, 2.0, 1.0)
+    ((linear, angular),) = tick(node)
+    assert 0.0 < linear <= 0.25
+    assert abs(angular) <= 1.0
+    assert node.published[-1][0] == "cmd_vel"
+    send_goal(node, ros, 0.55, 0.0)
+    assert tick(node) == [(0.0, 0.0)]
+    assert tick(node) == []
+    assert node.log == ["waiting for a goal", "driving", "arrived"]
+
+
+def test_pose_and_goal_reach_the_policy_unchanged(node: Any, ros: SimpleNamespace) -> None:
+    from workers.export.ros2.mapless_navigator.observation import observe
+    from workers.export.ros2.mapless_navigator.policy import Policy
+
+    receive(node, ros)
+    send_goal(node, ros, 2.0, 1.0)
+    policy = Policy.load(node.parameters["policy_directory"])
+    observation = observe(policy.specification, [[3.0] * 30], [[0.5, 0.0, 0.8]], [[2.0, 1.0]], [[0.0, 0.0]])
+    np.testing.assert_allclose(tick(node), policy.velocities(observation), rtol=0, atol=1e-6)
+
+
+def test_it_keeps_sending_stops_while_something_is_wrong(node: Any, ros: SimpleNamespace) -> None:
+    receive(node, ros)
+    send_goal(node, ros, 2.0, 1.0)
+    tick(node)
+    node.clock.seconds += 0.6
+    assert tick(node) == [(0.0, 0.0)]
+    assert tick(node) == [(0.0, 0.0)]
+    assert node.log[-1] == "stopped: odometry is stale"
+    receive(node, ros)
+    assert tick(node) != [(0.0, 0.0)]
+
+
+def test_a_message_that_was_long_under_way_is_stale(node: Any, ros: SimpleNamespace) -> None:
+    send_goal(node, ros, 2.0, 1.0)
+    receive(node, ros, age=0.7)
+    assert tick(node) == [(0.0, 0.0)]
+
+
+def test_a_stamp_from_the_future_does_not_stay_fresh(node: Any, ros: SimpleNamespace) -> None:
+    send_goal(node, ros, 2.0, 1.0)
+    receive(node, ros, age=-100.0)
+    assert tick(node) != [(0.0, 0.0)]
+    node.clock.seconds += 0.6
+    assert tick(node) == [(0.0, 0.0)]
+
+
+def test_it_stops_before_an_obstacle(node: Any, ros: SimpleNamespace) -> None:
+    send_goal(node, ros, 2.0, 1.0)
+    receive(node, ros, nearest=0.15)
+    assert tick(node) == [(0.0, 0.0)]
+    assert node.log[-1] == "stopped: an obstacle is too near"
+
+
+def test_a_goal_in_another_frame_is_refused(node: Any, ros: SimpleNamespace) -> None:
+    receive(node, ros)
+    send_goal(node, ros, 2.0, 1.0, frame="map")
+    assert "goal refused" in node.log[-1]
+    assert tick(node) == [(0.0, 0.0)]
+    assert node.log[-1] == "waiting for a goal"
+
+
+def test_parameters_change_what_it_does(ros: SimpleNamespace, package: Path) -> None:
+    ros.Node.parameters = {
+        "policy_directory": str(package / "policy"),
+        "max_linear_speed": 0.01,
+        "stamped_twist": True,
+        "goal_tolerance": 0.01,
+    }
+    node = importlib.import_module(MODULE).NavigatorNode()
+    receive(node, ros)
+    send_goal(node, ros, 2.0, 1.0)
+    node.timers[0][1]()
+    message = node.published[-1][1]
+    assert message.twist.linear.x == pytest.approx(0.01)
+    assert message.header.stamp.sec == 1000
+
+
+def test_the_node_stops_the_robot_when_it_ends(ros: SimpleNamespace, package: Path, monkeypatch: Any) -> None:
+    ros.Node.parameters = {"policy_directory": str(package / "policy")}
+    nodes = []
+
+    def spin(node: Any) -> None:
+        nodes.append(node)
+        receive(node, ros)
+        send_goal(node, ros, 2.0, 1.0)
+        tick(node)
+        raise KeyboardInterrupt
+
+    ros.rclpy.init = lambda signal_handler_options: None
+    ros.rclpy.spin, ros.rclpy.shutdown = spin, lambda: nodes.append("shut down")
+    module = importlib.import_module(MODULE)
+    monkeypatch.setattr(module.signal, "signal", lambda *_: None)
+    module.main()
+    node, end = nodes
+    assert (node.published[-1][1].linear.x, node.published[-1][1].angular.z) == (0.0, 0.0)
+    assert node.published[-2][1].linear.x > 0.0
+    assert (node.log[-1], end) == ("destroyed", "shut down")
+
+
+def test_the_packages_own_parameters_are_the_nodes_defaults(node: Any, package: Path) -> None:
+    written = dict(re.findall(r"^    (\w+): (\S+)$", (package / "config" / "navigator.yaml").read_text(), re.MULTILINE))
+    assert written.pop("stamped_twist") == "false"
+    defaults = vars(node._navigator._safety)
+    assert {name: float(value) for name, value in written.items()} == pytest.approx(defaults)
+    assert all(re.search(r"[.e]", value) for value in written.values())  # ROS refuses an integer for a float
+
+
+def test_package_description_names_what_the_node_imports(package: Path) -> None:
+    named = {element.text for element in ElementTree.parse(package / "package.xml").iter("exec_depend")}
+    source = (package / "mapless_navigator" / "node.py").read_text()
+    imported = set(re.findall(r"^\s*(?:from|import) (\w+)", source, re.MULTILINE))
+    assert {name for name in imported if name.endswith("_msgs") or name in ("rclpy", "ament_index_python")} <= named
+    launch = ElementTree.parse(package / "launch" / "navigator.launch.xml").getroot()
+    remapped = {element.get("from") for element in launch.iter("remap")}
+    assert remapped == {"scan", "odom", "goal_pose", "cmd_vel"}

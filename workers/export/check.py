@@ -1,0 +1,100 @@
+"""Compares what is exported with what was trained, before anybody gets it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from workers.errors import ExportError
+from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, RANGES, TARGET, VELOCITY
+from workers.export.ros2.mapless_navigator.observation import observe
+from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
+from workers.manifest import Manifest
+from workers.viewing import PolicyFunction
+
+TOLERANCE = 1e-5
+_ROWS = 1000
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """How far an export is from what was trained; both are at most `TOLERANCE`."""
+
+    rows: int
+    policy_difference: float
+    observation_difference: float
+
+
+def check_export(
+    trained: PolicyFunction, shipped: ShippedPolicy, manifest: Manifest, by_observation: bytes, by_scan: bytes
+) -> CheckReport:
+    """Compares both ONNX graphs and the NumPy runner with a trained policy over random observations and random scenes.
+
+    Args:
+        trained: the policy as it was trained, by torch.
+        shipped: the same as the bundle's own code read it.
+        manifest: the checkpoint's.
+        by_observation: the ONNX graph on observations.
+        by_scan: the ONNX graph on scan, pose, target and last action.
+
+    Raises:
+        ExportError: an observation or an action differs by more than `TOLERANCE`.
+    """
+    rng = np.random.default_rng(0)
+    numbers = manifest.observation.numbers
+    low, high = np.array([number.low for number in numbers]), np.array([number.high for number in numbers])
+    observations = rng.uniform(low, high, (_ROWS, len(numbers))).astype(np.float32)
+    graph = run_graph(by_observation, {OBSERVATION: observations})
+    expected = trained(observations)
+    limits = np.array([shipped.specification.max_linear_speed, shipped.specification.max_angular_speed])
+
+    scene = _scene(rng, shipped)
+    by_scene = run_graph(by_scan, scene)
+    seen = observe(shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION])
+    policy_difference = max(
+        _difference(graph[ACTION], expected, "the ONNX graph's actions"),
+        _difference(graph[VELOCITY] / limits, expected, "the ONNX graph's velocities, as fractions of their limits,"),
+        _difference(shipped.actions(observations), expected, "the NumPy runner's actions"),
+        # On its own observation: how far that one is off is the next line's business.
+        _difference(by_scene[ACTION], trained(by_scene[OBSERVATION]), "the scan graph's actions"),
+    )
+    return CheckReport(_ROWS, policy_difference, _difference(by_scene[OBSERVATION], seen, "the scan graph's observations"))
+
+
+def run_graph(model: bytes, inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+    """All outputs of an ONNX file by name, computed by onnxruntime on one thread."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.log_severity_level = 3
+    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    names = [output.name for output in session.get_outputs()]
+    return dict(zip(names, session.run(names, dict(inputs)), strict=True))
+
+
+def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats]:
+    """Random robots: scans up to twice the range, poses with headings of several turns, targets all round."""
+    specification = shipped.specification
+    half = specification.diagonal / np.sqrt(8.0)
+    scene = {
+        RANGES: rng.uniform(0.0, 2.0 * specification.range, (_ROWS, specification.rays)),
+        POSE: rng.uniform((-half, -half, -7.0), (half, half, 7.0), (_ROWS, 3)),
+        TARGET: rng.uniform(-half, half, (_ROWS, 2)),
+        LAST_ACTION: rng.uniform((0.0, -1.0), (1.0, 1.0), (_ROWS, 2)),
+    }
+    cast = {name: values.astype(np.float32) for name, values in scene.items()}
+    cast[RANGES] = np.minimum(cast[RANGES], np.float32(specification.range))
+    return cast
+
+
+def _difference(found: NDArray[np.floating], expected: Floats, what: str) -> float:
+    difference = float(np.abs(found - expected).max())
+    # Written so that nan fails too.
+    if not difference <= TOLERANCE:
+        raise ExportError(
+            f"{what} are up to {difference:.1e} off, more than {TOLERANCE:.0e}: do not use it, and report this"
+        )
+    return difference

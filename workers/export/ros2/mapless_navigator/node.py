@@ -1,0 +1,143 @@
+"""The ROS 2 node: LaserScan, Odometry and a goal PoseStamped in, Twist out.
+
+| topic         | type                        |                                                                  |
+|---------------|-----------------------------|------------------------------------------------------------------|
+| `scan`        | sensor_msgs/LaserScan       | in                                                               |
+| `odom`        | nav_msgs/Odometry           | in: the robot's pose                                             |
+| `goal_pose`   | geometry_msgs/PoseStamped   | in: only its position counts; its frame must be the odometry's   |
+| `cmd_vel`     | geometry_msgs/Twist         | out, once per control period while a goal is set, then one stop  |
+
+Everything that is decided is decided in `navigator`; this file translates messages.
+"""
+
+import math
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import LaserScan
+
+from .navigator import Command, Navigator, Safety, State
+from .observation import Scan
+from .policy import Policy
+
+_IDLE = (State.NO_GOAL, State.ARRIVED)
+
+
+class NavigatorNode(Node):
+    """Translates between ROS and `Navigator`."""
+
+    def __init__(self) -> None:
+        super().__init__("mapless_navigator")
+        policy = Policy.load(self._parameter("policy_directory", "") or default_policy_directory())
+        self._stamped = bool(self._parameter("stamped_twist", False))
+        self._navigator = Navigator(policy, self._safety(Safety.of(policy.specification)))
+        self._frame = ""
+        self._state: State | None = None
+        message = TwistStamped if self._stamped else Twist
+        self._publisher = self.create_publisher(message, "cmd_vel", 1)
+        self.create_subscription(LaserScan, "scan", self.on_scan, qos_profile_sensor_data)
+        self.create_subscription(Odometry, "odom", self.on_odometry, qos_profile_sensor_data)
+        self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 1)
+        self.create_timer(policy.specification.control_period, self.on_timer)
+
+    def on_scan(self, message: Any) -> None:
+        """A `LaserScan`."""
+        scan = Scan(
+            angle_min=message.angle_min,
+            angle_increment=message.angle_increment,
+            range_min=message.range_min,
+            range_max=message.range_max,
+            ranges=np.asarray(message.ranges, np.float64),
+        )
+        self._navigator.set_scan(self._measured_at(message.header.stamp), scan)
+
+    def on_odometry(self, message: Any) -> None:
+        """An `Odometry`."""
+        self._frame = message.header.frame_id
+        position, orientation = message.pose.pose.position, message.pose.pose.orientation
+        self._navigator.set_odometry(self._measured_at(message.header.stamp), position.x, position.y, yaw_of(orientation))
+
+    def on_goal(self, message: Any) -> None:
+        """A goal `PoseStamped`; one in another frame than the odometry's is refused."""
+        frame = message.header.frame_id
+        if frame and self._frame and frame != self._frame:
+            self.get_logger().error(
+                f"goal refused: its frame is '{frame}', the odometry's '{self._frame}': send it in the odometry's frame"
+            )
+            return
+        self._navigator.set_goal(message.pose.position.x, message.pose.position.y)
+
+    def on_timer(self) -> None:
+        """Once per control period: decide and send."""
+        command = self._navigator.command(self._now())
+        if command.state is not self._state:
+            self.get_logger().info(command.state.value)
+        elif command.state in _IDLE:
+            return  # Somebody else may be driving now.
+        self._state = command.state
+        self.send(command)
+
+    def send(self, command: Command) -> None:
+        """Publish velocities."""
+        twist = Twist()
+        twist.linear.x, twist.angular.z = command.linear, command.angular
+        if self._stamped:
+            stamped = TwistStamped()
+            stamped.header.stamp = self.get_clock().now().to_msg()
+            stamped.twist = twist
+            self._publisher.publish(stamped)
+        else:
+            self._publisher.publish(twist)
+
+    def _parameter(self, name: str, default: Any) -> Any:
+        return self.declare_parameter(name, default).value
+
+    def _safety(self, default: Safety) -> Safety:
+        """The parameters: each has the policy's own value where it is not set."""
+        names = vars(default)
+        return Safety(**{name: float(self._parameter(name, float(value))) for name, value in names.items()})
+
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds) * 1e-9
+
+    def _measured_at(self, stamp: Any) -> float:
+        """When a message was measured: its stamp, unless that is not set or lies ahead of our clock."""
+        now, stamped = self._now(), stamp.sec + stamp.nanosec * 1e-9
+        return min(now, stamped) if stamped > 0.0 else now
+
+
+def default_policy_directory() -> Path:
+    """The policy that was installed with this package."""
+    from ament_index_python.packages import get_package_share_directory
+
+    return Path(get_package_share_directory("mapless_navigator")) / "policy"
+
+
+def yaw_of(orientation: Any) -> float:
+    """Heading of a quaternion, radians."""
+    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def main() -> None:
+    """Run the node until it is interrupted or fails, then stop the robot."""
+    # Its own handlers would close the context at Ctrl-C, and the last stop could not be sent.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    node = NavigatorNode()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        node.get_logger().info("interrupted")
+    finally:
+        node.send(Command(0.0, 0.0, State.NO_GOAL))
+        node.destroy_node()
+        rclpy.shutdown()
