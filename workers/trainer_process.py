@@ -138,7 +138,9 @@ def main(descriptor: int, parent: int) -> None:
     # Ctrl-C reaches the whole terminal; ending in order is the worker's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    from workers.trainer import train  # seconds of imports, the reason why a worker keeps a process ready
+    # Seconds of imports, the reason why a worker keeps a process ready.
+    from workers.trainer import train
+    from workers.viewer import LiveViewer
 
     incoming = orders(sys.stdin.buffer)
     job = incoming.receive()
@@ -148,12 +150,14 @@ def main(descriptor: int, parent: int) -> None:
         reporter = PipeReporter(Sender(stream))
         threading.Thread(target=_listen, args=(incoming, reporter), name="orders", daemon=True).start()
         try:
+            config = TrainingConfig.model_validate_json(job.training)
             outcome = train(
-                TrainingConfig.model_validate_json(job.training),
+                config,
                 job.seed,
                 reporter,
                 Path(job.directory),
                 Path(job.resume) if job.resume else None,
+                viewer=LiveViewer(config.task, reporter),
             )
         except (WorkerError, ValueError) as error:
             # Typed, or about a value of the configuration: another attempt would meet it again.

@@ -4,11 +4,11 @@ viser believes every message of a client: some write attributes of its controls 
 what comes from browsers is let through by name.
 """
 
-import asyncio
 import contextlib
-from collections.abc import Coroutine
-from typing import Any
+from collections.abc import Awaitable, Callable
+from functools import partial
 
+import anyio
 import msgspec
 from fastapi import WebSocket
 from starlette.websockets import WebSocketDisconnect
@@ -48,23 +48,22 @@ async def bridge(browser: WebSocket, port: int) -> None:
         ping_interval=None,
     ) as scene:
         await browser.accept(subprotocol=VISER_PROTOCOL)
-        await until_one_ends(_down(scene, browser), _up(browser, scene))
+        await until_one_ends(partial(_down, scene, browser), partial(_up, browser, scene))
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):
         await browser.close()
 
 
-async def until_one_ends(*ways: Coroutine[Any, Any, None]) -> None:
+async def until_one_ends(*ways: Callable[[], Awaitable[None]]) -> None:
     """Runs the ways of a connection side by side until the first ends; a connection that is gone is no error."""
-    tasks = [asyncio.create_task(way) for way in ways]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in tasks:
-            task.cancel()
-        results = await asyncio.gather(*tasks, return_exceptions=True)
-    for result in results:
-        if isinstance(result, Exception) and not isinstance(result, _GONE):
-            raise result
+    async with anyio.create_task_group() as group:
+
+        async def run(way: Callable[[], Awaitable[None]]) -> None:
+            with contextlib.suppress(*_GONE):
+                await way()
+            group.cancel_scope.cancel()
+
+        for way in ways:
+            group.start_soon(run, way)
 
 
 def may_pass(message: bytes) -> bool:

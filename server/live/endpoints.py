@@ -1,6 +1,7 @@
 """Routes of the live view: its settings, the page inside its frame, and the two sockets of that page."""
 
 import asyncio
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, WebSocket
@@ -93,7 +94,7 @@ async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, servic
         await websocket.close(_POLICY_VIOLATION)
         return
     await websocket.accept()
-    await until_one_ends(_send_scores(websocket, run_id, theme, services), _wait_for_the_end(websocket))
+    await until_one_ends(partial(_send_scores, websocket, run_id, theme, services), partial(_wait_for_the_end, websocket))
 
 
 async def _send_scores(websocket: WebSocket, run_id: str, theme: Theme, services: Services) -> None:

@@ -1,8 +1,11 @@
 """The scene of one watched run on a viser server of its own, drawn by one thread thirty times a second."""
 
+import contextlib
 import threading
 import time
+from collections.abc import Iterator
 
+import rich
 import viser
 from viser import _messages
 
@@ -15,6 +18,20 @@ from server.live.themes import Theme
 from sim.arenas import build_arenas
 from sim.config import TaskConfig
 from workers.frames import Frame
+
+_console = threading.Lock()
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Keeps viser from announcing on the console that a server comes or goes, which it does whatever it is told."""
+    console = rich.get_console()
+    with _console:
+        console.quiet, quiet = True, console.quiet
+        try:
+            yield
+        finally:
+            console.quiet = quiet
 
 
 class LiveView:
@@ -30,7 +47,8 @@ class LiveView:
 
     def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
         arena = build_arenas(task.arena)[0]
-        self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        with _silence():
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             # With these, any browser could open a public tunnel to this port.
             self._server._websock_server.unregister_handler(message)  # noqa: SLF001
@@ -76,7 +94,8 @@ class LiveView:
         """Stops the thread and the port; blocks until both are gone."""
         self._stopping.set()
         self._thread.join()
-        self._server.stop()
+        with _silence():
+            self._server.stop()
 
     def _draw(self) -> None:
         tick = time.monotonic()

@@ -1,0 +1,111 @@
+"""Policy mode of the live view: some robots of their own, driven by the newest weights at a chosen pace."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.config import TaskConfig
+from sim.scan import scan
+from sim.vector_env import NavigationVectorEnv
+from workers.frames import Frame
+from workers.viewing import PolicyFunction
+
+
+def along_arc(
+    poses: NDArray[np.float32], velocities: NDArray[np.float32], seconds: float | NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Where robots are that have driven with constant velocities: exactly on the arc, as the simulation steps too.
+
+    Args:
+        poses: (N, 3) x, y, heading at the start; metres, radians.
+        velocities: (N, 2) linear and angular; m/s, rad/s.
+        seconds: how long they have driven; one number, or one for each.
+
+    Returns:
+        (N, 3) float32 poses, headings in [-pi, pi].
+    """
+    turn = velocities[:, 1] * seconds
+    # The chord of an arc: NumPy's sinc is sin(pi x) / (pi x).
+    chord = velocities[:, 0] * seconds * np.sinc(turn / (2.0 * np.pi))
+    direction = poses[:, 2] + 0.5 * turn
+    heading = poses[:, 2] + turn
+    return np.stack(
+        [
+            poses[:, 0] + chord * np.cos(direction),
+            poses[:, 1] + chord * np.sin(direction),
+            np.arctan2(np.sin(heading), np.cos(heading)),
+        ],
+        axis=1,
+        dtype=np.float32,
+    )
+
+
+class Showcase:
+    """Robots that show what a policy can do, moment by moment; between two control steps they are interpolated.
+
+    Args:
+        task: environment of the training.
+        robots: how many.
+    """
+
+    def __init__(self, task: TaskConfig, robots: int) -> None:
+        self._env = NavigationVectorEnv(task, robots)
+        self._lidar = task.lidar
+        self._period = task.control_period
+        self._limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)
+        self._observations, _ = self._env.reset()
+        self._sim_time = 0.0
+        # Time into the control step that is being shown; the first one is yet to be made.
+        self._into = self._period
+        self._last_outcomes = np.zeros(robots, np.uint8)
+        self._begin()
+        self._velocities = np.zeros((robots, 2), np.float32)
+
+    @property
+    def robots(self) -> int:
+        """How many robots drive."""
+        return self._env.num_envs
+
+    def advance(self, policy: PolicyFunction, seconds: float) -> None:
+        """Lets simulated time pass; at every control step the policy chooses anew."""
+        self._sim_time += seconds
+        self._into += seconds
+        while self._into >= self._period:
+            self._into -= self._period
+            self._step(policy)
+
+    def frame(self, step: int, speed: float) -> Frame:
+        """This moment.
+
+        Args:
+            step: environment steps of the training that the policy has learned from.
+            speed: simulated seconds per wall second.
+        """
+        poses = along_arc(self._poses, self._velocities, self._into)
+        return Frame(
+            mode="policy",
+            step=step,
+            sim_time=self._sim_time,
+            speed=speed,
+            poses=poses,
+            targets=self._targets,
+            ranges=scan(self._env.arenas[0], poses, self._lidar),
+            rewards=self._rewards,
+            outcomes=self._outcomes,
+        )
+
+    def _step(self, policy: PolicyFunction) -> None:
+        """One control step. What is shown during it is how things stood when it began."""
+        self._begin()
+        actions = np.clip(policy(self._observations), (0.0, -1.0), (1.0, 1.0)).astype(np.float32)
+        self._velocities = actions * self._limits
+        self._observations, *_ = self._env.step(actions)
+        ended = self._env.outcomes > 0
+        self._last_outcomes[ended] = self._env.outcomes[ended]
+
+    def _begin(self) -> None:
+        env = self._env
+        self._poses = env.poses.copy()
+        self._targets = env.targets.copy()
+        # A reward that belongs to an attempt that has just ended is history.
+        self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
+        self._outcomes = self._last_outcomes.copy()
