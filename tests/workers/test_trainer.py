@@ -1,0 +1,219 @@
+"""The training loop on the real environment: it learns, tells, saves, stops and resumes exactly."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from sim.config import TaskConfig
+from workers.checkpoints import read_checkpoint, read_manifest, read_policy
+from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
+from workers.errors import ArchiveMismatchError, NonFiniteError
+from workers.evaluation import evaluation_metrics
+from workers.frames import Frame
+from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
+from workers.trainer import train
+from workers.training_metrics import TrainingMetrics
+
+METRICS = {
+    *("train/reward", "loss/policy", "loss/value", "policy/kl", "policy/entropy", "policy/clip_fraction"),
+    *("policy/std_linear", "policy/std_angular", "value/explained_variance", "optim/learning_rate"),
+    *("time/steps_per_second", "time/simulation", "time/inference", "time/update", "time/reporting", "time/evaluation"),
+}
+ATTEMPT_METRICS = {  # only where an attempt ended
+    *("train/success_rate", "train/collision_rate", "train/timeout_rate", "train/return", "train/episode_length"),
+}
+EVALUATION_METRICS = {
+    *("eval/success_rate", "eval/collision_rate", "eval/timeout_rate", "eval/reward", "eval/return"),
+    *("eval/steps", "eval/path_efficiency"),
+}
+
+TINY = TrainingConfig(
+    algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(16,)), robots=32, rollout_steps=16, minibatch_size=128, epochs=2),
+    steps=4_000,  # 7.8 updates of 512 steps: the last one goes past it
+    evaluation=EvaluationConfig(every_steps=2_000),
+)
+
+
+class Recorder:
+    """A reporter that keeps everything, and asks to stop once a number of reports is in."""
+
+    def __init__(self, stop_after: int | None = None) -> None:
+        self.rows: list[tuple[int, dict[str, float]]] = []
+        self.events: list[str] = []
+        self.checkpoints: list[tuple[int, Path, EvaluationResult | None]] = []
+        self._stop_after = stop_after
+
+    def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        self.rows.append((step, dict(values)))
+
+    def event(self, step: int, level: EventLevel, message: str) -> None:
+        self.events.append(message)
+
+    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
+        assert self.rows[-1][0] == step, "a checkpoint is never ahead of its metrics"
+        self.checkpoints.append((step, archive, evaluation))
+
+    def frames(self, frames: Sequence[Frame]) -> None:
+        raise AssertionError("nobody watches")
+
+    @property
+    def watch(self) -> WatchRequest | None:
+        return None
+
+    @property
+    def stop_requested(self) -> bool:
+        return self._stop_after is not None and len(self.rows) >= self._stop_after
+
+
+def learned(rows: list[tuple[int, dict[str, float]]]) -> list[tuple[int, dict[str, float]]]:
+    """Without what depends on the clock."""
+    return [(step, {k: v for k, v in values.items() if not k.startswith("time/")}) for step, values in rows]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Recorder:
+    recorder = Recorder()
+    assert train(TINY, 5, recorder, tmp_path_factory.mktemp("whole"), report_interval=0.0) == "completed"
+    return recorder
+
+
+def test_metrics_have_their_standard_names_and_growing_steps(whole: Recorder) -> None:
+    assert [step for step, _ in whole.rows] == [512 * update for update in range(1, 9)]
+    names = [values.keys() for _, values in whole.rows]
+    assert set.union(*map(set, names)) <= METRICS | ATTEMPT_METRICS | EVALUATION_METRICS
+    assert set.intersection(*map(set, names)) >= METRICS
+    assert names[2] & ATTEMPT_METRICS == ATTEMPT_METRICS
+    for step, values in whole.rows:
+        assert ("eval/success_rate" in values) == (step in (2048, 4096))
+        shares = [values[f"time/{phase}"] for phase in ("simulation", "inference", "update", "reporting", "evaluation")]
+        assert 0.5 < sum(shares) <= 1.0
+    assert all(np.isfinite(value) for _, values in whole.rows for value in values.values())
+
+
+def test_every_evaluation_keeps_a_checkpoint(whole: Recorder) -> None:
+    assert [step for step, _, _ in whole.checkpoints] == [2048, 4096]
+    for step, archive, evaluation in whole.checkpoints:
+        manifest = read_manifest(archive)
+        assert (manifest.step, manifest.seed, manifest.training) == (step, 5, TINY)
+        assert evaluation is not None
+        assert manifest.evaluation is not None
+        assert manifest.evaluation.episodes == len(evaluation.episodes) == 200
+        assert len({number.name for number in manifest.observation.numbers}) == 16
+
+
+def test_first_report_comes_with_the_first_update(tmp_path: Path) -> None:
+    recorder = Recorder()
+    train(TINY, 5, recorder, tmp_path, report_interval=1e9)
+    assert [step for step, _ in recorder.rows] == [512, 2048, 4096]
+
+
+@pytest.mark.parametrize("updates", [3, 4])
+def test_stopped_and_resumed_equals_uninterrupted(whole: Recorder, tmp_path: Path, updates: int) -> None:
+    first = Recorder(stop_after=updates)
+    assert train(TINY, 5, first, tmp_path / "first", report_interval=0.0) == "stopped"
+    step, archive, _ = first.checkpoints[-1]
+    assert step == 512 * updates
+    second = Recorder()
+    assert train(TINY, 5, second, tmp_path / "second", resume=archive, report_interval=0.0) == "completed"
+
+    assert learned(first.rows + second.rows) == learned(whole.rows)
+    interrupted, uninterrupted = (read_checkpoint(r.checkpoints[-1][1]) for r in (second, whole))
+    for mine, theirs in ((interrupted.weights, uninterrupted.weights), (interrupted.arrays, uninterrupted.arrays)):
+        assert mine.keys() == theirs.keys()
+        for name in mine:
+            np.testing.assert_array_equal(mine[name], theirs[name], err_msg=name)
+    assert interrupted.counters == uninterrupted.counters
+
+
+def test_stop_before_the_first_update_still_leaves_a_checkpoint(tmp_path: Path) -> None:
+    recorder = Recorder(stop_after=0)
+    recorder.rows.append((0, {}))
+    assert train(TINY, 5, recorder, tmp_path) == "stopped"
+    assert read_manifest(recorder.checkpoints[0][1]).step == 0
+
+
+def test_finished_training_can_be_prolonged(whole: Recorder, tmp_path: Path) -> None:
+    recorder = Recorder()
+    longer = TINY.model_copy(update={"steps": 5_000})
+    assert train(longer, 5, recorder, tmp_path, resume=whole.checkpoints[-1][1], report_interval=0.0) == "completed"
+    assert [step for step, _ in recorder.rows] == [4608, 5120]
+
+
+def test_checkpoint_of_another_training_is_refused(whole: Recorder, tmp_path: Path) -> None:
+    other = TINY.model_copy(update={"task": TaskConfig(observation="paper")})
+    for config, seed in ((other, 5), (TINY, 6)):
+        with pytest.raises(ArchiveMismatchError, match="its own configuration"):
+            train(config, seed, Recorder(), tmp_path, resume=whole.checkpoints[-1][1])
+
+
+def test_nan_ends_the_training_with_advice(tmp_path: Path) -> None:
+    exploding = TINY.model_copy(update={"algorithm": TINY.algorithm.model_copy(update={"learning_rate": float("inf")})})
+    with pytest.raises(NonFiniteError, match="lower the learning rate"):
+        train(exploding, 5, Recorder(), tmp_path)
+
+
+def test_default_training_reaches_the_target_every_time(tmp_path: Path) -> None:
+    """The defaults of the form, on the simple arena."""
+    recorder = Recorder()
+    train(TrainingConfig(), 0, recorder, tmp_path)
+    _, archive, evaluation = recorder.checkpoints[-1]
+    assert evaluation is not None
+    assert evaluation.success_rate >= 0.99
+    assert evaluation_metrics(evaluation)["eval/steps"] < 110
+    _, policy = read_policy(archive)
+    assert sum(weights.size for weights in policy.weights.values()) > 1000
+
+
+def test_training_uses_one_thread(whole: Recorder) -> None:
+    assert whole.rows
+    assert torch.get_num_threads() == 1
+
+
+def test_evaluation_metrics_by_hand() -> None:
+    def episode(outcome: str, steps: int, reward: float, path: float, shortest: float) -> EpisodeResult:
+        return EpisodeResult.model_validate(
+            {
+                "outcome": outcome,
+                "steps": steps,
+                "reward": reward,
+                "path_length": path,
+                "shortest_path": shortest,
+                "min_clearance": 0.3,
+            }
+        )
+
+    result = EvaluationResult(
+        suite="s",
+        suite_hash="h",
+        episodes=(
+            episode("arrival", 100, 1500.0, 4.0, 3.0),
+            episode("arrival", 50, 1000.0, 2.0, 2.0),
+            episode("collision", 30, -80.0, 1.0, 2.0),
+            episode("timeout", 20, 80.0, 1.0, 2.0),
+        ),
+    )
+    assert evaluation_metrics(result) == pytest.approx(
+        {
+            "eval/success_rate": 0.5,
+            "eval/collision_rate": 0.25,
+            "eval/timeout_rate": 0.25,
+            "eval/return": 625.0,
+            "eval/reward": 2500.0 / 200,
+            "eval/steps": 75.0,
+            "eval/path_efficiency": (0.75 + 1.0) / 2,
+        }
+    )
+    nothing = EvaluationResult(suite="s", suite_hash="h", episodes=result.episodes[2:])
+    assert "eval/steps" not in evaluation_metrics(nothing)
+
+
+def test_reports_tell_means_over_updates() -> None:
+    metrics = TrainingMetrics(robots=4)
+    assert metrics.empty
+    metrics.update({"loss/value": 1.0})
+    metrics.update({"loss/value": 2.0})
+    assert metrics.flush()["loss/value"] == 1.5
+    assert metrics.empty

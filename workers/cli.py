@@ -1,0 +1,193 @@
+"""Training and evaluation from the command line: the same code as in the service, without it."""
+
+import signal
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+from pydantic import ValidationError
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from sim.errors import SimError
+from workers.config import TrainingConfig
+from workers.errors import WorkerError
+from workers.frames import Frame
+from workers.presets import PRESETS, preset
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.statistics import wilson_interval
+
+app = typer.Typer(help="Train and evaluate policies on this machine.", no_args_is_help=True)
+
+_console = Console()
+
+
+class ConsoleReporter:
+    """A reporter that draws a progress bar, and stops the training at Ctrl-C."""
+
+    def __init__(self, progress: Progress, total_steps: int) -> None:
+        self._progress = progress
+        self._task = progress.add_task("training", total=total_steps, success="", speed="")
+        self._stop = False
+        self.last: Path | None = None
+
+    def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        """See `Reporter.metrics`."""
+        fields: dict[str, str] = {"speed": f"{values['time/steps_per_second']:,.0f} steps/s"}
+        if "train/success_rate" in values:
+            fields["success"] = f"{values['train/success_rate']:.1%} training success"
+        self._progress.update(self._task, completed=step, **fields)  # type: ignore[arg-type]
+
+    def event(self, step: int, level: EventLevel, message: str) -> None:
+        """See `Reporter.event`."""
+        self._progress.console.print(f"[{level}] step {step:,}: {message}", markup=False)
+
+    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
+        """See `Reporter.checkpoint`."""
+        self.last = archive
+        if evaluation is not None:
+            self._progress.console.print(f"step {step:>10,}  {describe(evaluation)}  {archive}", highlight=False)
+
+    def frames(self, frames: Sequence[Frame]) -> None:
+        """Nobody watches."""
+
+    @property
+    def watch(self) -> WatchRequest | None:
+        """Nobody watches."""
+        return None
+
+    @property
+    def stop_requested(self) -> bool:
+        """Whether Ctrl-C was pressed."""
+        return self._stop
+
+    def request_stop(self, _signal: int, _frame: FrameType | None) -> None:
+        """A signal handler: finish this update, write a checkpoint, leave; a second signal interrupts at once."""
+        self._stop = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def describe(result: EvaluationResult) -> str:
+    """An evaluation in one line."""
+    count = len(result.episodes)
+    arrivals = [episode for episode in result.episodes if episode.outcome == "arrival"]
+    low, high = wilson_interval(len(arrivals), count)
+    steps = f"{sum(e.steps for e in arrivals) / len(arrivals):6.1f} steps" if arrivals else "     - steps"
+    reward = sum(episode.reward for episode in result.episodes) / max(1, sum(e.steps for e in result.episodes))
+    return (
+        f"{len(arrivals) / count:6.1%} success [{low:.1%}, {high:.1%}] of {count} on {result.suite}, "
+        f"{steps} per target, {reward:6.2f} reward per step"
+    )
+
+
+@app.command()
+def train(
+    preset_name: Annotated[
+        str, typer.Option("--preset", help=f"Where to start from: {', '.join(p.id for p in PRESETS)}.")
+    ] = "default",
+    config: Annotated[
+        Path | None,
+        typer.Option(help="A training as JSON (as in a checkpoint's manifest), instead of a preset.", exists=True),
+    ] = None,
+    arena: Annotated[str | None, typer.Option(help="simple or complex.")] = None,
+    observation: Annotated[str | None, typer.Option(help="improved or paper.")] = None,
+    reward: Annotated[str | None, typer.Option(help="basic.")] = None,
+    algorithm: Annotated[str | None, typer.Option(help="ppo.")] = None,
+    network: Annotated[str | None, typer.Option(help="mlp or resblock.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Environment steps of all robots together.")] = None,
+    seed: Annotated[int, typer.Option(help="Of weights, exploration and environment.")] = 0,
+    out: Annotated[Path, typer.Option(help="Directory for the checkpoints.")] = Path("checkpoints"),
+    resume: Annotated[Path | None, typer.Option(help="A checkpoint to continue from, with its own configuration.")] = None,
+) -> None:
+    """Train a policy, with a progress bar; Ctrl-C writes a checkpoint first."""
+    changes = _changes(arena, observation, reward, algorithm, network, steps)
+    try:
+        # Only now: torch and numba take two seconds to import, which `--help` should not.
+        from workers.checkpoints import read_manifest
+        from workers.trainer import train as run
+
+        if resume is not None:
+            manifest = read_manifest(resume)
+            training, seed = _changed(manifest.training, changes), manifest.seed
+        else:
+            start = (
+                preset(preset_name).training if config is None else TrainingConfig.model_validate_json(config.read_text())
+            )
+            training = _changed(start, changes)
+        columns = "[progress.percentage]{task.percentage:>3.0f}%", "{task.fields[speed]}", "{task.fields[success]}"
+        with Progress(BarColumn(), *map(TextColumn, columns), TimeRemainingColumn(), console=_console) as progress:
+            reporter = ConsoleReporter(progress, training.steps)
+            signal.signal(signal.SIGINT, reporter.request_stop)
+            outcome = run(training, seed, reporter, out, resume)
+    except ValidationError as error:
+        lines = (f"  {'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
+        _fail("\n".join(("not a valid training:", *lines)))
+    except (WorkerError, SimError, KeyError) as error:
+        _fail(str(error.args[0]))
+    _console.print(f"{outcome}: {reporter.last}")
+
+
+@app.command()
+def evaluate(
+    checkpoint: Annotated[Path, typer.Argument(help="A checkpoint archive.", exists=True, dir_okay=False)],
+    suite: Annotated[str | None, typer.Option(help="A suite by name; that of the checkpoint's own task without it.")] = None,
+) -> None:
+    """Drive a checkpoint's policy through a frozen suite and print how it did, with a 95 % Wilson interval."""
+    try:
+        from sim.suites import load_suite, suite_for
+
+        from workers.checkpoints import read_policy
+        from workers.evaluation import evaluate as run
+
+        manifest, policy = read_policy(checkpoint)
+        task = manifest.training.task
+        result = run(policy, task, suite_for(task) if suite is None else load_suite(suite))
+    except (WorkerError, SimError, KeyError) as error:
+        _fail(str(error.args[0]))
+    _console.print(describe(result), highlight=False)
+
+
+def _changes(
+    arena: str | None,
+    observation: str | None,
+    reward: str | None,
+    algorithm: str | None,
+    network: str | None,
+    steps: int | None,
+) -> dict[str, Any]:
+    """The options that were given, as parts of a training's JSON."""
+    task: dict[str, Any] = {}
+    learner: dict[str, Any] = {}
+    if arena is not None:
+        task["arena"] = {"name": arena}
+    if observation is not None:
+        task["observation"] = observation
+    if reward is not None:
+        task["reward"] = {"name": reward}
+    if algorithm is not None:
+        learner["name"] = algorithm
+    if network is not None:
+        learner["network"] = {"name": network}
+    return {"task": task, "algorithm": learner} | ({} if steps is None else {"steps": steps})
+
+
+def _changed(training: TrainingConfig, changes: dict[str, Any]) -> TrainingConfig:
+    """A training with some of its parts replaced; a part with another name starts from that name's defaults."""
+    return TrainingConfig.model_validate(_merged(training.model_dump(), changes))
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    if "name" in changes and changes["name"] != base.get("name"):
+        return changes
+    merged = dict(base)
+    for key, value in changes.items():
+        inner = merged.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def _fail(message: str) -> None:
+    Console(stderr=True).print(message, style="red", highlight=False, markup=False)
+    raise typer.Exit(2)

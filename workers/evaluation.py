@@ -1,0 +1,65 @@
+"""A policy on a frozen suite: one result per scenario."""
+
+from sim.suites import Suite, run_suite
+
+from sim.config import TaskConfig
+from workers.reporting import EpisodeResult, EvaluationResult, Outcome
+from workers.viewing import PolicyFunction
+
+# As `NavigationVectorEnv.outcomes` counts them, from 1.
+_OUTCOMES: tuple[Outcome, ...] = ("arrival", "collision", "timeout")
+
+
+def evaluate(policy: PolicyFunction, task: TaskConfig, suite: Suite) -> EvaluationResult:
+    """Drives every scenario of a suite once.
+
+    Args:
+        policy: observations to actions, deterministic.
+        task: the robot, its sensors, the observation and the limits; the arena is the suite's.
+        suite: where each attempt starts and where it should arrive.
+    """
+    table = run_suite(policy, task, suite)
+    episodes = tuple(
+        EpisodeResult(
+            outcome=_OUTCOMES[outcome - 1],
+            steps=steps,
+            reward=reward,
+            path_length=path_length,
+            shortest_path=shortest_path,
+            min_clearance=min_clearance,
+        )
+        for outcome, steps, reward, path_length, shortest_path, min_clearance in zip(
+            table.outcomes.tolist(),
+            table.steps.tolist(),
+            table.rewards.tolist(),
+            table.path_lengths.tolist(),
+            table.shortest_paths.tolist(),
+            table.min_clearances.tolist(),
+            strict=True,
+        )
+    )
+    return EvaluationResult(suite=suite.name, suite_hash=suite.hash, episodes=episodes)
+
+
+def evaluation_metrics(result: EvaluationResult) -> dict[str, float]:
+    """An evaluation as the curves show it.
+
+    Steps and path efficiency are means over arrivals, absent where there were none. Path efficiency is SPL of the arrivals
+    (Anderson et al. 2018): shortest path over driven path, at most 1. Reward is per step, return per episode.
+    """
+    count = len(result.episodes)
+    arrivals = [episode for episode in result.episodes if episode.outcome == "arrival"]
+    total_reward = sum(episode.reward for episode in result.episodes)
+    metrics = {
+        "eval/success_rate": len(arrivals) / count,
+        "eval/collision_rate": sum(episode.outcome == "collision" for episode in result.episodes) / count,
+        "eval/timeout_rate": sum(episode.outcome == "timeout" for episode in result.episodes) / count,
+        "eval/return": total_reward / count,
+        "eval/reward": total_reward / max(1, sum(episode.steps for episode in result.episodes)),
+    }
+    if arrivals:
+        metrics["eval/steps"] = sum(episode.steps for episode in arrivals) / len(arrivals)
+        metrics["eval/path_efficiency"] = sum(
+            episode.shortest_path / max(episode.path_length, episode.shortest_path, 1e-9) for episode in arrivals
+        ) / len(arrivals)
+    return metrics
