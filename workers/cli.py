@@ -137,7 +137,6 @@ def evaluate(
     """Drive a checkpoint's policy through a frozen suite and print how it did, with a 95 % Wilson interval."""
     try:
         from sim.suites import load_suite, suite_for
-
         from workers.checkpoints import read_policy
         from workers.evaluation import evaluate as run
 

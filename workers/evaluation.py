@@ -1,8 +1,7 @@
 """A policy on a frozen suite: one result per scenario."""
 
-from sim.suites import Suite, run_suite
-
 from sim.config import TaskConfig
+from sim.suites import Suite, run_suite
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
 from workers.viewing import PolicyFunction
 

@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 import torch
 from numpy.typing import NDArray
+
 from sim.observations import observation_layout
 from sim.suites import suite_for
 from sim.vector_env import NavigationVectorEnv
-
 from workers.algorithms import build_algorithm
 from workers.algorithms.base import with_prefix, without_prefix
 from workers.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
@@ -66,7 +66,7 @@ def train(
         ArchiveError: `resume` is damaged, or belongs to another training.
     """
     torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
+    torch.set_flush_denormal(True)  # Adam's moments of dead units decay into numbers that the processor handles slowly
     viewer = viewer or Unwatched()
     training = _Training(config, seed, reporter, directory, viewer, report_interval)
     try:
@@ -75,6 +75,7 @@ def train(
         return training.run()
     finally:
         viewer.close()
+        torch.set_flush_denormal(False)
 
 
 class _Training:
