@@ -1,9 +1,9 @@
 /** The policies of a run, to take away. */
 import { Badge, Button, Table } from '@mantine/core'
-import { IconDownload } from '@tabler/icons-react'
 import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
+import { IconDownload } from './icons'
 import { Message, SuccessEstimate } from './ui'
 import ui from './ui.module.css'
 

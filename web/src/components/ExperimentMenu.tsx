@@ -1,19 +1,12 @@
 /** What can be done to an experiment: a menu, with the dialogs that it needs. */
 import { ActionIcon, Button, Group, Menu, Modal, Stack, Text, TextInput } from '@mantine/core'
 import { useDisclosure } from '@mantine/hooks'
-import {
-  IconCopy,
-  IconDots,
-  IconPencil,
-  IconPlayerPlay,
-  IconPlayerStop,
-  IconTrash,
-} from '@tabler/icons-react'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useActions } from '../api/actions'
 import type { Experiment } from '../api/types'
 import { plural } from '../lib/format'
+import { IconCopy, IconDots, IconPencil, IconPlayerPlay, IconPlayerStop, IconTrash } from './icons'
 import { canResume, canStop } from './states'
 
 interface ExperimentMenuProps {

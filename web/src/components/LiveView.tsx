@@ -10,11 +10,11 @@ import {
   Tooltip,
   useComputedColorScheme,
 } from '@mantine/core'
-import { IconMaximize } from '@tabler/icons-react'
 import { useQueryClient } from '@tanstack/react-query'
 import { type ReactNode, useEffect, useRef, useState } from 'react'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
+import { IconMaximize } from './icons'
 import classes from './LiveView.module.css'
 
 const MAX_ROBOTS = 64

@@ -8,7 +8,6 @@ import {
   useComputedColorScheme,
   useMantineColorScheme,
 } from '@mantine/core'
-import { IconMoon, IconSun } from '@tabler/icons-react'
 import { Suspense } from 'react'
 import { Link, NavLink, Outlet } from 'react-router'
 import { isUnauthorized } from '../api/errors'
@@ -17,6 +16,7 @@ import type { Status } from '../api/types'
 import { useStatus } from '../api/useStatus'
 import { plural } from '../lib/format'
 import { LoginPage } from '../pages/LoginPage'
+import { IconMoon, IconSun } from './icons'
 import classes from './Shell.module.css'
 
 export function Shell() {

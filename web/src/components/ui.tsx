@@ -1,11 +1,11 @@
 /** The small parts that every page is made of. */
 import { Alert, Button, Skeleton, Title, Tooltip, useComputedColorScheme } from '@mantine/core'
-import { IconAlertCircle, IconAlertTriangle } from '@tabler/icons-react'
 import type { CSSProperties, ReactNode } from 'react'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
 import type { Estimate, ExperimentState } from '../api/types'
 import { lineColor } from '../charts/palette'
 import { count, percent, percentRange, plural } from '../lib/format'
+import { IconAlertCircle, IconAlertTriangle } from './icons'
 import { STATES } from './states'
 import classes from './ui.module.css'
 

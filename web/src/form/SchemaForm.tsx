@@ -1,7 +1,7 @@
 /** The fields of a form in two parts: what most people set, and everything else under *Advanced*. */
 import { Accordion, Anchor, Text, Title } from '@mantine/core'
-import { IconAdjustmentsHorizontal } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
+import { IconAdjustmentsHorizontal } from '../components/icons'
 import { Notice } from '../components/ui'
 import { FieldInput, fieldId } from './FieldInput'
 import classes from './form.module.css'

@@ -37,21 +37,3 @@ export function sameValue(a: Json | undefined, b: Json | undefined): boolean {
   const [left, right] = [Object.entries(a), Object.entries(b)]
   return left.length === right.length && left.every(([key, value]) => sameValue(value, valueAt(b, [key])))
 }
-
-/** The leaves in which `values` differs from `reference`: [["task.arena.name", "complex", "simple"], ...]. */
-export function differences(
-  values: Json,
-  reference: Json,
-  path: Path = [],
-): [string, Json, Json | undefined][] {
-  if (sameValue(values, reference)) return []
-  if (values === null || typeof values !== 'object' || Array.isArray(values)) {
-    return [[pathKey(path), values, reference]]
-  }
-  return Object.entries(values).flatMap(([key, value]) => {
-    const other = valueAt(reference, [key])
-    return other === undefined && (value === null || typeof value !== 'object')
-      ? [[pathKey([...path, key]), value, undefined] as [string, Json, undefined]]
-      : differences(value, other ?? null, [...path, key])
-  })
-}

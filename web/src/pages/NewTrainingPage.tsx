@@ -1,12 +1,12 @@
 /** The launch form, rendered from the schema that the server derives from its own configuration models. */
 import { Button, Group, Input, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
-import { IconRocket } from '@tabler/icons-react'
 import { useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
 import type { Experiment, Preset } from '../api/types'
+import { IconRocket } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'

@@ -1,8 +1,8 @@
 /** An address that leads nowhere, and a page that broke. */
 import { Button, Code } from '@mantine/core'
-import { IconCompassOff } from '@tabler/icons-react'
 import { Link, useRouteError } from 'react-router'
 import { messageOf } from '../api/errors'
+import { IconCompassOff } from '../components/icons'
 import { Message } from '../components/ui'
 import { useTitle } from '../lib/hooks'
 

@@ -1,7 +1,10 @@
 /** What jsdom lacks of a browser, and matchers. */
 import '@testing-library/jest-dom/vitest'
-import { cleanup } from '@testing-library/react'
+import { cleanup, configure } from '@testing-library/react'
 import { afterEach, vi } from 'vitest'
+
+// A test waits for what it expects, on a busy machine too.
+configure({ asyncUtilTimeout: 10_000 })
 
 afterEach(() => {
   cleanup()
@@ -26,3 +29,25 @@ class NoObserver {
 }
 vi.stubGlobal('ResizeObserver', NoObserver)
 Element.prototype.scrollIntoView = () => {}
+
+// uPlot draws on a canvas; what it draws is looked at in a real browser, not here.
+const context = new Proxy({} as Record<string | symbol, unknown>, {
+  get: (target, key) => (key in target ? target[key] : () => ({ width: 0 })),
+  set: (target, key, value) => {
+    target[key] = value
+    return true
+  },
+})
+HTMLCanvasElement.prototype.getContext = (() => context) as never
+vi.stubGlobal(
+  'Path2D',
+  class {
+    moveTo() {}
+    lineTo() {}
+    rect() {}
+    arc() {}
+    closePath() {}
+    addPath() {}
+    bezierCurveTo() {}
+  },
+)

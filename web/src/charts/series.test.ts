@@ -1,0 +1,83 @@
+import { expect, test } from 'vitest'
+import { curves } from '../testing/examples'
+import { MAIN_CHARTS, SECTIONS } from './metrics'
+import { alignSeries, allPositive, lastValue, smooth, valueAt } from './series'
+import { chartOf, chartOfCurves } from './shape'
+
+test('series of different steps share one x, with gaps where they have no point', () => {
+  const aligned = alignSeries([
+    { steps: [10, 20, 30], values: [1, 2, 3] },
+    { steps: [15, 30], values: [7, null] },
+  ])
+  expect(aligned.x).toEqual([10, 15, 20, 30])
+  expect(aligned.values).toEqual([
+    [1, null, 2, 3],
+    [null, 7, null, null],
+  ])
+})
+
+test('smoothing starts at the first value and skips gaps', () => {
+  // With weight 0.5 the averages are 2, then 0.5 * 2 + 0.5 * 8 = 5, over the norms 0.5, then 0.75.
+  expect(smooth([4, null, 8], 0.5)).toEqual([4, null, 5 / 0.75])
+  expect(smooth([1, 2], 0)).toEqual([1, 2])
+})
+
+test('a constant stays a constant under smoothing', () => {
+  for (const value of smooth([3, 3, 3, 3], 0.85)) expect(value).toBeCloseTo(3)
+})
+
+test('what a legend reads', () => {
+  expect(lastValue([1, 2, null])).toBe(2)
+  expect(lastValue([])).toBeNull()
+  expect(valueAt([1, null, 3], 1)).toBe(1)
+  expect(valueAt([null, 2], 0)).toBeNull()
+})
+
+test('zero and below have no logarithm', () => {
+  expect(allPositive([{ key: 'a', color: 0, values: [1, null, 0.1] }])).toBe(true)
+  expect(allPositive([{ key: 'a', color: 0, values: [1, 0] }])).toBe(false)
+})
+
+test('a chart of a run shows the series that have points, each with a colour of its own', () => {
+  const [spec] = MAIN_CHARTS
+  if (!spec) throw new Error('no chart')
+  const data = chartOf(spec, [
+    { name: 'eval/success_rate', steps: [50], values: [0.4], min: null, max: null },
+    { name: 'train/return', steps: [1], values: [1], min: null, max: null },
+  ])
+  expect(data.x).toEqual([50])
+  expect(data.lines).toEqual([{ key: 'eval/success_rate', label: 'evaluation', color: 1, values: [0.4] }])
+})
+
+test('experiments together: seeds thin, mean bold with its band, N in the legend', () => {
+  const { x, lines } = chartOfCurves(curves)
+  expect(x).toEqual([0, 100, 200])
+  expect(lines.map(({ key, label, thin, color }) => [key, label, thin ?? false, color])).toEqual([
+    ['exp1:0', undefined, true, 0],
+    ['exp1:1', undefined, true, 0],
+    ['exp1', 'Corridor, 2 seeds', false, 0],
+    ['exp2', 'Alone, 1 seed', false, 1],
+  ])
+  expect(lines[2]?.band?.low).toEqual([0.1, 0.5, null])
+  expect(lines[3]?.band).toBeUndefined()
+})
+
+test('an experiment without a value has no line, and no chart without lines has an x', () => {
+  const nothing = curves.experiments.map((one) => ({ ...one, count: [0, 0, 0] }))
+  expect(chartOfCurves({ ...curves, experiments: nothing })).toEqual({ x: [], lines: [] })
+})
+
+test('every metric that a training reports is in some chart', () => {
+  const shown = [...MAIN_CHARTS, ...SECTIONS.flatMap((section) => section.charts)].flatMap((chart) =>
+    chart.metrics.map((metric) => metric.name),
+  )
+  for (const name of [
+    'loss/policy',
+    'loss/value',
+    'policy/kl',
+    'policy/entropy',
+    'train/reward',
+    'time/update',
+  ])
+    expect(shown).toContain(name)
+})

@@ -1,0 +1,46 @@
+import { screen, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import { comparison, curves, experiment, form } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const routes = {
+  'GET /api/compare': comparison,
+  'GET /api/compare/curves': curves,
+  'GET /api/training/form': form,
+  'GET /api/experiments': { items: [experiment], total: 1 },
+}
+
+test('figures with intervals and N, warnings, curves, and what differs', async () => {
+  const server = startServer(routes)
+  open('/compare?experiment=exp1&experiment=exp2')
+  const figures = await screen.findByTestId('figures')
+  expect(figures).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%/)
+  expect(figures).toHaveTextContent('2 seeds × 200 episodes')
+  expect(figures).toHaveTextContent('not evaluated yet')
+  expect(screen.getByTestId('warnings')).toHaveTextContent('fewer than 5')
+  const differences = await screen.findByTestId('differences')
+  expect(
+    within(differences)
+      .getAllByRole('row')
+      .slice(1)
+      .map((row) => row.textContent),
+  ).toEqual(['Learning rateAlgorithm0.0010.0003', 'Hidden layersNetwork64, 64–'])
+  const [chart] = await screen.findAllByRole('figure', { name: 'Success rate' })
+  expect(chart).toHaveTextContent('Corridor, 2 seeds')
+  expect(chart).toHaveTextContent('Alone, 1 seed')
+  expect(server.asked.some((path) => path.startsWith('/api/compare?experiment=exp1&experiment=exp2'))).toBe(
+    true,
+  )
+})
+
+test('with none chosen there is a list to choose from', async () => {
+  startServer(routes)
+  const { router, user } = open('/compare')
+  await user.click(await screen.findByRole('checkbox', { name: 'Tick Corridor' }))
+  await user.click(screen.getByRole('button', { name: 'Compare 1' }))
+  expect(router.state.location.search).toBe('?experiment=exp1')
+  expect(await screen.findByTestId('figures')).toBeInTheDocument()
+})

@@ -1,0 +1,31 @@
+import { screen, waitFor } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import { curves, experiment, form, training } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const routes = {
+  'GET /api/experiments/exp1': { ...experiment, training: { ...training, steps: 600_000 } },
+  'GET /api/compare/curves': curves,
+  'GET /api/training/form': form,
+}
+
+test('its runs, its success with what stands behind it, and what differs from the defaults', async () => {
+  startServer(routes)
+  open('/experiments/exp1')
+  const runs = await screen.findAllByTestId('run')
+  expect(runs.map((run) => run.textContent?.slice(0, 6))).toEqual(['Seed 0', 'Seed 1'])
+  expect(screen.getByRole('link', { name: 'Seed 1' })).toHaveAttribute('href', '/runs/run2')
+  expect(screen.getByText('2 seeds, 400 episodes')).toBeInTheDocument()
+  expect(await screen.findByText(/default 300\s000/)).toBeInTheDocument()
+  expect(screen.getByRole('link', { name: 'Duplicate' })).toHaveAttribute('href', '/new?from=exp1')
+})
+
+test('stopping it stops its runs', async () => {
+  const server = startServer({ ...routes, 'POST /api/experiments/exp1/stop': experiment })
+  const { user } = open('/experiments/exp1')
+  await user.click(await screen.findByRole('button', { name: 'Stop' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/experiments/exp1/stop'))
+})

@@ -1,0 +1,150 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import { experiment, form, training } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const LAUNCHED = { ...experiment, runs: experiment.runs.slice(0, 1) }
+
+function start(routes = {}) {
+  return startServer({ 'GET /api/training/form': form, 'POST /api/experiments': LAUNCHED, ...routes })
+}
+
+const sent = (server: ReturnType<typeof start>) => server.changes.at(-1)?.body as typeof form.defaults
+
+test('the defaults can be launched at once, and a single run is then watched', async () => {
+  const server = start()
+  const { router, user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(router.state.location.pathname).toBe('/runs/run1'))
+  expect(sent(server)).toEqual(form.defaults)
+})
+
+test('what is typed and chosen is what is sent', async () => {
+  const server = start()
+  const { user } = open('/new')
+  const name = await screen.findByRole('textbox', { name: 'Name' })
+  await user.clear(name)
+  await user.type(name, 'Maze')
+  await user.click(screen.getByRole('radio', { name: 'Complex' }))
+  await user.click(screen.getByRole('radio', { name: 'ResBlock' }))
+  const seeds = screen.getByRole('textbox', { name: 'Number of seeds' })
+  await user.clear(seeds)
+  await user.type(seeds, '5')
+  expect(screen.getByTestId('launch-summary')).toHaveTextContent(/5 runs of 300\s000 steps/)
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toMatchObject({
+    name: 'Maze',
+    seeds: [0, 1, 2, 3, 4],
+    training: { task: { arena: { name: 'complex' } }, algorithm: { network: { name: 'resblock' } } },
+  })
+})
+
+test('a branch that was left keeps what was set in it', async () => {
+  start()
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: /Advanced/ }))
+  const layers = screen.getByRole('textbox', { name: 'Hidden layers' })
+  await user.clear(layers)
+  await user.type(layers, '32, 16')
+  await user.click(screen.getByRole('radio', { name: 'ResBlock' }))
+  expect(screen.queryByRole('textbox', { name: 'Hidden layers' })).not.toBeInTheDocument()
+  await user.click(screen.getByRole('radio', { name: 'MLP' }))
+  expect(screen.getByRole('textbox', { name: 'Hidden layers' })).toHaveValue('32, 16')
+})
+
+test('another algorithm starts with its own defaults', async () => {
+  const server = start()
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('radio', { name: 'DDPG' }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server).training.algorithm).toEqual({
+    name: 'ddpg',
+    network: { name: 'mlp', hidden_sizes: [128, 128], activation: 'relu' },
+    tau: 0.01,
+  })
+})
+
+test('a preset sets the training and leaves name and seeds; a change of it is called one’s own', async () => {
+  const server = start()
+  const { user } = open('/new')
+  const presets = await screen.findByRole('radiogroup', { name: 'Start from' })
+  await user.click(within(presets).getByRole('radio', { name: 'Paper settings' }))
+  expect(screen.getByRole('radio', { name: 'ResBlock' })).toBeChecked()
+  expect(screen.getByRole('radio', { name: 'Paper' })).toBeChecked()
+  await user.click(screen.getByRole('radio', { name: 'Improved' }))
+  expect(within(presets).getByRole('radio', { name: 'Your settings' })).toBeChecked()
+  await user.click(within(presets).getByRole('radio', { name: 'Default' }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toEqual(form.defaults)
+})
+
+test('what the server refuses stands at its field, in the summary, and goes when the field is changed', async () => {
+  start({
+    'POST /api/experiments': refusal(422, [
+      {
+        loc: ['body', 'training', 'algorithm', 'ppo', 'learning_rate'],
+        msg: 'Input should be less than 0.1',
+        type: 'x',
+      },
+      {
+        loc: ['body', 'training', 'task'],
+        msg: 'Value error, the target is out of reach',
+        type: 'value_error',
+      },
+    ]),
+  })
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: /Advanced/ }))
+  const rate = screen.getByRole('textbox', { name: 'Learning rate' })
+  await user.clear(rate)
+  await user.type(rate, '7')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+
+  const summary = await screen.findByTestId('problems')
+  expect(summary).toHaveTextContent('Learning rate: Input should be less than 0.1')
+  expect(summary).toHaveTextContent('The target is out of reach')
+  expect(rate).toBeInvalid()
+  expect(rate).toHaveAccessibleDescription(/Input should be less than 0.1/)
+
+  await user.click(within(summary).getByRole('button', { name: 'Learning rate' }))
+  expect(rate).toHaveFocus()
+  await user.clear(rate)
+  expect(rate).toBeValid()
+})
+
+test('seeds can be chosen one by one', async () => {
+  const server = start()
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: 'Choose them' }))
+  const seeds = screen.getByRole('textbox', { name: 'Seeds' })
+  await user.clear(seeds)
+  await user.type(seeds, '7, 11')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server).seeds).toEqual([7, 11])
+})
+
+test('a duplicate starts with the settings, the seeds and the name of its original', async () => {
+  const original = { ...experiment, training: { ...training, steps: 5000 } }
+  start({ 'GET /api/experiments/exp1': original })
+  open('/new?from=exp1')
+  expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('Corridor (copy)')
+  expect(screen.getByTestId('launch-summary')).toHaveTextContent(/2 runs of 5\s000 steps/)
+})
+
+test('a server out of reach loses nothing of what was typed', async () => {
+  start({ 'POST /api/experiments': new TypeError('Failed to fetch') })
+  const { user } = open('/new')
+  const name = await screen.findByRole('textbox', { name: 'Name' })
+  await user.clear(name)
+  await user.type(name, 'Maze')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  expect(await screen.findByText('Not launched: The server cannot be reached.')).toBeInTheDocument()
+  expect(name).toHaveValue('Maze')
+})

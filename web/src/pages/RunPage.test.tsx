@@ -1,0 +1,112 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import { checkpoints, experiment, live, NOW, runDetail } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const routes = {
+  'GET /api/runs/run1': runDetail,
+  'GET /api/runs/run1/metrics': {
+    series: [{ name: 'train/success_rate', steps: [4096, 8192], values: [0.1, 0.4], min: null, max: null }],
+  },
+  'GET /api/runs/run1/checkpoints': checkpoints,
+  'GET /api/runs/run1/events': [
+    { id: 1, at: NOW - 50, step: 0, level: 'info', message: 'Claimed by worker-1' },
+    { id: 2, at: NOW - 10, step: 90_000, level: 'warning', message: 'Link lost for 2 s' },
+  ],
+  'GET /api/runs/run1/live': live,
+  'GET /api/experiments/exp1': experiment,
+}
+
+test('a running run: how far it is, its curves, its robots', async () => {
+  startServer(routes)
+  open('/runs/run1')
+  const vitals = await screen.findByTestId('vitals')
+  expect(vitals).toHaveTextContent('Running')
+  expect(vitals).toHaveTextContent(/120\s000 of 300\s000/)
+  expect(vitals).toHaveTextContent('13 s')
+  expect(within(vitals).getByRole('progressbar')).toHaveAttribute('aria-valuenow', '40')
+  expect(document.title).toBe('Corridor, seed 0 – Mapless')
+  expect(await screen.findByRole('figure', { name: 'Success rate' })).toHaveTextContent(/training\s*40\.0\s%/)
+  expect(screen.getByTitle('The robots in 3D')).toHaveAttribute('src', '/live/run1/')
+  await waitFor(() => expect(screen.queryByTestId('live-overlay')).not.toBeInTheDocument())
+})
+
+test('its policies, the newest first, the best marked, each to take away', async () => {
+  startServer(routes)
+  open('/runs/run1')
+  const rows = await screen.findAllByTestId('checkpoint')
+  expect(rows.map((row) => within(row).getByRole('link').getAttribute('href'))).toEqual([
+    '/api/checkpoints/cp2/download',
+    '/api/checkpoints/cp1/download',
+  ])
+  expect(rows[0]).toHaveTextContent('Best')
+  expect(rows[0]).toHaveTextContent(/88\.5\s%\s*83\.3–92\.2\s%\s*N = 200/)
+  expect(rows[1]).not.toHaveTextContent('Best')
+})
+
+test('what happened, the newest first', async () => {
+  startServer(routes)
+  open('/runs/run1')
+  const log = await screen.findByTestId('events')
+  expect(
+    within(log)
+      .getAllByRole('listitem')
+      .map((line) => line.textContent),
+  ).toEqual([expect.stringContaining('Link lost for 2 s'), expect.stringContaining('Claimed by worker-1')])
+})
+
+test('a choice about the view shows at once and is sent with the others', async () => {
+  const server = startServer({ ...routes, 'PUT /api/runs/run1/live': live })
+  const { user } = open('/runs/run1')
+  const controls = await screen.findByRole('group', { name: 'Live view' })
+  await waitFor(() => expect(within(controls).getByRole('radio', { name: '5×' })).toBeEnabled())
+  await user.click(within(controls).getByRole('radio', { name: '5×' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  const { status, ...settings } = live
+  expect(server.changes[0]).toEqual({ route: 'PUT /api/runs/run1/live', body: { ...settings, speed: 5 } })
+})
+
+test.each([
+  ['queued', 'Waiting for a free worker'],
+  ['completed', 'This run is complete'],
+  ['stopped', 'This run was stopped'],
+  ['failed', 'This run failed'],
+] as const)('a %s run has no robots to show, and says so', async (state, text) => {
+  startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, state } })
+  open('/runs/run1')
+  expect(await screen.findByTestId('live-overlay')).toHaveTextContent(text)
+  expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
+})
+
+test('a failed run says why, and can be resumed', async () => {
+  const server = startServer({
+    ...routes,
+    'GET /api/runs/run1': { ...runDetail, state: 'failed', error: 'The trainer ended with exit code 137' },
+    'POST /api/runs/run1/resume': { ...runDetail, state: 'queued' },
+  })
+  const { user } = open('/runs/run1')
+  expect(await screen.findByText('The trainer ended with exit code 137')).toBeInTheDocument()
+  expect(screen.queryByRole('button', { name: 'Stop' })).not.toBeInTheDocument()
+  await user.click(screen.getByRole('button', { name: 'Resume' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/runs/run1/resume'))
+})
+
+test('a change that the server tells of is asked for', async () => {
+  FakeEventSource.open = []
+  const server = startServer(routes)
+  open('/runs/run1')
+  expect(await screen.findByTestId('vitals')).toHaveTextContent('Running')
+  server.routes['GET /api/runs/run1'] = { ...runDetail, state: 'completed', step: 300_000 }
+  await waitFor(() => expect(FakeEventSource.open).toHaveLength(1))
+  FakeEventSource.open[0]?.send({ experiment_id: 'exp1', run_id: 'run1', kind: 'run' })
+  await waitFor(() => expect(screen.getByTestId('vitals')).toHaveTextContent('Completed'))
+})
+
+test('a run that is not there', async () => {
+  startServer({})
+  open('/runs/gone')
+  expect(await screen.findByText('There is no such run')).toBeInTheDocument()
+})

@@ -1,0 +1,320 @@
+/** Answers of the server as the tests use them, typed by its OpenAPI. */
+import type { components } from '../api/schema'
+import type {
+  Checkpoint,
+  Comparison,
+  Curves,
+  Experiment,
+  LiveState,
+  Run,
+  RunDetail,
+  Status,
+} from '../api/types'
+
+export const NOW = Date.UTC(2026, 10, 21, 12) / 1000
+
+export const status: Status = {
+  version: '0.1.0',
+  commit: 'c0ffee1',
+  workers: [
+    { name: 'worker-1', last_seen: NOW, run_id: 'run1' },
+    { name: 'worker-2', last_seen: NOW, run_id: null },
+  ],
+  queued: 0,
+  running: 1,
+}
+
+export const run: Run = {
+  id: 'run1',
+  experiment_id: 'exp1',
+  seed: 0,
+  state: 'running',
+  attempt: 1,
+  step: 120_000,
+  total_steps: 300_000,
+  steps_per_second: 14_000,
+  seconds_left: 12.9,
+  success_rate: 0.91,
+  eval_success_rate: 0.885,
+  worker: 'worker-1',
+  error: null,
+  created_at: NOW - 60,
+  started_at: NOW - 50,
+  finished_at: null,
+}
+
+const network = { name: 'mlp' as const, hidden_sizes: [64, 64], activation: 'relu' as const }
+
+/** A training as the form's schema below describes it, with enough of the rest for lists and headings. */
+export const training = {
+  task: {
+    arena: { name: 'simple' },
+    observation: 'improved',
+    reward: { name: 'basic', arrival: 120 },
+  },
+  algorithm: { name: 'ppo', network, learning_rate: 0.001, robots: 128 },
+  steps: 300_000,
+} as unknown as Experiment['training']
+
+export const experiment: Experiment = {
+  id: 'exp1',
+  name: 'Corridor',
+  created_at: NOW - 7200,
+  training,
+  state: 'running',
+  runs: [
+    run,
+    {
+      ...run,
+      id: 'run2',
+      seed: 1,
+      state: 'completed',
+      step: 300_000,
+      seconds_left: null,
+      steps_per_second: null,
+    },
+  ],
+  success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
+}
+
+export const runDetail: RunDetail = { ...run, experiment_name: 'Corridor', training }
+
+export const live: LiveState = {
+  mode: 'policy',
+  robots: 8,
+  speed: 1,
+  rays: true,
+  follow: null,
+  status: { connected: true, receiving: true, watchers: 1 },
+}
+
+export const checkpoints: Checkpoint[] = [
+  {
+    id: 'cp1',
+    step: 50_000,
+    size: 436_112,
+    sha256: 'ab'.repeat(32),
+    created_at: NOW - 40,
+    best: false,
+    evaluation: null,
+  },
+  {
+    id: 'cp2',
+    step: 100_000,
+    size: 436_112,
+    sha256: 'cd'.repeat(32),
+    created_at: NOW - 20,
+    best: true,
+    evaluation: {
+      suite: 'simple-200',
+      suite_hash: 'c0ffee',
+      episodes: 200,
+      arrivals: 177,
+      success: { value: 0.885, low: 0.833, high: 0.922, seeds: 1, episodes: 200 },
+      steps_mean: 104.2,
+      reward_mean: 1790,
+    },
+  },
+]
+
+export const curves: Curves = {
+  name: 'eval/success_rate',
+  steps: [0, 100, 200],
+  experiments: [
+    {
+      id: 'exp1',
+      name: 'Corridor',
+      seeds: [
+        { seed: 0, values: [0.1, 0.5, 0.9] },
+        { seed: 1, values: [0.3, 0.7, null] },
+      ],
+      mean: [0.2, 0.6, 0.9],
+      iqm: [0.2, 0.6, 0.9],
+      low: [0.1, 0.5, null],
+      high: [0.3, 0.7, null],
+      count: [2, 2, 1],
+    },
+    {
+      id: 'exp2',
+      name: 'Alone',
+      seeds: [{ seed: 0, values: [0.4, 0.5, 0.6] }],
+      mean: [0.4, 0.5, 0.6],
+      iqm: [0.4, 0.5, 0.6],
+      low: [null, null, null],
+      high: [null, null, null],
+      count: [1, 1, 1],
+    },
+  ],
+}
+
+export const comparison: Comparison = {
+  experiments: [
+    {
+      id: 'exp1',
+      name: 'Corridor',
+      seeds: 2,
+      episodes: 400,
+      suite: 'simple-200',
+      suite_hash: 'c0ffee',
+      success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
+      steps_per_target: { value: 104.2, low: 101.9, high: 106.7, seeds: 2, episodes: 393 },
+      reward: { value: 1790, low: 1772, high: 1804, seeds: 2, episodes: 400 },
+    },
+    {
+      id: 'exp2',
+      name: 'Alone',
+      seeds: 0,
+      episodes: 0,
+      suite: null,
+      suite_hash: null,
+      success: null,
+      steps_per_target: null,
+      reward: null,
+    },
+  ],
+  differences: [
+    { path: 'algorithm.learning_rate', values: [0.001, 0.0003] },
+    { path: 'algorithm.network.hidden_sizes', values: [[64, 64], null] },
+  ],
+  warnings: ['Corridor has 2 seeds: fewer than 5 cannot show that one configuration beats another.'],
+} as Comparison
+
+const ADVANCED = { 'x-advanced': true }
+
+/** A launch form with one of everything that pydantic writes: unions in unions, ranges, lists, factories' defaults. */
+export const form = {
+  schema: {
+    title: 'ExperimentCreate',
+    type: 'object',
+    properties: {
+      name: { type: 'string', title: 'Name', default: 'My first policy', maxLength: 120 },
+      seeds: {
+        type: 'array',
+        items: { type: 'integer' },
+        title: 'Seeds',
+        default: [0],
+        minItems: 1,
+        maxItems: 50,
+      },
+      training: { $ref: '#/$defs/Training', title: 'Training', default: training },
+    },
+    $defs: {
+      Training: {
+        title: 'TrainingConfig',
+        type: 'object',
+        properties: {
+          task: { $ref: '#/$defs/Task', title: 'Task' },
+          algorithm: {
+            title: 'Algorithm',
+            oneOf: [{ $ref: '#/$defs/Ppo' }, { $ref: '#/$defs/Ddpg' }],
+            discriminator: { propertyName: 'name', mapping: { ddpg: '#/$defs/Ddpg', ppo: '#/$defs/Ppo' } },
+          },
+          steps: { type: 'integer', title: 'Steps', default: 300_000, minimum: 1000, maximum: 1_000_000_000 },
+        },
+      },
+      Task: {
+        title: 'TaskConfig',
+        type: 'object',
+        properties: {
+          arena: { $ref: '#/$defs/Arena', title: 'Arena' },
+          observation: {
+            type: 'string',
+            enum: ['paper', 'improved'],
+            title: 'Observation',
+            default: 'improved',
+          },
+          reward: { $ref: '#/$defs/Reward', title: 'Reward' },
+        },
+      },
+      Arena: {
+        type: 'object',
+        title: 'ArenaConfig',
+        properties: {
+          name: { type: 'string', enum: ['simple', 'complex'], title: 'Arena', default: 'simple' },
+        },
+      },
+      Reward: {
+        type: 'object',
+        title: 'RewardConfig',
+        properties: {
+          name: { type: 'string', const: 'basic', title: 'Reward', default: 'basic' },
+          arrival: { type: 'number', title: 'Arrival reward', default: 120, ...ADVANCED },
+        },
+      },
+      Network: {
+        title: 'Network',
+        oneOf: [{ $ref: '#/$defs/ResBlock' }, { $ref: '#/$defs/Mlp' }],
+        discriminator: {
+          propertyName: 'name',
+          mapping: { mlp: '#/$defs/Mlp', resblock: '#/$defs/ResBlock' },
+        },
+      },
+      ResBlock: {
+        type: 'object',
+        properties: { name: { type: 'string', const: 'resblock', title: 'ResBlock', default: 'resblock' } },
+      },
+      Mlp: {
+        type: 'object',
+        properties: {
+          name: { type: 'string', const: 'mlp', title: 'MLP', default: 'mlp' },
+          hidden_sizes: {
+            type: 'array',
+            items: { type: 'integer' },
+            title: 'Hidden layers',
+            default: [64, 64],
+            ...ADVANCED,
+          },
+          activation: {
+            type: 'string',
+            enum: ['relu', 'tanh'],
+            title: 'Activation',
+            default: 'relu',
+            ...ADVANCED,
+          },
+        },
+      },
+      Ppo: {
+        type: 'object',
+        properties: {
+          name: { type: 'string', const: 'ppo', title: 'PPO', default: 'ppo' },
+          network: { $ref: '#/$defs/Network', title: 'Network', default: network },
+          learning_rate: {
+            type: 'number',
+            title: 'Learning rate',
+            default: 0.001,
+            exclusiveMinimum: 0,
+            maximum: 0.1,
+            ...ADVANCED,
+          },
+          robots: { type: 'integer', title: 'Robots', default: 128, minimum: 1, maximum: 4096, ...ADVANCED },
+        },
+      },
+      Ddpg: {
+        type: 'object',
+        properties: {
+          name: { type: 'string', const: 'ddpg', title: 'DDPG', default: 'ddpg' },
+          network: {
+            $ref: '#/$defs/Network',
+            title: 'Network',
+            default: { ...network, hidden_sizes: [128, 128] },
+          },
+          tau: { type: 'number', title: 'Target rate', default: 0.01, ...ADVANCED },
+        },
+      },
+    },
+  },
+  defaults: { name: 'My first policy', seeds: [0], training },
+  presets: [
+    { id: 'default', title: 'Default', description: 'Small and quick.', training },
+    {
+      id: 'paper',
+      title: 'Paper settings',
+      description: 'As published.',
+      training: {
+        ...training,
+        task: { ...training.task, observation: 'paper' },
+        algorithm: { ...training.algorithm, network: { name: 'resblock' } },
+      },
+    },
+  ],
+} as unknown as components['schemas']['TrainingForm']
