@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, sync_playwright
@@ -76,7 +77,8 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def context(browser: Browser, stack: str) -> Iterator[BrowserContext]:
     """A logged-in browser profile of its own, 1280 x 900."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900}, accept_downloads=True)
+    origin = "{0.scheme}://{0.netloc}".format(urlsplit(stack))
+    context = browser.new_context(base_url=origin, viewport={"width": 1280, "height": 900}, accept_downloads=True)
     page = context.new_page()
     page.goto(stack)
     page.close()
