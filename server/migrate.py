@@ -43,5 +43,7 @@ def upgrade(database: Database) -> None:
             f"The database was written by a newer version of Mapless ({error}): update the program, or use another database."
         ) from error
     except OperationalError as error:
+        # What follows the first line are guesses at the cause.
+        reason, *_ = str(error.orig).splitlines()
         url = database.engine.url.render_as_string(hide_password=True)
-        raise UnreachableDatabaseError(f"The database {url} can't be used: {error.orig}") from error
+        raise UnreachableDatabaseError(f"The database {url} can't be used: {reason}") from error

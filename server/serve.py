@@ -1,6 +1,7 @@
 """Runs the application on its port until it is told to stop."""
 
 import contextlib
+import signal
 import socket
 from collections.abc import Callable
 
@@ -62,6 +63,7 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             timeout_graceful_shutdown=_GRACE_SECONDS,
         )
         server = _Server(config, services, lambda: on_ready(login_url(settings, services.secrets.token)))
-        # uvicorn raises SIGINT once more when it has shut down; nothing is left to be interrupted.
+        # uvicorn raises the signal that ended it once more when it has shut down; nothing is left to be interrupted.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listener])

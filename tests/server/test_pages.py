@@ -1,0 +1,65 @@
+"""The built pages, or a page that says how to build them."""
+
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.settings import Settings
+
+
+@pytest.fixture
+def dist(settings: Settings) -> Path:
+    """What a build leaves."""
+    (settings.web_dist / "assets").mkdir(parents=True)
+    (settings.web_dist / "index.html").write_text("<!doctype html><title>Mapless</title>")
+    (settings.web_dist / "favicon.svg").write_text("<svg/>")
+    (settings.web_dist / "assets" / "index-abc123.js").write_text("export {}")
+    (settings.web_dist.parent / "secret.txt").write_text("secret")
+    return settings.web_dist
+
+
+@pytest.mark.parametrize("path", ["/", "/experiments/abc", "/runs/x/y", "/apiary"])
+def test_every_route_of_the_application_is_its_one_page(dist: Path, client: TestClient, path: str) -> None:
+    response = client.get(path)
+
+    assert response.status_code == 200
+    assert response.headers["content-type"].startswith("text/html")
+    assert response.text == (dist / "index.html").read_text()
+    # A new build must be seen at the next visit.
+    assert response.headers["cache-control"] == "no-cache"
+
+
+def test_assets_never_change(dist: Path, client: TestClient) -> None:
+    response = client.get("/assets/index-abc123.js")
+
+    assert response.status_code == 200
+    assert response.headers["content-type"].startswith("text/javascript")
+    assert response.headers["cache-control"] == "public, max-age=31536000, immutable"
+    # One that is gone is not answered with a page, which a browser would take for a script.
+    assert client.get("/assets/index-gone.js").status_code == 404
+
+
+def test_other_files_of_the_build(dist: Path, client: TestClient) -> None:
+    assert client.get("/favicon.svg").headers["content-type"] == "image/svg+xml"
+
+
+@pytest.mark.parametrize(
+    "path", ["/../secret.txt", "/%2e%2e/secret.txt", "/assets/../../secret.txt", "/..%2fsecret.txt", "/%00"]
+)
+def test_nothing_outside_the_build_is_served(dist: Path, client: TestClient, path: str) -> None:
+    assert "secret" not in client.get(path).text
+
+
+def test_a_route_that_the_api_lacks_is_not_a_page(dist: Path, client: TestClient) -> None:
+    response = client.get("/api/nothing")
+
+    assert response.status_code == 404
+    assert response.json() == {"detail": "There is no route /api/nothing."}
+
+
+def test_pages_that_were_not_built(client: TestClient) -> None:
+    response = client.get("/")
+
+    assert response.status_code == 503
+    assert "make pages" in response.text
