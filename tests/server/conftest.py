@@ -10,10 +10,7 @@ from fastapi.testclient import TestClient
 from server.app import create_app
 from server.services import Services
 from server.settings import Settings
-
-TOKEN = "a-login-token-for-tests"
-WORKER_TOKEN = "a-worker-token-for-tests"
-BASE_URL = "http://127.0.0.1:8400"
+from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
 
 
 @pytest.fixture
@@ -39,3 +36,9 @@ def client(app: FastAPI) -> Iterator[TestClient]:
 def services(app: FastAPI) -> Services:
     services: Services = app.state.services
     return services
+
+
+@pytest.fixture
+def reports(client: TestClient, services: Services) -> Reports:
+    """Stands in for the workers."""
+    return Reports(client, services)

@@ -13,10 +13,7 @@ from server.app import create_app
 from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
-
-TOKEN = "a-login-token-for-tests"
-WORKER_TOKEN = "a-worker-token-for-tests"
-BASE_URL = "http://127.0.0.1:8400"
+from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN
 
 
 @pytest.fixture

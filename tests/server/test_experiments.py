@@ -16,6 +16,7 @@ from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.migrate import upgrade
 from server.models import RunState
 from server.services import Services
+from tests.server.harness import Reports
 from workers.config import TrainingConfig
 from workers.protocol import Queue
 
@@ -55,24 +56,10 @@ def links(services: Services) -> RecordingLinks:
     return links
 
 
-def launch(client: TestClient, name: str = "Corridor", seeds: tuple[int, ...] = (0,), **training: Any) -> dict[str, Any]:
-    response = client.post("/api/experiments", json={"name": name, "seeds": seeds, "training": training})
-    assert response.status_code == 201, response.text
-    experiment: dict[str, Any] = response.json()
-    return experiment
-
-
-def set_state(services: Services, run: dict[str, Any], state: RunState, **columns: Any) -> None:
-    """Bring a run where a worker would have brought it."""
-    with services.database.write() as session:
-        row = session.get_one(models.Run, run["id"])
-        row.state = state
-        for name, value in columns.items():
-            setattr(row, name, value)
-
-
-def test_launching_queues_one_run_a_seed_and_rings_for_each(client: TestClient, doorbell: RecordingDoorbell) -> None:
-    experiment = launch(client, "  Corridor ", seeds=(3, 1), steps=5_000)
+def test_launching_queues_one_run_a_seed_and_rings_for_each(
+    client: TestClient, doorbell: RecordingDoorbell, reports: Reports
+) -> None:
+    experiment = reports.experiment("  Corridor ", seeds=(3, 1), steps=5_000)
 
     assert experiment["name"] == "Corridor"
     assert experiment["state"] == "queued"
@@ -96,7 +83,7 @@ def test_launching_queues_one_run_a_seed_and_rings_for_each(client: TestClient, 
         ({"seeds": [1, 1]}, ["body", "seeds"]),
         ({"seeds": [0, -1]}, ["body", "seeds", 1]),
         ({"training": {"steps": 10}}, ["body", "training", "steps"]),
-        ({"training": {"algorithm": {"gamma": 1.5}}}, ["body", "training", "algorithm", "gamma"]),
+        ({"training": {"algorithm": {"name": "ppo", "gamma": 1.5}}}, ["body", "training", "algorithm", "ppo", "gamma"]),
         ({"training": {"task": {"lidar": {"batches": 7}}}}, ["body", "training", "task", "lidar"]),
         ({"surprise": 1}, ["body", "surprise"]),
     ],
@@ -128,10 +115,10 @@ def test_the_form_can_be_sent_as_it_comes(client: TestClient) -> None:
     assert client.post("/api/experiments", json=paper).json()["training"]["algorithm"]["network"]["name"] == "resblock"
 
 
-def test_the_list_is_searched_filtered_and_paged(client: TestClient, services: Services) -> None:
+def test_the_list_is_searched_filtered_and_paged(client: TestClient, reports: Reports) -> None:
     names = ["Maze 50%", "maze 500", "Corridor", "Élan"]
-    created = {name: launch(client, name) for name in names}
-    set_state(services, created["Corridor"]["runs"][0], "failed")
+    created = {name: reports.experiment(name) for name in names}
+    reports.state(created["Corridor"]["runs"][0], "failed")
 
     def listed(**parameters: Any) -> list[str]:
         page = client.get("/api/experiments", params=parameters).json()
@@ -190,10 +177,10 @@ def test_the_filter_in_sql_agrees_with_the_state_that_is_shown(module_database: 
         session.rollback()
 
 
-def test_stopping_ends_what_waits_and_asks_what_runs(client: TestClient, services: Services, links: RecordingLinks) -> None:
-    experiment = launch(client, seeds=(0, 1, 2))
-    set_state(services, experiment["runs"][1], "running")
-    set_state(services, experiment["runs"][2], "completed")
+def test_stopping_ends_what_waits_and_asks_what_runs(client: TestClient, links: RecordingLinks, reports: Reports) -> None:
+    experiment = reports.experiment(seeds=(0, 1, 2))
+    reports.state(experiment["runs"][1], "running")
+    reports.state(experiment["runs"][2], "completed")
 
     stopped = client.post(f"/api/experiments/{experiment['id']}/stop").json()
 
@@ -204,12 +191,12 @@ def test_stopping_ends_what_waits_and_asks_what_runs(client: TestClient, service
 
 
 def test_resuming_queues_what_was_stopped_or_has_failed(
-    client: TestClient, services: Services, doorbell: RecordingDoorbell
+    client: TestClient, services: Services, doorbell: RecordingDoorbell, reports: Reports
 ) -> None:
-    experiment = launch(client, seeds=(0, 1, 2))
-    set_state(services, experiment["runs"][0], "stopped", attempt=2, finished_at=1.0)
-    set_state(services, experiment["runs"][1], "failed", attempt=4, error="out of memory", losses=3)
-    set_state(services, experiment["runs"][2], "completed")
+    experiment = reports.experiment(seeds=(0, 1, 2))
+    reports.state(experiment["runs"][0], "stopped", attempt=2, finished_at=1.0)
+    reports.state(experiment["runs"][1], "failed", attempt=4, error="out of memory", losses=3)
+    reports.state(experiment["runs"][2], "completed")
     doorbell.rings.clear()
 
     resumed = client.post(f"/api/experiments/{experiment['id']}/resume").json()
@@ -222,18 +209,18 @@ def test_resuming_queues_what_was_stopped_or_has_failed(
         assert session.scalar(select(models.Run.losses).where(models.Run.id == experiment["runs"][1]["id"])) == 0
 
 
-def test_nothing_to_stop_and_nothing_to_resume(client: TestClient, services: Services) -> None:
-    experiment = launch(client)
+def test_nothing_to_stop_and_nothing_to_resume(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment()
     assert client.post(f"/api/experiments/{experiment['id']}/resume").status_code == 409
-    set_state(services, experiment["runs"][0], "completed")
+    reports.state(experiment["runs"][0], "completed")
 
     response = client.post(f"/api/experiments/{experiment['id']}/stop")
     assert response.status_code == 409
     assert response.json() == {"detail": "All runs of this experiment have ended already."}
 
 
-def test_renaming(client: TestClient) -> None:
-    experiment = launch(client)
+def test_renaming(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment()
 
     renamed = client.patch(f"/api/experiments/{experiment['id']}", json={"name": "Better name"})
     assert renamed.status_code == 200
@@ -242,10 +229,10 @@ def test_renaming(client: TestClient) -> None:
     assert client.patch(f"/api/experiments/{experiment['id']}", json={"id": "x", "name": "y"}).status_code == 422
 
 
-def test_deleting_cuts_off_workers_and_leaves_nothing(client: TestClient, services: Services, links: RecordingLinks) -> None:
-    experiment, other = launch(client), launch(client)
+def test_deleting_cuts_off_workers_and_leaves_nothing(client: TestClient, links: RecordingLinks, reports: Reports) -> None:
+    experiment, other = reports.experiment(), reports.experiment()
     run = experiment["runs"][0]
-    set_state(services, run, "running")
+    reports.state(run, "running")
 
     response = client.delete(f"/api/experiments/{experiment['id']}")
 
@@ -273,7 +260,7 @@ def test_an_experiment_that_is_not_there(client: TestClient, method: str, path: 
     assert response.json() == {"detail": "There is no experiment nobody; it may have been deleted."}
 
 
-def test_whoever_looks_on_is_told(client: TestClient, services: Services) -> None:
+def test_whoever_looks_on_is_told(client: TestClient, services: Services, reports: Reports) -> None:
     told: list[Change] = []
 
     class RecordingBus(EventBus):
@@ -281,7 +268,7 @@ def test_whoever_looks_on_is_told(client: TestClient, services: Services) -> Non
             told.append(change)
 
     services.bus = RecordingBus()
-    experiment = launch(client)
+    experiment = reports.experiment()
     client.post(f"/api/experiments/{experiment['id']}/stop")
     client.delete(f"/api/experiments/{experiment['id']}")
 

@@ -1,0 +1,79 @@
+"""What tests of the service share: its tokens, and a stand-in for the workers that report to it."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi.testclient import TestClient
+
+from server import models
+from server.checkpoints.repository import CheckpointRepository
+from server.ids import new_id
+from server.metrics.repository import MetricRepository, ReportedRow
+from server.models import RunState
+from server.services import Services
+from server.system.repository import WorkerRepository
+from workers.reporting import EpisodeResult, EvaluationResult
+
+TOKEN = "a-login-token-for-tests"
+WORKER_TOKEN = "a-worker-token-for-tests"
+BASE_URL = "http://127.0.0.1:8400"
+
+
+@dataclass(frozen=True)
+class Reports:
+    """Puts into the service what workers would have reported."""
+
+    client: TestClient
+    services: Services
+
+    def experiment(self, name: str = "Corridor", seeds: Sequence[int] = (0,), **training: object) -> dict[str, Any]:
+        """Launch an experiment; as the API shows it."""
+        response = self.client.post("/api/experiments", json={"name": name, "seeds": list(seeds), "training": training})
+        assert response.status_code == 201, response.text
+        experiment: dict[str, Any] = response.json()
+        return experiment
+
+    @staticmethod
+    def evaluation(arrivals: int, episodes: int = 10, *, steps: int = 80, suite_hash: str = "hash-a") -> EvaluationResult:
+        """`arrivals` episodes arrive after `steps` steps with reward 100, the others collide after 5 with reward -100."""
+        arrived = EpisodeResult(
+            outcome="arrival", steps=steps, reward=100.0, path_length=4.0, shortest_path=3.5, min_clearance=0.3
+        )
+        collided = EpisodeResult(
+            outcome="collision", steps=5, reward=-100.0, path_length=0.2, shortest_path=3.5, min_clearance=0.0
+        )
+        rows = (arrived,) * arrivals + (collided,) * (episodes - arrivals)
+        return EvaluationResult(suite="simple-200", suite_hash=suite_hash, episodes=rows)
+
+    def checkpoint(self, run: dict[str, Any], step: int, evaluation: EvaluationResult | None) -> str:
+        """Upload an archive and register it; its id."""
+
+        async def archive() -> AsyncIterator[bytes]:
+            yield f"archive of step {step}".encode()
+
+        file = asyncio.run(self.services.files.write(new_id(), archive()))
+        with self.services.database.write() as session:
+            CheckpointRepository(session).add(run["id"], step, file, evaluation)
+        return file.id
+
+    def metrics(self, run: dict[str, Any], name: str, points: dict[int, float]) -> None:
+        """Report one series."""
+        rows = [ReportedRow(seq, step, 0.0, {name: value}) for seq, (step, value) in enumerate(points.items(), start=1)]
+        with self.services.database.write() as session:
+            MetricRepository(session).append_rows(run["id"], rows)
+
+    def state(self, run: dict[str, Any], state: RunState, **columns: Any) -> None:
+        """Bring a run where a worker would have brought it."""
+        with self.services.database.write() as session:
+            row = session.get_one(models.Run, run["id"])
+            row.state = state
+            for name, value in columns.items():
+                setattr(row, name, value)
+
+    def heard_of(self, worker: str, seconds_ago: float) -> None:
+        """Have heard of a worker."""
+        with self.services.database.write() as session:
+            WorkerRepository(session).seen(worker, time.time() - seconds_ago)

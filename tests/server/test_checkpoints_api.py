@@ -1,0 +1,125 @@
+"""Checkpoints over HTTP: listed with what they achieve, the best marked, downloaded, and gone with their experiment."""
+
+import hashlib
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.services import Services
+from server.statistics import wilson_interval
+from tests.server.harness import Reports
+
+
+def test_checkpoints_are_listed_with_what_they_achieve(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment()["runs"][0]
+    reports.checkpoint(run, 2_000, None)
+    reports.checkpoint(run, 1_000, reports.evaluation(arrivals=4, steps=120))
+
+    first, second = client.get(f"/api/runs/{run['id']}/checkpoints").json()
+
+    assert (first["step"], second["step"]) == (1_000, 2_000)
+    assert second["evaluation"] is None
+    assert second["size"] == len("archive of step 2000")
+    assert second["sha256"] == hashlib.sha256(b"archive of step 2000").hexdigest()
+    interval = wilson_interval(4, 10)
+    assert first["evaluation"] == {
+        "suite": "simple-200",
+        "suite_hash": "hash-a",
+        "episodes": 10,
+        "arrivals": 4,
+        "success": {"value": 0.4, "low": interval.low, "high": interval.high, "seeds": 1, "episodes": 10},
+        # Of the four that arrived; the six collisions would make a bad policy look quick.
+        "steps_mean": 120.0,
+        "reward_mean": -20.0,
+    }
+
+
+def test_the_best_arrives_most_often_and_of_equal_ones_soonest(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment()["runs"][0]
+    reports.checkpoint(run, 1_000, reports.evaluation(arrivals=9, steps=70))
+    reports.checkpoint(run, 2_000, reports.evaluation(arrivals=10, steps=90))
+    reports.checkpoint(run, 3_000, reports.evaluation(arrivals=10, steps=80))
+    reports.checkpoint(run, 4_000, reports.evaluation(arrivals=0))
+    reports.checkpoint(run, 5_000, None)
+
+    checkpoints = client.get(f"/api/runs/{run['id']}/checkpoints").json()
+
+    assert [checkpoint["step"] for checkpoint in checkpoints if checkpoint["best"]] == [3_000]
+    assert checkpoints[3]["evaluation"]["steps_mean"] is None
+
+
+def test_the_success_of_an_experiment_is_that_of_its_last_checkpoints(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment(seeds=(0, 1, 2))
+    # The best one is not what training ended with: to take it would be to choose by the test.
+    reports.checkpoint(experiment["runs"][0], 1_000, reports.evaluation(arrivals=10))
+    reports.checkpoint(experiment["runs"][0], 2_000, reports.evaluation(arrivals=8))
+    reports.checkpoint(experiment["runs"][0], 2_500, None)
+    reports.checkpoint(experiment["runs"][1], 2_000, reports.evaluation(arrivals=8))
+
+    success = client.get(f"/api/experiments/{experiment['id']}").json()["success"]
+
+    interval = wilson_interval(16, 20)
+    assert success == {"value": 0.8, "low": interval.low, "high": interval.high, "seeds": 2, "episodes": 20}
+
+
+def test_every_episode_behind_a_figure_can_be_read(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment()["runs"][0]
+    evaluation = reports.evaluation(arrivals=4)
+    identifier = reports.checkpoint(run, 1_000, evaluation)
+
+    episodes = client.get(f"/api/checkpoints/{identifier}/episodes").json()
+
+    assert episodes == {"checkpoint_id": identifier} | evaluation.model_dump(mode="json")
+
+
+def test_the_download_has_a_name_that_every_file_system_takes(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment('../Élan "50%"\r\n', seeds=(7,))["runs"][0]
+    identifier = reports.checkpoint(run, 1_000, None)
+
+    response = client.get(f"/api/checkpoints/{identifier}/download")
+
+    assert response.status_code == 200
+    assert response.content == b"archive of step 1000"
+    assert response.headers["content-type"] == "application/zip"
+    assert response.headers["content-length"] == "20"
+    assert response.headers["content-disposition"] == 'attachment; filename="mapless-elan-50-seed7-step1000.zip"'
+
+
+def test_a_name_without_a_usable_letter(client: TestClient, reports: Reports) -> None:
+    identifier = reports.checkpoint(reports.experiment("迷宮")["runs"][0], 5, None)
+
+    disposition = client.get(f"/api/checkpoints/{identifier}/download").headers["content-disposition"]
+    assert disposition == 'attachment; filename="mapless-experiment-seed0-step5.zip"'
+
+
+@pytest.mark.parametrize("path", ["nobody/download", "nobody/episodes", "..%2fdata/download"])
+def test_a_checkpoint_that_is_not_there(client: TestClient, path: str) -> None:
+    assert client.get(f"/api/checkpoints/{path}").status_code == 404
+
+
+def test_a_checkpoint_that_was_not_evaluated_has_no_episodes(client: TestClient, reports: Reports) -> None:
+    identifier = reports.checkpoint(reports.experiment()["runs"][0], 5, None)
+
+    response = client.get(f"/api/checkpoints/{identifier}/episodes")
+    assert response.status_code == 404
+    assert "has not been evaluated" in response.json()["detail"]
+
+
+def test_files_go_with_their_experiment(client: TestClient, reports: Reports, services: Services) -> None:
+    gone, stays = reports.experiment(seeds=(0, 1)), reports.experiment()
+    for run in gone["runs"]:
+        reports.checkpoint(run, 5, reports.evaluation(arrivals=1))
+    kept = reports.checkpoint(stays["runs"][0], 5, None)
+
+    assert client.delete(f"/api/experiments/{gone['id']}").status_code == 204
+
+    assert services.files.ids() == {kept}
+
+
+def test_a_file_that_is_gone_from_the_store_is_said_so(client: TestClient, reports: Reports, services: Services) -> None:
+    identifier = reports.checkpoint(reports.experiment()["runs"][0], 5, None)
+    services.files.delete(identifier)
+
+    response = client.get(f"/api/checkpoints/{identifier}/download")
+    assert response.status_code == 404
+    assert "gone from the store" in response.json()["detail"]

@@ -1,0 +1,200 @@
+"""Experiments side by side: figures with what stands behind them, differences, warnings, curves on one grid."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.comparison.differences import differences
+from server.comparison.service import common_grid, resample
+from server.metrics.points import Points
+from server.statistics import success_rate
+from tests.server.harness import Reports
+
+
+def compare(client: TestClient, *experiments: dict[str, Any]) -> dict[str, Any]:
+    response = client.get("/api/compare", params={"experiment": [experiment["id"] for experiment in experiments]})
+    assert response.status_code == 200, response.text
+    comparison: dict[str, Any] = response.json()
+    return comparison
+
+
+def test_figures_stand_on_the_last_checkpoint_of_every_seed(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("Corridor", seeds=(0, 1))
+    for run, arrivals, steps in zip(experiment["runs"], (8, 6), (80, 100), strict=True):
+        reports.checkpoint(run, 1_000, reports.evaluation(arrivals=1))
+        reports.checkpoint(run, 2_000, reports.evaluation(arrivals=arrivals, steps=steps))
+
+    (figures,) = compare(client, experiment)["experiments"]
+
+    assert (figures["name"], figures["seeds"], figures["episodes"], figures["suite"]) == ("Corridor", 2, 20, "simple-200")
+    expected = success_rate([8, 6], [10, 10])
+    assert figures["success"] == {
+        "value": 0.7,
+        "low": expected.low,
+        "high": expected.high,
+        "seeds": 2,
+        "episodes": 20,
+    }
+    # Over the episodes that arrived, 8 and 6: seeds count alike.
+    assert figures["steps_per_target"]["value"] == 90.0
+    assert figures["steps_per_target"]["episodes"] == 14
+    # Means of 60 and 20.
+    assert figures["reward"]["value"] == pytest.approx(40.0)
+    assert figures["reward"]["low"] < 40.0 < figures["reward"]["high"]
+
+
+def test_what_differs_in_the_configuration_is_listed_by_its_path(client: TestClient, reports: Reports) -> None:
+    one = reports.experiment(steps=5_000)
+    other = reports.experiment(steps=6_000, algorithm={"name": "ppo", "network": {"name": "resblock"}})
+
+    assert compare(client, one, other)["differences"] == [
+        {"path": "algorithm.network.name", "values": ["mlp", "resblock"]},
+        {"path": "algorithm.network.hidden_sizes", "values": [[64, 64], None]},
+        {"path": "algorithm.network.activation", "values": ["relu", None]},
+        {"path": "steps", "values": [5_000, 6_000]},
+    ]
+    assert {"path": "steps", "values": [6_000, 5_000]} in compare(client, other, one)["differences"]
+
+
+def test_the_same_configuration_does_not_differ(client: TestClient, reports: Reports) -> None:
+    assert compare(client, reports.experiment("a"), reports.experiment("b", seeds=(1, 2)))["differences"] == []
+
+
+names = st.sampled_from(["task", "arena", "steps"])
+settings = st.recursive(
+    st.integers(0, 3),
+    lambda children: st.dictionaries(names, children, max_size=3),
+    max_leaves=8,
+)
+configurations = st.dictionaries(names, settings, max_size=4)
+
+
+@given(configurations, configurations)
+def test_differences_are_symmetric_and_empty_for_equals(one: dict[str, Any], other: dict[str, Any]) -> None:
+    assert differences([one, one]) == []
+    forth = {row.path: row.values for row in differences([one, other])}
+    back = {row.path: row.values[::-1] for row in differences([other, one])}
+    assert forth == back
+
+
+def test_too_few_seeds_and_unfinished_runs_are_said(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("Corridor", seeds=(0, 1))
+    assert compare(client, experiment)["warnings"] == ["Corridor has not been evaluated yet."]
+
+    reports.checkpoint(experiment["runs"][0], 1_000, reports.evaluation(arrivals=10))
+    few, *others = compare(client, experiment)["warnings"]
+    assert few.startswith("Corridor has 1 seed: fewer than 5 can't show that one configuration beats another")
+    assert others == [
+        "1 of 2 runs of Corridor are not in its figures.",
+        "Corridor is not finished: its figures are those of its newest checkpoints.",
+    ]
+
+
+def test_five_seeds_that_are_done_need_no_warning(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment(seeds=range(5))
+    for run in experiment["runs"]:
+        reports.checkpoint(run, 1_000, reports.evaluation(arrivals=10))
+        reports.state(run, "completed")
+
+    assert compare(client, experiment)["warnings"] == []
+
+
+def test_different_suites_are_never_counted_together(client: TestClient, reports: Reports) -> None:
+    mixed = reports.experiment("Mixed", seeds=(0, 1, 2))
+    for run, suite_hash, arrivals in zip(mixed["runs"], ("hash-a", "hash-b", "hash-b"), (0, 10, 10), strict=True):
+        reports.checkpoint(run, 1_000, reports.evaluation(arrivals=arrivals, suite_hash=suite_hash))
+    other = reports.experiment("Other")
+    reports.checkpoint(other["runs"][0], 1_000, reports.evaluation(arrivals=10, suite_hash="hash-a"))
+
+    comparison = compare(client, mixed, other)
+
+    figures = comparison["experiments"][0]
+    assert (figures["suite_hash"], figures["seeds"], figures["success"]["value"]) == ("hash-b", 2, 1.0)
+    assert "They were measured on different suites: their figures can't be compared." in comparison["warnings"]
+    # A list shows the same figure as the comparison.
+    assert client.get(f"/api/experiments/{mixed['id']}").json()["success"] == figures["success"]
+
+
+def test_an_experiment_without_arrivals_has_no_steps_per_target(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment()
+    reports.checkpoint(experiment["runs"][0], 1_000, reports.evaluation(arrivals=0))
+
+    (figures,) = compare(client, experiment)["experiments"]
+    assert figures["success"]["value"] == 0.0
+    assert figures["steps_per_target"] is None
+    assert figures["reward"]["value"] == -100.0
+
+
+def test_curves_stand_on_one_grid(client: TestClient, reports: Reports) -> None:
+    one, other = reports.experiment("one", seeds=(0, 1)), reports.experiment("other")
+    reports.metrics(one["runs"][0], "eval/success_rate", {100: 0.0, 300: 1.0})
+    reports.metrics(one["runs"][1], "eval/success_rate", {100: 0.5, 200: 0.75})
+    reports.metrics(other["runs"][0], "eval/success_rate", {400: 1.0})
+
+    response = client.get("/api/compare/curves", params={"experiment": [one["id"], other["id"]]})
+
+    assert response.status_code == 200
+    curves = response.json()
+    assert (curves["name"], curves["steps"]) == ("eval/success_rate", [100, 200, 300, 400])
+    first, second = curves["experiments"]
+    assert first["seeds"] == [
+        {"seed": 0, "values": [0.0, 0.5, 1.0, None]},
+        {"seed": 1, "values": [0.5, 0.75, None, None]},
+    ]
+    assert first["mean"] == [0.25, 0.625, 1.0, None]
+    assert first["iqm"] == first["mean"]  # nothing to cut off two seeds
+    assert first["count"] == [2, 2, 1, 0]
+    # Both seeds' lower, both seeds' higher value are in more than 2.5 % of the replicates.
+    assert first["low"] == [0.0, 0.5, None, None]
+    assert first["high"] == [0.5, 0.75, None, None]
+    assert second["mean"] == [None, None, None, 1.0]
+
+
+def test_long_curves_are_resampled(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment()
+    reports.metrics(experiment["runs"][0], "train/return", {step: float(step) for step in range(0, 1_001, 10)})
+
+    parameters = {"experiment": experiment["id"], "name": "train/return", "points": 5}
+    curves = client.get("/api/compare/curves", params=parameters).json()
+
+    assert curves["steps"] == [0, 250, 500, 750, 1_000]
+    assert curves["experiments"][0]["mean"] == [0.0, 250.0, 500.0, 750.0, 1_000.0]
+
+
+def test_a_metric_that_nobody_reported_is_an_empty_curve(client: TestClient, reports: Reports) -> None:
+    parameters = {"experiment": reports.experiment()["id"], "name": "nothing"}
+    curves = client.get("/api/compare/curves", params=parameters).json()
+
+    assert curves["steps"] == []
+    assert curves["experiments"][0]["mean"] == []
+
+
+series = st.lists(
+    st.tuples(st.integers(0, 10_000), st.floats(-1e3, 1e3, width=32)), unique_by=lambda p: p[0], min_size=1, max_size=40
+).map(sorted)
+
+
+@given(st.lists(series, min_size=1, max_size=4), st.integers(2, 30))
+def test_resampling_stays_within_each_curve(curves: list[list[tuple[int, float]]], limit: int) -> None:
+    points = [Points.of([p[0] for p in curve], [0.0] * len(curve), [p[1] for p in curve]) for curve in curves]
+    grid = common_grid(points, limit)
+
+    assert grid.size <= limit
+    assert (np.diff(grid) > 0).all()
+    for curve in points:
+        values = resample(curve, grid)
+        inside = (grid >= curve.steps[0]) & (grid <= curve.steps[-1])
+        assert (np.isfinite(values) == inside).all()
+        assert (values[inside] >= curve.values.min() - 1e-3).all()
+        assert (values[inside] <= curve.values.max() + 1e-3).all()
+
+
+@pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves"])
+def test_what_cannot_be_compared(client: TestClient, reports: Reports, path: str) -> None:
+    assert client.get(path).status_code == 422
+    assert client.get(path, params={"experiment": [reports.experiment()["id"], "nobody"]}).status_code == 404
+    assert client.get(path, params={"experiment": [str(i) for i in range(21)]}).status_code == 422

@@ -1,0 +1,82 @@
+"""The file store: whole archives or none, on a directory and on any other fsspec store."""
+
+import asyncio
+import hashlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from server.errors import CorruptUploadError, NotFoundError, TooLargeError
+from server.files import FileStore, StoredFile
+from server.ids import new_id
+
+
+@pytest.fixture(params=["directory", "memory"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> FileStore:
+    url = str(tmp_path / "checkpoints") if request.param == "directory" else f"memory://{new_id()}"
+    return FileStore(url, max_bytes=1_000)
+
+
+async def blocks(*parts: bytes) -> AsyncIterator[bytes]:
+    for part in parts:
+        yield part
+
+
+def write(store: FileStore, identifier: str, *parts: bytes, sha256: str | None = None) -> StoredFile:
+    return asyncio.run(store.write(identifier, blocks(*parts), sha256))
+
+
+def test_what_was_written_is_read(store: FileStore) -> None:
+    digest = hashlib.sha256(b"weights").hexdigest()
+
+    assert write(store, "abc", b"wei", b"ghts", sha256=digest.upper()) == StoredFile("abc", 7, digest)
+    assert b"".join(store.read("abc")) == b"weights"
+    assert store.ids() == {"abc"}
+
+
+def test_an_upload_that_grows_too_large_leaves_nothing(store: FileStore) -> None:
+    with pytest.raises(TooLargeError):
+        write(store, "abc", b"x" * 600, b"x" * 600)
+
+    assert store.ids() == set()
+
+
+def test_an_upload_that_was_garbled_leaves_nothing(store: FileStore) -> None:
+    with pytest.raises(CorruptUploadError):
+        write(store, "abc", b"weights", sha256="0" * 64)
+
+    assert store.ids() == set()
+
+
+def test_an_upload_that_breaks_off_leaves_nothing(store: FileStore) -> None:
+    async def broken() -> AsyncIterator[bytes]:
+        yield b"wei"
+        raise ConnectionResetError
+
+    with pytest.raises(ConnectionResetError):
+        asyncio.run(store.write("abc", broken()))
+
+    assert store.ids() == set()
+
+
+def test_an_archive_that_is_gone(store: FileStore) -> None:
+    with pytest.raises(NotFoundError):
+        store.read("abc")
+    store.delete("abc")  # nothing to do, and no error
+
+
+def test_what_no_row_names_is_swept_away(store: FileStore) -> None:
+    for identifier in ("kept", "torn1", "torn2"):
+        write(store, identifier, b"x")
+
+    assert store.keep_only({"kept", "elsewhere"}) == 2
+    assert store.ids() == {"kept"}
+
+
+@pytest.mark.parametrize("identifier", ["../secret", "a/b", "", ".", "a.zip", "/etc/passwd"])
+def test_an_id_is_never_a_path(store: FileStore, identifier: str) -> None:
+    with pytest.raises(NotFoundError):
+        store.read(identifier)
+    with pytest.raises(NotFoundError):
+        write(store, identifier, b"x")
