@@ -7,9 +7,7 @@ from collections.abc import Callable
 
 import uvicorn
 
-from server.app import create_app
 from server.listening import listen, login_url
-from server.services import Services
 from server.settings import Settings
 from workers.supervised import end_with_supervisor
 
@@ -20,10 +18,10 @@ _GRACE_SECONDS = 3
 class _Server(uvicorn.Server):
     """Ends event streams before it waits for open requests: they would not end by themselves."""
 
-    def __init__(self, config: uvicorn.Config, services: Services, on_ready: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None], end_streams: Callable[[], None]) -> None:
         super().__init__(config)
-        self._services = services
         self._on_ready = on_ready
+        self._end_streams = end_streams
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -31,7 +29,7 @@ class _Server(uvicorn.Server):
             self._on_ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        self._services.bus.close()
+        self._end_streams()
         await super().shutdown(sockets)
 
 
@@ -48,10 +46,13 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
     """
     end_with_supervisor()
     listener = listen(settings)
+    # Late, so that a port that is taken is answered at once.
+    from server.app import create_app
+
     with contextlib.closing(listener):
         settings = settings.model_copy(update={"port": listener.getsockname()[1]})
         app = create_app(settings)
-        services: Services = app.state.services
+        services = app.state.services
         config = uvicorn.Config(
             app,
             log_level="warning",
@@ -62,7 +63,8 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_GRACE_SECONDS,
         )
-        server = _Server(config, services, lambda: on_ready(login_url(settings, services.secrets.token)))
+        url = login_url(settings, services.secrets.token)
+        server = _Server(config, on_ready=lambda: on_ready(url), end_streams=services.bus.close)
         # uvicorn raises the signal that ended it once more when it has shut down; nothing is left to be interrupted.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         with contextlib.suppress(KeyboardInterrupt):

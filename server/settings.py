@@ -4,7 +4,7 @@ import ipaddress
 from pathlib import Path
 from typing import Self
 
-from pydantic import Field, SecretStr, model_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
@@ -33,7 +33,9 @@ class Settings(BaseSettings):
         pydantic.ValidationError: a value is out of range, or the server would be reachable from the network without a token.
     """
 
-    model_config = SettingsConfigDict(env_prefix="MAPLESS_", frozen=True, extra="ignore", env_ignore_empty=True)
+    model_config = SettingsConfigDict(
+        env_prefix="MAPLESS_", frozen=True, extra="ignore", env_ignore_empty=True, validate_default=True
+    )
 
     data_dir: Path = Field(
         Path("data"), description="Everything that the service keeps, where the URLs below don't say otherwise."
@@ -62,6 +64,12 @@ class Settings(BaseSettings):
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
     max_body_bytes: int = Field(4 * 2**20, gt=0, description="Largest body of any other request.")
 
+    @field_validator("data_dir")
+    @classmethod
+    def _absolute(cls, path: Path) -> Path:
+        """The processes that share it may have other working directories."""
+        return path.resolve()
+
     @model_validator(mode="after")
     def _closed_on_a_network(self) -> Self:
         if is_loopback(self.host):
@@ -78,17 +86,17 @@ class Settings(BaseSettings):
     @property
     def resolved_database_url(self) -> str:
         """SQLAlchemy URL of the database."""
-        return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'mapless.db'}"
+        return self.database_url or f"sqlite:///{self.data_dir / 'mapless.db'}"
 
     @property
     def resolved_broker_url(self) -> str:
         """Celery URL of the broker."""
-        return self.broker_url or f"sqla+sqlite:///{self.data_dir.resolve() / 'broker.db'}"
+        return self.broker_url or f"sqla+sqlite:///{self.data_dir / 'broker.db'}"
 
     @property
     def resolved_files_url(self) -> str:
         """Directory or fsspec URL of the checkpoints."""
-        return self.files_url or str(self.data_dir.resolve() / "checkpoints")
+        return self.files_url or str(self.data_dir / "checkpoints")
 
     @property
     def resolved_server_url(self) -> str:

@@ -1,6 +1,7 @@
 """Which version is running, and from which commit."""
 
 import subprocess
+import tomllib
 from functools import cache
 from importlib import metadata
 
@@ -12,11 +13,11 @@ _COMMIT_FILE = PROJECT_ROOT / "COMMIT"
 
 @cache
 def version() -> str:
-    """The version of the installed distribution."""
-    try:
-        return metadata.version("mapless")
-    except metadata.PackageNotFoundError:
-        return "0+unknown"
+    """The version in pyproject.toml, or that of the installed distribution where the project's directory is not there."""
+    project = PROJECT_ROOT / "pyproject.toml"
+    if project.is_file():
+        return str(tomllib.loads(project.read_text())["project"]["version"])
+    return metadata.version("mapless")
 
 
 @cache

@@ -76,4 +76,4 @@ class Reports:
     def heard_of(self, worker: str, seconds_ago: float) -> None:
         """Have heard of a worker."""
         with self.services.database.write() as session:
-            WorkerRepository(session).seen(worker, time.time() - seconds_ago)
+            WorkerRepository(session).seen(worker, "cpu", time.time() - seconds_ago)

@@ -7,10 +7,11 @@ import pytest
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import inspect, text
 
 from server.database import Database
-from server.migrate import IncompatibleDatabaseError, migration_config, upgrade
+from server.migrate import IncompatibleDatabaseError, head, migration_config, upgrade
 from server.models import Base
 
 
@@ -28,6 +29,10 @@ def test_migrations_and_models_agree(database: Database) -> None:
     with database.engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True, "compare_server_default": True})
         assert compare_metadata(context, Base.metadata) == []
+
+
+def test_the_newest_migration_is_the_one_with_the_highest_number(database: Database) -> None:
+    assert head() == ScriptDirectory.from_config(migration_config(database)).get_current_head()
 
 
 def test_a_second_start_finds_nothing_to_do(database: Database) -> None:

@@ -1,0 +1,132 @@
+"""The `mapless` command. Its own imports are light: `mapless --help` must not wait for torch or for a database driver."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+from pydantic import ValidationError
+
+if TYPE_CHECKING:
+    from server.settings import Settings
+
+app = typer.Typer(
+    name="mapless",
+    help="Train LiDAR navigation policies, watch the robots learn, take the policy away.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+# Everything after the command's name belongs to the workers' own command line, --help included.
+_PASSED_ON: dict[str, Any] = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+
+Host = Annotated[str | None, typer.Option(help="Address to bind [MAPLESS_HOST, 127.0.0.1].")]
+Port = Annotated[int | None, typer.Option(help="Port to bind, 0 for a free one [MAPLESS_PORT, 8400].")]
+DataDir = Annotated[Path | None, typer.Option(help="Where everything is kept [MAPLESS_DATA_DIR, data].")]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; a refusal is one line on standard error and exit status 1."""
+    app(arguments, prog_name="mapless")
+
+
+@app.callback(invoke_without_command=True)
+def _options(
+    show_version: Annotated[
+        bool, typer.Option("--version", help="Show version and commit, and exit.", is_eager=True)
+    ] = False,
+) -> None:
+    if show_version:
+        show_version_and_exit()
+
+
+def show_version_and_exit() -> NoReturn:
+    """Print version and commit, and exit."""
+    from server.version import commit, version
+
+    typer.echo(f"mapless {version()}" + (f" ({commit()})" if commit() else ""))
+    raise typer.Exit
+
+
+@app.command()
+def version() -> None:
+    """Show version and commit."""
+    show_version_and_exit()
+
+
+@app.command()
+def serve(host: Host = None, port: Port = None, data_dir: DataDir = None) -> None:
+    """Start the server alone; workers are started elsewhere."""
+    # First of all, so that a wrong setting is answered before the server's imports are waited for.
+    settings = _settings(host=host, port=port, data_dir=data_dir)
+    from server.errors import ServiceError
+    from server.serve import serve as serve_until_interrupted
+
+    try:
+        serve_until_interrupted(settings, on_ready=lambda url: typer.echo(f"Mapless is at {url}"))
+    except (ServiceError, OSError) as error:
+        _refuse(str(error))
+
+
+@app.command()
+def up(
+    host: Host = None,
+    port: Port = None,
+    data_dir: DataDir = None,
+    workers: Annotated[int | None, typer.Option(min=0, help="Trainings side by side [MAPLESS_WORKERS, one a core].")] = None,
+) -> None:
+    """Start the server and its workers, and keep them running."""
+    settings = _settings(host=host, port=port, data_dir=data_dir, workers=workers)
+    from server.errors import ServiceError
+    from server.supervisor import Supervisor
+
+    try:
+        Supervisor(settings, say=typer.echo).run()
+    except (ServiceError, OSError) as error:
+        _refuse(str(error))
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
+def train(context: typer.Context) -> None:
+    """Train without the service, with a progress bar."""
+    _workers_command("train", context)
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
+def evaluate(context: typer.Context) -> None:
+    """Measure a checkpoint on a suite."""
+    _workers_command("evaluate", context)
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
+def worker(context: typer.Context) -> None:
+    """Start a worker for a server, here or on another machine."""
+    _workers_command("worker", context)
+
+
+def _workers_command(name: str, context: typer.Context) -> None:
+    from workers.cli import app as workers_app
+
+    workers_app([name, *context.args], prog_name="mapless")
+
+
+def _settings(**given: Any) -> "Settings":
+    """The settings of the environment, with what the command line says in their place."""
+    from server.settings import Settings
+
+    # Databases, logs and checkpoints are their owner's alone; logs hold the login URL.
+    os.umask(0o077)
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        for problem in error.errors():
+            name = f"MAPLESS_{problem['loc'][0]}: ".upper() if problem["loc"] else ""
+            sys.stderr.write(f"mapless: {name}{problem['msg'].removeprefix('Value error, ')}\n")
+        raise typer.Exit(1) from None
+
+
+def _refuse(message: str) -> NoReturn:
+    sys.stderr.write(f"mapless: {message}\n")
+    raise typer.Exit(1)

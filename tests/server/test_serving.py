@@ -1,0 +1,156 @@
+"""The service as a process: how it starts, what it imports, how it ends, and how it says that it can't start."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+
+import httpx
+
+ROOT = Path(__file__).parents[2]
+
+
+def environment(data: Path, **more: str) -> dict[str, str]:
+    """A clean environment: no settings but these."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("MAPLESS_")}
+    return kept | {"MAPLESS_DATA_DIR": str(data)} | more
+
+
+@contextmanager
+def serving(data: Path, port: str = "0") -> Iterator[tuple["subprocess.Popen[str]", str]]:
+    """`mapless serve` while the block lasts, and its login URL."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "server", "serve", "--port", port],
+        cwd=ROOT,
+        env=environment(data),
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout is not None
+            match = re.search(r"http://\S+", process.stdout.readline())
+            assert match is not None
+            yield process, match.group()
+        finally:
+            process.kill()
+
+
+def test_a_page_hears_of_changes_until_the_server_ends(tmp_path: Path) -> None:
+    with serving(tmp_path) as (process, url), httpx.Client(base_url=url.partition("/?")[0], timeout=10) as browser:
+        assert browser.get(url).status_code == 303
+        with browser.stream("GET", "/api/events") as events:
+            lines = events.iter_lines()
+            assert events.headers["content-type"].startswith("text/event-stream")
+            assert list(islice(lines, 2)) == [": open", ""]
+            experiment = browser.post("/api/experiments", json={}).json()
+            event, data, end = islice(lines, 3)
+            assert (event, end) == ("event: change", "")
+            assert json.loads(data.removeprefix("data: ")) == {
+                "experiment_id": experiment["id"],
+                "run_id": None,
+                "kind": "experiment",
+            }
+            process.send_signal(signal.SIGINT)
+            # The stream ends by itself, else the server would wait for it.
+            assert list(lines) == []
+        assert process.wait(timeout=10) == 0
+    # What it keeps, the login token above all, is its owner's alone.
+    kept = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(kept) >= 3
+    assert [path for path in kept if path.stat().st_mode & 0o077] == []
+
+
+def test_what_was_launched_is_there_after_a_restart(tmp_path: Path) -> None:
+    with serving(tmp_path) as (process, url):
+        base, _, token = url.partition("/?token=")
+        headers = {"Authorization": f"Bearer {token}"}
+        experiment = httpx.post(f"{base}/api/experiments", json={}, headers=headers).json()
+        process.kill()
+
+    # The same port and token: pages that are open go on.
+    with serving(tmp_path, port=base.rpartition(":")[2]) as (process, same_url):
+        assert same_url == url
+        assert httpx.get(f"{base}/api/experiments/{experiment['id']}", headers=headers).json() == experiment
+        process.terminate()
+        assert process.wait(timeout=10) == 0
+
+
+def start_and_fail(data: Path, *arguments: str, **more: str) -> str:
+    """The one line with which a start is refused."""
+    result = subprocess.run(
+        [sys.executable, "-m", "server", "serve", *arguments],
+        cwd=ROOT,
+        env=environment(data, **more),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert result.returncode == 1
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    return line
+
+
+def test_a_port_that_is_taken_is_one_clear_line(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        line = start_and_fail(tmp_path, "--port", str(port))
+
+    assert line == (
+        f"mapless: Port {port} on 127.0.0.1 is taken: stop what runs there, or choose another with MAPLESS_PORT."
+    )
+
+
+def test_a_data_directory_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    line = start_and_fail(tmp_path / "file" / "data", "--port", "0")
+
+    assert line.startswith("mapless: ")
+    assert str(tmp_path / "file" / "data") in line
+
+
+def test_the_network_without_a_token_is_one_clear_line(tmp_path: Path) -> None:
+    assert "without a login token: set MAPLESS_TOKEN" in start_and_fail(tmp_path, "--host", "0.0.0.0")
+
+
+def test_a_wrong_setting_is_one_clear_line_with_its_name(tmp_path: Path) -> None:
+    line = start_and_fail(tmp_path, MAPLESS_PORT="many")
+
+    assert line.startswith("mapless: MAPLESS_PORT: Input should be a valid integer")
+
+
+def test_a_database_that_does_not_answer_is_one_clear_line(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as nobody:
+        port = nobody.getsockname()[1]
+    line = start_and_fail(
+        tmp_path, "--port", "0", MAPLESS_DATABASE_URL=f"postgresql+psycopg://mapless:secret@127.0.0.1:{port}/mapless"
+    )
+
+    assert line.startswith("mapless: The database postgresql+psycopg://mapless:***@127.0.0.1")
+
+
+def imported_by(statement: str) -> set[str]:
+    """The packages that are loaded after `statement`, in a fresh interpreter."""
+    code = f"import sys; {statement}; print(*sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    return {name.partition(".")[0] for name in result.stdout.split()}
+
+
+def test_the_server_starts_without_what_only_workers_need() -> None:
+    loaded = imported_by("import server.app, server.serve")
+
+    assert "fastapi" in loaded
+    assert loaded.isdisjoint({"torch", "pymunk", "numba"})
+
+
+def test_help_does_not_wait_for_the_server_nor_for_the_workers() -> None:
+    loaded = imported_by("import server.cli")
+
+    assert loaded.isdisjoint({"torch", "pymunk", "numba", "numpy", "fastapi", "sqlalchemy", "celery"})
