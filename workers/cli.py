@@ -14,12 +14,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import WorkerError
+from workers.export.command import export
 from workers.frames import Frame
 from workers.presets import PRESETS, preset
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.statistics import wilson_interval
 
 app = typer.Typer(help="Train and evaluate policies on this machine.", no_args_is_help=True)
+app.command()(export)
 
 _console = Console()
 
@@ -93,8 +95,8 @@ def train(
     ] = None,
     arena: Annotated[str | None, typer.Option(help="simple or complex.")] = None,
     observation: Annotated[str | None, typer.Option(help="improved or paper.")] = None,
-    reward: Annotated[str | None, typer.Option(help="basic.")] = None,
-    algorithm: Annotated[str | None, typer.Option(help="ppo.")] = None,
+    reward: Annotated[str | None, typer.Option(help="basic, clearance or alignment.")] = None,
+    algorithm: Annotated[str | None, typer.Option(help="ppo, ddpg, td3 or sac.")] = None,
     network: Annotated[str | None, typer.Option(help="mlp or resblock.")] = None,
     steps: Annotated[int | None, typer.Option(help="Environment steps of all robots together.")] = None,
     seed: Annotated[int, typer.Option(help="Of weights, exploration and environment.")] = 0,

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from sim.observations import observation_layout
-from sim.suites import suite_for
+from sim.suites import run_suite, suite_for
 from sim.vector_env import NavigationVectorEnv
 from workers.algorithms import build_algorithm
 from workers.algorithms.base import with_prefix, without_prefix
@@ -76,6 +76,13 @@ def train(
     finally:
         viewer.close()
         torch.set_flush_denormal(False)
+
+
+def warm_up() -> None:
+    """Loads compiled kernels and the default suite, about a second's work that the first training would do otherwise."""
+    task = TrainingConfig().task
+    run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
+    NavigationVectorEnv(task, 1, seed=0).reset()
 
 
 class _Training:

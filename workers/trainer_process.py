@@ -138,9 +138,11 @@ def main(descriptor: int, parent: int) -> None:
     # Ctrl-C reaches the whole terminal; ending in order is the worker's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    # Seconds of imports, the reason why a worker keeps a process ready.
-    from workers.trainer import train
+    # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
+    from workers.trainer import train, warm_up
     from workers.viewer import LiveViewer
+
+    warm_up()
 
     incoming = orders(sys.stdin.buffer)
     job = incoming.receive()
