@@ -29,9 +29,10 @@ def exact_arc(pose: tuple[float, float, float], linear: float, angular: float, t
     x, y, heading = pose
     if abs(angular) < 1e-12:
         return x + linear * time * math.cos(heading), y + linear * time * math.sin(heading), heading
-    after = heading + angular * time
-    radius = linear / angular
-    return x + radius * (math.sin(after) - math.sin(heading)), y - radius * (math.cos(after) - math.cos(heading)), after
+    # The chord of a circle of radius v/w; as a difference of sines it would cancel in slow turns.
+    half = angular * time / 2.0
+    chord = 2.0 * linear / angular * math.sin(half)
+    return x + chord * math.cos(heading + half), y + chord * math.sin(heading + half), heading + angular * time
 
 
 def wrapped(angle: float) -> float:

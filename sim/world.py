@@ -67,6 +67,7 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "range": task.lidar.range,
         "looks_ahead": task.lidar.field_of_view <= 180.0,
         "batches": task.lidar.batches,
+        "rays_per_batch": task.lidar.rays // task.lidar.batches,
         "observation": _OBSERVATIONS[task.observation],
         "near": near_distance(task),
         "reward": _REWARDS[task.reward.name],

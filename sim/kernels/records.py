@@ -20,6 +20,7 @@ PARAMETERS = np.dtype(
         ("range", "f4"),  # m, of the LiDAR
         ("looks_ahead", "i4"),  # 1 when the field of view is within the front half plane
         ("batches", "i4"),
+        ("rays_per_batch", "i4"),
         ("observation", "i4"),
         ("near", "f4"),  # m, see `sim.observations.near_distance`
         ("reward", "i4"),

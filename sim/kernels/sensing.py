@@ -43,8 +43,17 @@ def clearance_at(x, y, index, bounds, circles, boxes):
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, dx, dy):
-    """Fill `ranges` (rays,) with the scan from a pose and return the clearance of the point, metres.
+def nearest_of(ranges, row, first, last):
+    """The smallest of ranges[row, first:last], which is not empty."""
+    nearest = ranges[row, first]
+    for k in range(first + 1, last):
+        nearest = min(nearest, ranges[row, k])
+    return nearest
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, row, dx, dy):
+    """Fill row `row` of `ranges` (n, rays) with the scan from a pose and return the clearance of the point, metres.
 
     `dx` and `dy` are scratch rows, (rays,) float32; `limit` is the LiDAR's range, which a ray without a hit reads.
     A ray that starts inside an obstacle reads 0.
@@ -62,7 +71,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
         dy[i] = uy
         to_side = (half_width - (x if ux > ZERO else -x)) / max(abs(ux), TINY)
         to_end = (half_height - (y if uy > ZERO else -y)) / max(abs(uy), TINY)
-        ranges[i] = max(min(limit, min(to_side, to_end)), ZERO)
+        ranges[row, i] = max(min(limit, min(to_side, to_end)), ZERO)
     for j in range(circles.shape[1]):
         radius = circles[index, j, 2]
         if radius <= ZERO:
@@ -76,7 +85,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
             continue
         if gap <= ZERO:
             for i in range(rays):
-                ranges[i] = ZERO
+                ranges[row, i] = ZERO
             continue
         radius_squared = radius * radius
         for i in range(rays):
@@ -85,7 +94,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
             aside = fx * dy[i] - fy * dx[i]
             square = radius_squared - aside * aside
             hit = ahead - math.sqrt(max(square, ZERO))
-            ranges[i] = min(ranges[i], hit if (square >= ZERO and hit >= ZERO) else limit)
+            ranges[row, i] = min(ranges[row, i], hit if (square >= ZERO and hit >= ZERO) else limit)
     for j in range(boxes.shape[1]):
         half_length = boxes[index, j, 2]
         if half_length <= ZERO:
@@ -121,7 +130,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
             my = -ly * iy
             enter = max(mx - ex, my - ey)
             leave = min(mx + ex, my + ey)
-            ranges[i] = min(ranges[i], max(enter, ZERO) if (leave >= enter and leave >= ZERO) else limit)
+            ranges[row, i] = min(ranges[row, i], max(enter, ZERO) if (leave >= enter and leave >= ZERO) else limit)
     return clearance
 
 
@@ -133,7 +142,7 @@ def scan_poses(poses, maps, bounds, circles, boxes, ray_cos, ray_sin, limit, loo
     for i in range(poses.shape[0]):
         sense(
             poses[i, 0], poses[i, 1], poses[i, 2], maps[i], bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead,
-            ranges[i], dx, dy,
+            ranges, i, dx, dy,
         )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from sim.kernels.records import (
     PAPER,
     TIMEOUT,
 )
-from sim.kernels.sensing import clearance_at, sense
+from sim.kernels.sensing import FAST, clearance_at, nearest_of, sense
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -80,7 +80,7 @@ def write_commands(actions, records, state, command, parameters):
     return -1
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _bearing(dx, dy, heading):
     """Direction of (dx, dy) against the heading, in [-pi, pi], left positive."""
     bearing = np.float32(math.atan2(dy, dx)) - heading
@@ -91,39 +91,38 @@ def _bearing(dx, dy, heading):
     return min(max(bearing, -PI), PI)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _observe(i, robots, geometry, p, out):
-    """Write robot i's observation to `out` (numbers,); `sim.observations` says what each number is."""
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+def _observe(i, robots, geometry, p):
+    """Write robot i's observation; `sim.observations` says what each number is."""
     record = robots.records[i]
-    ranges = robots.ranges[i]
-    rays = ranges.shape[0] // p.batches
+    out = robots.observations
+    rays = p.rays_per_batch
+    paper = p.observation == PAPER
     for k in range(p.batches):
-        nearest = ranges[k * rays]
-        for j in range(k * rays + 1, (k + 1) * rays):
-            nearest = min(nearest, ranges[j])
-        out[k] = nearest / p.range if p.observation == PAPER else p.near / max(nearest, p.near)
+        nearest = nearest_of(robots.ranges, i, k * rays, (k + 1) * rays)
+        out[i, k] = nearest / p.range if paper else p.near / max(nearest, p.near)
     k = p.batches
-    out[k] = record.linear
-    out[k + 1] = record.angular
+    out[i, k] = record.linear
+    out[i, k + 1] = record.angular
     heading = robots.poses[i, 2]
     dx = robots.targets[i, 0] - robots.poses[i, 0]
     dy = robots.targets[i, 1] - robots.poses[i, 1]
     bearing = _bearing(dx, dy, heading)
-    if p.observation == PAPER:
+    if paper:
         width = geometry.bounds[record.map, 0]
         height = geometry.bounds[record.map, 1]
         direction = np.float32(math.atan2(dy, dx))
-        out[k + 2] = record.distance / (np.float32(2.0) * np.float32(math.sqrt(width * width + height * height)))
-        out[k + 3] = (direction if direction >= ZERO else direction + TWO_PI) / TWO_PI
-        out[k + 4] = (heading if heading >= ZERO else heading + TWO_PI) / TWO_PI
+        out[i, k + 2] = record.distance / (np.float32(2.0) * np.float32(math.sqrt(width * width + height * height)))
+        out[i, k + 3] = (direction if direction >= ZERO else direction + TWO_PI) / TWO_PI
+        out[i, k + 4] = (heading if heading >= ZERO else heading + TWO_PI) / TWO_PI
     else:
-        out[k + 2] = record.distance / (record.distance + ONE)
-        out[k + 3] = bearing / PI
-        out[k + 4] = heading / PI
-    out[k + 5] = abs(bearing) / PI
+        out[i, k + 2] = record.distance / (record.distance + ONE)
+        out[i, k + 3] = bearing / PI
+        out[i, k + 4] = heading / PI
+    out[i, k + 5] = abs(bearing) / PI
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _distance_to_target(i, robots):
     """Metres from robot i to its target."""
     dx = robots.targets[i, 0] - robots.poses[i, 0]
@@ -193,7 +192,17 @@ def _forget_attempt(record):
     record.steps = 0
     record.attempt_reward = 0.0
     record.path_length = 0.0
-    record.min_clearance = np.float32(np.inf)
+    record.min_clearance = ZERO  # the first step sets it
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _nothing_happened(i, robots):
+    """Clear the results of robot i's step."""
+    robots.outcomes[i] = NONE
+    robots.rewards[i] = ZERO
+    robots.terms[i, :] = ZERO
+    robots.terminations[i] = False
+    robots.truncations[i] = False
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -223,71 +232,64 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
             robots.targets[i, 1] = targets[i, 1]
             robots.records[i].distance = _distance_to_target(i, robots)
         _forget_attempt(robots.records[i])
-        robots.outcomes[i] = NONE
-        robots.rewards[i] = ZERO
-        robots.terms[i, :] = ZERO
-        robots.terminations[i] = False
-        robots.truncations[i] = False
+        _nothing_happened(i, robots)
         _sense(i, robots, geometry, p, dx, dy)
-        _observe(i, robots, geometry, p, robots.observations[i])
+        _observe(i, robots, geometry, p)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _sense(i, robots, geometry, p, dx, dy):
     """Scan from robot i's pose; returns the clearance of its centre, metres."""
     return sense(
         robots.poses[i, 0], robots.poses[i, 1], robots.poses[i, 2], robots.records[i].map,
         geometry.bounds, geometry.circles, geometry.boxes, geometry.ray_cos, geometry.ray_sin,
-        p.range, p.looks_ahead, robots.ranges[i], dx, dy,
+        p.range, p.looks_ahead, robots.ranges, i, dx, dy,
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _clearance_on_the_way(i, x, y, robots, geometry, p):
-    """Smallest clearance of the points between robot i's last pose and (x, y), without the end, metres."""
-    clearance = np.float32(np.inf)
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+def _clearance_on_the_way(i, x, y, clearance, robots, geometry, p):
+    """`clearance` or, where it is smaller, that of points between (x, y) and robot i's pose, metres."""
     for k in range(1, p.path_samples):
         part = np.float32(k) / np.float32(p.path_samples)
-        px = robots.poses[i, 0] + part * (x - robots.poses[i, 0])
-        py = robots.poses[i, 1] + part * (y - robots.poses[i, 1])
+        px = x + part * (robots.poses[i, 0] - x)
+        py = y + part * (robots.poses[i, 1] - y)
         here = clearance_at(px, py, robots.records[i].map, geometry.bounds, geometry.circles, geometry.boxes)
         clearance = min(clearance, here)
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
 def _reward(i, outcome, before, robots, p):
     """Write robot i's reward and its terms for a step that began `before` metres from the target."""
-    terms = robots.terms[i]
-    terms[:] = ZERO
+    terms = robots.terms
+    for k in range(terms.shape[1]):
+        terms[i, k] = ZERO
     if outcome == ARRIVAL:
-        terms[0] = p.arrival_reward
+        terms[i, 0] = p.arrival_reward
     elif outcome == COLLISION:
-        terms[1] = p.collision_reward
+        terms[i, 1] = p.collision_reward
     else:
         now = robots.records[i].distance
         gained = p.progress * (before - now)
         if p.reward == BASIC:
-            terms[2] = gained
+            terms[i, 2] = gained
         else:
             ratio = MAX_RATIO if now * MAX_RATIO <= before else before / now
-            terms[2] = gained * np.float32(2.0**ratio)
+            terms[i, 2] = gained * np.float32(2.0**ratio)
             safety = ZERO
             if p.reward == CLEARANCE:
-                ahead = robots.ranges[i, p.ahead_first]
-                for k in range(p.ahead_first + 1, p.ahead_last):
-                    ahead = min(ahead, robots.ranges[i, k])
-                safety = ahead / p.range
+                safety = nearest_of(robots.ranges, i, p.ahead_first, p.ahead_last) / p.range
             elif p.reward == ALIGNMENT:
                 dx = robots.targets[i, 0] - robots.poses[i, 0]
                 dy = robots.targets[i, 1] - robots.poses[i, 1]
                 safety = ONE - abs(_bearing(dx, dy, robots.poses[i, 2])) / PI
-            terms[3] = -p.penalty * (ONE - safety)
-    robots.rewards[i] = terms[0] + terms[1] + terms[2] + terms[3]
+            terms[i, 3] = -p.penalty * (ONE - safety)
+    robots.rewards[i] = terms[i, 0] + terms[i, 1] + terms[i, 2] + terms[i, 3]
     robots.records[i].attempt_reward += robots.rewards[i]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def step_robots(state, robots, geometry, parameters):
     """Everything that follows the physics of a step.
 
@@ -303,11 +305,7 @@ def step_robots(state, robots, geometry, parameters):
     records = robots.records
     for i in range(records.shape[0]):
         if records[i].parked:
-            robots.outcomes[i] = NONE
-            robots.rewards[i] = ZERO
-            robots.terms[i, :] = ZERO
-            robots.terminations[i] = False
-            robots.truncations[i] = False
+            _nothing_happened(i, robots)
             continue
         if robots.outcomes[i] != NONE:
             _forget_attempt(records[i])
@@ -316,20 +314,23 @@ def step_robots(state, robots, geometry, parameters):
         y = np.float32(state[i, 1] - geometry.origins[tile, 1])
         if abs(state[i, 2]) > math.pi:
             state[i, 2] -= 2.0 * math.pi * math.floor((state[i, 2] + math.pi) / (2.0 * math.pi))
-        on_the_way = _clearance_on_the_way(i, x, y, robots, geometry, p)
+        last_x = robots.poses[i, 0]
+        last_y = robots.poses[i, 1]
         robots.poses[i, 0] = x
         robots.poses[i, 1] = y
         robots.poses[i, 2] = np.float32(state[i, 2])
 
-        clearance = min(_sense(i, robots, geometry, p, dx, dy), on_the_way) - p.radius
-        nearest = robots.ranges[i, 0]
-        for k in range(1, robots.ranges.shape[1]):
-            nearest = min(nearest, robots.ranges[i, k])
+        clearance = _sense(i, robots, geometry, p, dx, dy)
+        if p.path_samples > 1:
+            clearance = _clearance_on_the_way(i, last_x, last_y, clearance, robots, geometry, p)
+        clearance -= p.radius
+        nearest = nearest_of(robots.ranges, i, 0, robots.ranges.shape[1])
         before = records[i].distance
         records[i].distance = _distance_to_target(i, robots)
         records[i].steps += 1
         records[i].path_length += p.max_linear * records[i].linear * p.period
-        records[i].min_clearance = min(records[i].min_clearance, clearance)
+        if records[i].steps == 1 or clearance < records[i].min_clearance:
+            records[i].min_clearance = clearance
 
         outcome = NONE
         if records[i].distance < p.arrival_distance:
@@ -345,10 +346,11 @@ def step_robots(state, robots, geometry, parameters):
 
         if outcome == ARRIVAL:
             _draw_target(i, robots, geometry, p)
-        _observe(i, robots, geometry, p, robots.observations[i])
+        _observe(i, robots, geometry, p)
         if outcome in (COLLISION, TIMEOUT):
-            robots.final_observations[i, :] = robots.observations[i]
+            for k in range(robots.observations.shape[1]):
+                robots.final_observations[i, k] = robots.observations[i, k]
             _draw_start(i, robots, geometry, p, state)
             _draw_target(i, robots, geometry, p)
             _sense(i, robots, geometry, p, dx, dy)
-            _observe(i, robots, geometry, p, robots.observations[i])
+            _observe(i, robots, geometry, p)
