@@ -11,9 +11,10 @@ import {
   useComputedColorScheme,
 } from '@mantine/core'
 import { useQueryClient } from '@tanstack/react-query'
-import { type ReactNode, useEffect, useRef, useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
+import { useStatus } from '../api/useStatus'
 import { IconMaximize } from './icons'
 import classes from './LiveView.module.css'
 
@@ -33,7 +34,8 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
   const watching = useWatching()
   const active = state === 'running' || state === 'stopping'
   const { live, change } = useLive(runId, active && watching)
-  const overlay = overlayOf(state, live)
+  const { data: status } = useStatus()
+  const overlay = overlayOf(state, status?.workers.length, live)
   return (
     <div>
       <div
@@ -52,12 +54,7 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
           />
         )}
         {overlay && (
-          <div
-            className={classes.overlay}
-            role="status"
-            data-testid="live-overlay"
-            data-clear={active || undefined}
-          >
+          <div className={classes.overlay} role="status" data-testid="live-overlay">
             {overlay}
           </div>
         )}
@@ -79,11 +76,13 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
   )
 }
 
-/** What lies over the picture while there is none. */
-function overlayOf(state: RunState, live: LiveState | undefined): ReactNode {
+/** What stands in place of the picture; while the run goes on, the picture itself says what it waits for. */
+function overlayOf(state: RunState, workers: number | undefined, live: LiveState | undefined): string | null {
   switch (state) {
     case 'queued':
-      return 'Waiting for a free worker. The robots appear here as soon as one takes this run.'
+      return workers === 0
+        ? 'No worker is there to take this run. Start one (mapless worker), and the robots appear here.'
+        : 'Waiting for a free worker. The robots appear here as soon as one takes this run.'
     case 'completed':
       return 'This run is complete; its policy is among the checkpoints below.'
     case 'stopped':
@@ -91,9 +90,7 @@ function overlayOf(state: RunState, live: LiveState | undefined): ReactNode {
     case 'failed':
       return 'This run failed; the event log says why.'
     default:
-      if (!live) return 'Connecting …'
-      if (!live.status.connected) return 'Waiting for the worker to connect …'
-      return live.status.receiving ? null : 'Waiting for the first frame …'
+      return live ? null : 'Connecting …'
   }
 }
 

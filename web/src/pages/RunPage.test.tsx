@@ -1,6 +1,6 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { checkpoints, experiment, live, NOW, runDetail } from '../testing/examples'
+import { checkpoints, experiment, live, NOW, runDetail, status } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, startServer } from '../testing/server'
 
@@ -65,7 +65,7 @@ test('a choice about the view shows at once and is sent with the others', async 
   await waitFor(() => expect(within(controls).getByRole('radio', { name: '5×' })).toBeEnabled())
   await user.click(within(controls).getByRole('radio', { name: '5×' }))
   await waitFor(() => expect(server.changes).toHaveLength(1))
-  const { status, ...settings } = live
+  const { status: _, ...settings } = live
   expect(server.changes[0]).toEqual({ route: 'PUT /api/runs/run1/live', body: { ...settings, speed: 5 } })
 })
 
@@ -79,6 +79,16 @@ test.each([
   open('/runs/run1')
   expect(await screen.findByTestId('live-overlay')).toHaveTextContent(text)
   expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
+})
+
+test('a queued run that nobody will take says so', async () => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1': { ...runDetail, state: 'queued' },
+    'GET /api/status': { ...status, workers: [], running: 0, queued: 1 },
+  })
+  open('/runs/run1')
+  await waitFor(() => expect(screen.getByTestId('live-overlay')).toHaveTextContent('No worker is there'))
 })
 
 test('a failed run says why, and can be resumed', async () => {
