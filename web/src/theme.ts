@@ -55,7 +55,9 @@ export const theme = createTheme({
     Tooltip: { defaultProps: { openDelay: 300, withArrow: true } },
     Modal: { defaultProps: { centered: true } },
     Menu: { defaultProps: { position: 'bottom-end', shadow: 'md', width: 190 } },
-    Table: { defaultProps: { verticalSpacing: 7, horizontalSpacing: 'sm' } },
+    Table: {
+      defaultProps: { verticalSpacing: 7, horizontalSpacing: 'sm', borderColor: 'var(--mapless-line)' },
+    },
   },
 })
 
@@ -67,7 +69,6 @@ export const cssVariables: CSSVariablesResolver = () => ({
     '--mapless-page': '#f6f7f7',
     '--mapless-line': '#e1e5e7',
     '--mapless-text-quiet': '#5d6870',
-    '--table-border-color': '#e8ebed',
     '--mantine-color-dimmed': '#5d6870',
     '--mantine-color-text': '#1c2327',
   },
@@ -76,7 +77,6 @@ export const cssVariables: CSSVariablesResolver = () => ({
     '--mapless-page': '#101316',
     '--mapless-line': '#2a3036',
     '--mapless-text-quiet': '#97a1a9',
-    '--table-border-color': '#252b31',
     '--mantine-color-default-border': '#353c43',
     '--mantine-color-dimmed': '#97a1a9',
     '--mantine-color-text': '#dbe0e4',

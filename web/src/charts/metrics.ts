@@ -156,6 +156,7 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
           { name: 'time/simulation', label: 'simulation' },
           { name: 'time/inference', label: 'inference' },
           { name: 'time/update', label: 'update' },
+          { name: 'time/evaluation', label: 'evaluation' },
           { name: 'time/reporting', label: 'reporting' },
         ],
         format: percent,
