@@ -11,7 +11,7 @@ export default defineConfig({
     // The vendors change seldom: a browser keeps them across releases.
     rolldownOptions: {
       output: {
-        advancedChunks: {
+        codeSplitting: {
           groups: [
             { name: 'react', test: /node_modules\/(react|react-dom|react-router|scheduler)\// },
             { name: 'mantine', test: /node_modules\/(@mantine|@floating-ui)\// },
