@@ -44,15 +44,20 @@ endef
 .venv/.dev: requirements-dev.txt .venv/.run
 	$(call install,requirements-dev.txt)
 
+.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py) .venv/.run
+	@echo "Compiling the simulator's kernels ..."
+	@$(BIN)/python -m sim.precompile
+	@touch $@
+
 pages: .venv/.run
 	@$(BIN)/python web/build.py
 
 # --- use -----------------------------------------------------------------------------------------------------------
 
-run: pages
+run: pages .venv/.kernels
 	@exec $(BIN)/mapless up $(ARGS)
 
-test: .venv/.dev pages
+test: .venv/.dev pages .venv/.kernels
 	$(BIN)/python web/build.py run test
 	$(BIN)/python -m pytest $(ARGS)
 
