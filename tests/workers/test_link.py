@@ -1,0 +1,201 @@
+"""The link brings everything to a server that comes and goes, in order, and hears what the server wants."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.server import Server, ServerConnection, serve
+
+from workers.link import Link
+from workers.protocol import CLOSE_FENCED, Batch, Final, Orders
+from workers.reporting import WatchRequest
+from workers.spool import Spool
+
+LEASE = 0.6
+
+
+class Peer:
+    """A server's end of the link: stores what comes, and answers as it is told to."""
+
+    def __init__(self) -> None:
+        self.stored: list[int] = []
+        self.frames: list[bytes] = []
+        self.batches: list[Batch] = []
+        self.paths: list[str] = []
+        self.connection: ServerConnection | None = None
+        self.deaf = threading.Event()
+        self.fence = threading.Event()
+        self._server: Server | None = None
+        self.port = 0
+
+    @property
+    def ack(self) -> int:
+        return max(self.stored, default=0)
+
+    def start(self) -> None:
+        self._server = serve(self._handle, "127.0.0.1", self.port)
+        self.port = self._server.socket.getsockname()[1]
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def stop(self) -> None:
+        assert self._server is not None
+        if self.connection is not None:
+            self.connection.socket.close()
+        self._server.shutdown()
+
+    def _handle(self, connection: ServerConnection) -> None:
+        self.connection = connection
+        assert connection.request is not None
+        self.paths.append(connection.request.path)
+        if self.fence.is_set():
+            connection.close(CLOSE_FENCED)
+            return
+        connection.send(Orders(ack=self.ack).model_dump_json())
+        try:
+            for message in connection:
+                if isinstance(message, bytes):
+                    self.frames.append(message)
+                    continue
+                batch = Batch.model_validate_json(message)
+                self.batches.append(batch)
+                if self.deaf.is_set():
+                    # Received, perhaps even stored, but the answer is lost.
+                    connection.socket.close()
+                    return
+                self.stored += [item.seq for item in batch.items if item.seq > self.ack]
+                connection.send(Orders(ack=self.ack, over=batch.final is not None).model_dump_json())
+        except (ConnectionClosed, OSError):
+            return
+
+
+@pytest.fixture
+def peer() -> Iterator[Peer]:
+    peer = Peer()
+    peer.start()
+    yield peer
+    peer.stop()
+
+
+class Worker:
+    """The worker's end."""
+
+    def __init__(self, directory: Path, port: int) -> None:
+        self.orders: list[Orders] = []
+        self.spool = Spool(directory / "spool", last_seq=0)
+        self.link = Link(f"http://127.0.0.1:{port}", "secret", "run1", 3, self.spool, LEASE, self.orders.append)
+
+    def report(self, count: int) -> None:
+        for _ in range(count):
+            self.spool.metrics(self.spool.last_seq + 1, 0.0, {"a": 1.0})
+            self.link.notify()
+
+
+@pytest.fixture
+def worker(tmp_path: Path, peer: Peer) -> Iterator[Worker]:
+    worker = Worker(tmp_path, peer.port)
+    yield worker
+    worker.link.close()
+    worker.spool.close()
+
+
+def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.01)
+
+
+def test_everything_arrives_in_order_and_the_final_message_comes_last(peer: Peer, worker: Worker) -> None:
+    worker.report(1_300)
+    worker.link.finish(Final(outcome="completed"))
+    assert worker.link.wait(10)
+    assert peer.stored == list(range(1, 1_301))
+    assert [batch.final is not None for batch in peer.batches] == [False] * (len(peer.batches) - 1) + [True]
+    assert peer.batches[-1].items == ()
+    assert worker.spool.acked == 1_300
+    assert set(peer.paths) == {"/api/worker/runs/run1/link?attempt=3"}
+
+
+def test_a_server_restart_loses_nothing_and_doubles_nothing(peer: Peer, worker: Worker) -> None:
+    worker.report(10)
+    until(lambda: worker.spool.acked == 10)
+    peer.stop()
+    worker.report(10)
+    time.sleep(0.3)
+    peer.start()
+    worker.report(10)
+    until(lambda: worker.spool.acked == 30)
+    assert peer.stored == list(range(1, 31))
+
+
+def test_what_was_not_acknowledged_is_sent_again(peer: Peer, worker: Worker) -> None:
+    peer.deaf.set()
+    worker.report(5)
+    until(lambda: len(peer.batches) >= 2)
+    assert worker.spool.acked == 0
+    peer.deaf.clear()
+    until(lambda: worker.spool.acked == 5)
+    assert peer.stored == [1, 2, 3, 4, 5]
+
+
+def test_the_lease_is_renewed_while_the_trainer_says_nothing(peer: Peer, worker: Worker) -> None:
+    until(lambda: len(peer.batches) >= 3, seconds=5)
+    assert all(batch == Batch() for batch in peer.batches)
+
+
+def test_a_fenced_link_ends_and_says_so(peer: Peer, worker: Worker) -> None:
+    until(lambda: peer.connection is not None)
+    assert peer.connection is not None
+    peer.connection.close(CLOSE_FENCED)
+    assert worker.link.wait(5)
+    assert worker.link.fenced()
+
+
+def test_a_link_that_is_fenced_on_arrival_ends_too(tmp_path: Path, peer: Peer) -> None:
+    peer.fence.set()
+    worker = Worker(tmp_path, peer.port)
+    assert worker.link.wait(5)
+    assert worker.link.fenced()
+    worker.link.close()
+    worker.spool.close()
+
+
+def test_orders_reach_the_worker_whole(peer: Peer, worker: Worker) -> None:
+    until(lambda: peer.connection is not None and worker.orders != [])
+    wish = Orders(ack=0, stop=True, watch=WatchRequest(mode="training", robots=3))
+    assert peer.connection is not None
+    peer.connection.send(wish.model_dump_json())
+    until(lambda: wish in worker.orders)
+
+
+def test_frames_overtake_and_the_oldest_are_dropped_while_there_is_no_server(peer: Peer, worker: Worker) -> None:
+    until(lambda: worker.orders != [])
+    worker.link.frame(b"first")
+    until(lambda: peer.frames == [b"first"])
+    peer.stop()
+    for number in range(100):
+        worker.link.frame(b"%d" % number)
+    peer.start()
+
+    def fresh_frame_arrives() -> bool:
+        worker.link.frame(b"fresh")
+        return b"fresh" in peer.frames
+
+    until(fresh_frame_arrives)
+    assert len(peer.frames) < 50
+
+
+def test_closing_ends_the_thread_whether_or_not_there_is_a_server(tmp_path: Path, peer: Peer) -> None:
+    peer.stop()
+    worker = Worker(tmp_path, peer.port)
+    worker.report(3)
+    time.sleep(0.1)
+    started = time.monotonic()
+    worker.link.close()
+    assert time.monotonic() - started < 2
+    assert worker.link.done
+    worker.spool.close()
+    peer.start()

@@ -1,0 +1,71 @@
+"""What a training reports lies in a file first, numbered, until the server has it."""
+
+from math import inf, nan
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from workers.protocol import EventItem, MetricItem
+from workers.spool import Spool
+
+
+def numbers(spool: Spool, limit: int = 100) -> list[int]:
+    return [item.seq for item in spool.pending(limit)]
+
+
+def test_items_are_numbered_from_what_the_server_has_and_wait_until_acknowledged(tmp_path: Path) -> None:
+    spool = Spool(tmp_path / "spool", last_seq=40)
+    assert [spool.metrics(step, 0.0, {"a": 1.0}) for step in (10, 20, 30)] == [41, 42, 43]
+    assert numbers(spool) == [41, 42, 43]
+    assert numbers(spool, limit=2) == [41, 42]
+    spool.acknowledge(42)
+    assert (numbers(spool), spool.acked, spool.last_seq) == ([43], 42, 43)
+    spool.acknowledge(41)
+    assert numbers(spool) == [43]
+
+
+def test_metrics_and_events_keep_their_order_and_content(tmp_path: Path) -> None:
+    spool = Spool(tmp_path / "spool", last_seq=0)
+    spool.metrics(10, 5.0, {"a": 0.5, "b": nan, "c": inf})
+    spool.event(10, "warning", "the robot\nis stuck é")
+    first, second = spool.pending()
+    assert first == MetricItem(seq=1, step=10, at=5.0, values={"a": 0.5, "b": None, "c": None})
+    assert isinstance(second, EventItem)
+    assert (second.seq, second.level, second.message) == (2, "warning", "the robot\nis stuck é")
+
+
+def test_a_line_torn_by_a_crash_is_forgotten_and_its_number_given_again(tmp_path: Path) -> None:
+    path = tmp_path / "spool"
+    spool = Spool(path, last_seq=0)
+    spool.metrics(10, 0.0, {"a": 1.0})
+    spool.metrics(20, 0.0, {"a": 2.0})
+    spool.close()
+    whole = path.read_bytes()
+    for cut in range(len(whole) // 2 + 1, len(whole)):
+        path.write_bytes(whole[:cut])
+        again = Spool(path, last_seq=0)
+        assert numbers(again) == [1]
+        assert again.metrics(30, 0.0, {"a": 3.0}) == 2
+        assert [item.step for item in again.pending()] == [10, 30]
+        again.close()
+
+
+@given(st.lists(st.one_of(st.just("put"), st.integers(0, 3)), max_size=60), st.integers(1, 5))
+def test_whatever_the_order_of_events_nothing_is_lost_doubled_or_swapped(
+    tmp_path_factory: pytest.TempPathFactory, actions: list[str | int], limit: int
+) -> None:
+    spool = Spool(tmp_path_factory.mktemp("spool") / "spool", last_seq=0)
+    put = received = 0
+    for action in actions:
+        if action == "put":
+            put = spool.metrics(put, 0.0, {})
+        else:
+            # The server takes in what is pending, and its acknowledgement covers some of it.
+            pending = numbers(spool, limit)
+            assert pending == list(range(received + 1, min(put, received + limit) + 1))
+            received += min(len(pending), int(action))
+            spool.acknowledge(received)
+    assert numbers(spool, 100) == list(range(received + 1, put + 1))
+    spool.close()
