@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from workers.client import ServerClient
-from workers.errors import ServerUnavailableError
+from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
 from workers.link import Link
 from workers.pipe import CheckpointReport, Control, Ended, EventReport, FrameReport, Job, MetricsReport, Report
 from workers.protocol import Claim, Final, FinalOutcome, Orders
@@ -58,6 +58,7 @@ class Attempt:
         self._told = Control(stop=False, watch=None)
         self._telling = threading.Lock()
         self._ended: Ended | None = None
+        self._broken: str | None = None
         self._trainer: TrainerHandle | None = None
         self._last_call: float | None = None
         self._step = claim.checkpoint.step if claim.checkpoint else 0
@@ -99,6 +100,8 @@ class Attempt:
             resume = self._fetch_checkpoint()
         except ServerUnavailableError:
             return Final(outcome="released")
+        except (RunRefusedError, RequestRefusedError) as error:
+            return Final(outcome="failed", error=f"The checkpoint to go on from cannot be fetched: {error}")
         if self._link.fenced():
             return None
         trainer.train(
@@ -118,8 +121,8 @@ class Attempt:
             return None
         trainer.close()
         final = self._final(trainer, killed)
-        while final.outcome != "failed" and not self._uploads.idle and not self._link.fenced():
-            self._changed.wait(_POLL_SECONDS)
+        while not self._uploads.idle and not self._link.fenced():
+            time.sleep(_POLL_SECONDS)
             if self._given_up():
                 return None
         if self._uploads.refusal is not None:
@@ -147,7 +150,7 @@ class Attempt:
         """Wait for the trainer's end, or bring it about; returns whether it had to be killed after a stop."""
         deadline: float | None = None
         while self._ended is None and trainer.alive:
-            if self._link.fenced() or self._uploads.refusal is not None:
+            if self._link.fenced() or self._uploads.refusal is not None or self._broken is not None:
                 trainer.kill()
                 return False
             if self._stop_wanted():
@@ -167,6 +170,8 @@ class Attempt:
     def _final(self, trainer: TrainerHandle, killed: bool) -> Final:
         """What the end of the trainer means for the run."""
         ended = self._ended
+        if self._broken is not None:
+            return Final(outcome="lost", error=self._broken)
         if ended is not None and ended.outcome == "completed":
             return Final(outcome="completed")
         if ended is not None and ended.outcome == "failed":
@@ -182,6 +187,16 @@ class Attempt:
     # -- what comes in, on other threads ----------------------------------------------------------------------------------
 
     def _on_report(self, report: Report) -> None:
+        if self._broken is not None:
+            return
+        try:
+            self._take(report)
+        except (OSError, ValueError) as error:
+            # A full disk, say: this attempt can tell no more, and the trainer must not wait for somebody who listens.
+            self._broken = f"The worker could not pass on what the training reports: {error}"
+            self._changed.set()
+
+    def _take(self, report: Report) -> None:
         match report:
             case MetricsReport():
                 self._step = report.step

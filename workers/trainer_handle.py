@@ -87,10 +87,9 @@ class TrainerHandle:
 
     def kill(self) -> None:
         """End it and whatever it has started, at once."""
-        try:
+        # Only while it is ours to name: its number may belong to somebody else once it has been waited for.
+        if self.alive:
             os.killpg(self._process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            return
 
     def close(self) -> None:
         """Kill it if it still runs, and hear the last of its reports."""

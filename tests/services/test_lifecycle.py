@@ -1,0 +1,133 @@
+"""Whatever dies in mid-training, the run goes on by itself, and its curve has no gap and no double point."""
+
+import signal
+import time
+
+import psutil
+
+from server.doorbell import CeleryDoorbell
+from tests.services.stack import LEASE_SECONDS, Service, assert_one_unbroken_curve, tree, trainers, until
+
+# So many steps that no test sees their end.
+ENDLESS = 50_000_000
+
+
+def until_checkpoint(service: Service, run_id: str, beyond: int = 0) -> int:
+    """The step of the first checkpoint beyond a step, once the curve has gone past it."""
+
+    def passed() -> int | None:
+        newest = max(service.checkpoints(run_id), default=0)
+        return newest if newest > beyond and max(service.steps(run_id)) > newest else None
+
+    step = until(passed)
+    assert step is not None
+    return step
+
+
+def until_resumed(service: Service, run_id: str, attempt: int) -> int:
+    """The step from which this attempt went on, once its curve has grown beyond."""
+    until(lambda: service.run(run_id)["attempt"] >= attempt)
+    until(lambda: len(service.resumed_from(run_id)) >= attempt - 1)
+    step = service.resumed_from(run_id)[attempt - 2]
+    until(lambda: max(service.steps(run_id), default=0) > step)
+    return step
+
+
+def test_duplicate_messages_train_once_and_a_stop_keeps_everything(service: Service) -> None:
+    service.start_server()
+    worker = service.start_worker(concurrency=2)
+    (run_id,) = service.launch(ENDLESS)
+    doorbell = CeleryDoorbell(service.environment["MAPLESS_BROKER_URL"])
+    for attempt in (0, 0, 0, 1, 1):
+        doorbell.ring(run_id, attempt, "cpu")
+    doorbell.close()
+    until_checkpoint(service, run_id)
+    assert service.run(run_id)["attempt"] == 1
+    service.api.post(f"/api/runs/{run_id}/stop").raise_for_status()
+    stopped = service.until_state(run_id, "stopped")
+    assert service.checkpoints(run_id)[-1] == stopped["step"] == service.steps(run_id)[-1]
+    service.api.post(f"/api/runs/{run_id}/resume").raise_for_status()
+    assert until_resumed(service, run_id, attempt=2) == stopped["step"]
+    assert_one_unbroken_curve(service, run_id)
+
+    # The worker shuts down: it hands the run back, with a checkpoint, and leaves nothing behind.
+    service.stop(worker)
+    released = service.run(run_id)
+    assert released["state"] == "queued"
+    assert service.checkpoints(run_id)[-1] == released["step"] == service.steps(run_id)[-1]
+    assert list((service.directory / "work").iterdir()) == []
+
+
+def test_a_server_that_dies_and_comes_back_loses_nothing(service: Service) -> None:
+    server = service.start_server()
+    service.start_worker()
+    (run_id,) = service.launch(ENDLESS)
+    until_checkpoint(service, run_id)
+    seen = service.steps(run_id)
+    server.kill()
+    server.wait()
+    time.sleep(2 * LEASE_SECONDS)
+    service.start_server()
+    until(lambda: service.steps(run_id)[-1] > seen[-1])
+    steps = service.steps(run_id)
+    assert steps[: len(seen)] == seen
+    assert max(after - before for before, after in zip(steps, steps[1:], strict=False)) < seen[-1]
+    assert service.run(run_id)["attempt"] == 1
+    service.api.post(f"/api/runs/{run_id}/stop").raise_for_status()
+    stopped = service.until_state(run_id, "stopped")
+    assert service.checkpoints(run_id)[-1] == stopped["step"] == service.steps(run_id)[-1]
+
+
+def test_a_trainer_that_dies_is_replaced_and_the_event_log_says_why(service: Service) -> None:
+    service.start_server()
+    worker = service.start_worker()
+    (run_id,) = service.launch(ENDLESS)
+    checkpoint = until_checkpoint(service, run_id)
+    (trainer,) = trainers(worker.pid)
+    trainer.kill()
+    assert until_resumed(service, run_id, attempt=2) >= checkpoint
+    assert any("SIGKILL" in message for message in service.events(run_id))
+    assert_one_unbroken_curve(service, run_id)
+
+
+def test_a_zombie_is_fenced_out(service: Service) -> None:
+    service.start_server()
+    worker = service.start_worker("first")
+    (run_id,) = service.launch(ENDLESS)
+    until_checkpoint(service, run_id)
+    frozen = tree(worker.pid)
+    for process in frozen:
+        process.suspend()
+    service.start_worker("second")
+    until_resumed(service, run_id, attempt=2)
+    for process in frozen:
+        process.resume()
+    # It wakes up in the belief that the run is its own, is told otherwise, and its trainer ends.
+    until(lambda: "was fenced out" in (service.directory / "first.log").read_text())
+    assert service.run(run_id)["worker"].startswith("second@")
+    assert_one_unbroken_curve(service, run_id)
+
+
+def test_a_worker_killed_under_the_supervisor_comes_back_and_goes_on(service: Service) -> None:
+    supervisor = service.start("up", "server", "up", "--workers", "1")
+    until(lambda: service.api.get("/healthz").status_code == 200)
+    (run_id,) = service.launch(ENDLESS)
+    checkpoint = until_checkpoint(service, run_id)
+    worker = next(child for child in psutil.Process(supervisor.pid).children() if "workers" in child.cmdline())
+    victims = tree(worker.pid)
+    killed_at = time.monotonic()
+    for victim in victims:
+        if victim not in trainers(worker.pid):
+            victim.kill()
+    assert until_resumed(service, run_id, attempt=2) >= checkpoint
+    assert time.monotonic() - killed_at < 30
+    assert not any(victim.is_running() and victim.status() != psutil.STATUS_ZOMBIE for victim in victims)
+    assert_one_unbroken_curve(service, run_id)
+
+    # Ctrl-C: the training is handed back with a checkpoint, and goes on at the next start.
+    supervisor.send_signal(signal.SIGINT)
+    assert supervisor.wait(10) == 0
+    service.start("up", "server", "up", "--workers", "1")
+    until(lambda: service.api.get("/healthz").status_code == 200)
+    until_resumed(service, run_id, attempt=3)
+    assert_one_unbroken_curve(service, run_id)
