@@ -76,9 +76,12 @@ def up(
     port: Port = None,
     data_dir: DataDir = None,
     workers: Annotated[int | None, typer.Option(min=0, help="Trainings side by side [MAPLESS_WORKERS, one a core].")] = None,
+    no_workers: Annotated[
+        bool, typer.Option("--no-workers", help="The server alone; workers are started elsewhere.")
+    ] = False,
 ) -> None:
     """Start the server and its workers, and keep them running."""
-    settings = _settings(host=host, port=port, data_dir=data_dir, workers=workers)
+    settings = _settings(host=host, port=port, data_dir=data_dir, workers=0 if no_workers else workers)
     from server.errors import ServiceError
     from server.supervisor import Supervisor
 

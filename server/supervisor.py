@@ -143,7 +143,8 @@ class Supervisor:
     """
 
     def __init__(self, settings: Settings, say: Callable[[str], None]) -> None:
-        self._settings = settings
+        # Children get it too, and may be given another working directory.
+        self._settings = settings.model_copy(update={"data_dir": settings.data_dir.resolve()})
         self._say = say
         self._signals = 0
 

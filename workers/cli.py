@@ -19,6 +19,7 @@ from workers.frames import Frame
 from workers.presets import PRESETS, preset
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.statistics import wilson_interval
+from workers.worker import worker
 
 app = typer.Typer(help="Train and evaluate policies on this machine.", no_args_is_help=True)
 app.command()(export)
@@ -82,6 +83,9 @@ def describe(result: EvaluationResult) -> str:
         f"{len(arrivals) / count:6.1%} success [{low:.1%}, {high:.1%}] of {count} on {result.suite}, "
         f"{steps} per target, {reward:6.2f} reward per step"
     )
+
+
+app.command()(worker)
 
 
 @app.command()

@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import WorkerError
 from workers.frames import Frame
@@ -161,7 +162,7 @@ def main(descriptor: int, parent: int) -> None:
                 Path(job.resume) if job.resume else None,
                 viewer=LiveViewer(config.task, reporter),
             )
-        except (WorkerError, ValueError) as error:
+        except (WorkerError, SimError, ValueError) as error:
             # Typed, or about a value of the configuration: another attempt would meet it again.
             reporter.end("failed", f"{type(error).__name__}: {error}")
         else:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import select
+from sqlalchemy import select, update
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
@@ -72,9 +72,7 @@ def worker(client: TestClient) -> TestClient:
 
 
 def claim(worker: TestClient, run_id: str, published_attempt: int = 0, name: str = "w") -> Claim:
-    response = worker.post(
-        f"/api/worker/runs/{run_id}/claim", json={"worker": name, "published_attempt": published_attempt}
-    )
+    response = worker.post(f"/api/worker/runs/{run_id}/claim", json={"worker": name, "published_attempt": published_attempt})
     assert response.status_code == 200, response.text
     return Claim.model_validate_json(response.content)
 
@@ -96,15 +94,13 @@ def hear(socket: WebSocketTestSession) -> Orders:
     return Orders.model_validate_json(socket.receive_text())
 
 
-def upload(
-    worker: TestClient, run_id: str, step: int, attempt: int, after_seq: int = 0, archive: bytes = b"an archive", **change: Any
-) -> int:
+def upload(worker: TestClient, run_id: str, step: int, attempt: int, after_seq: int = 0) -> int:
+    """The status of the answer to an upload."""
+    archive = b"an archive"
     head = CheckpointUpload(after_seq=after_seq, sha256=hashlib.sha256(archive).hexdigest(), evaluation=EVALUATION)
-    head = head.model_copy(update=change)
     body = head.model_dump_json().encode() + b"\n" + archive
-    return worker.put(
-        f"/api/worker/runs/{run_id}/checkpoints/{step}", params={"attempt": attempt}, content=body
-    ).status_code
+    response = worker.put(f"/api/worker/runs/{run_id}/checkpoints/{step}", params={"attempt": attempt}, content=body)
+    return int(response.status_code)
 
 
 def steps_of(services: Services, run_id: str) -> list[int]:
@@ -200,8 +196,7 @@ def test_an_old_attempt_is_cut_off_and_changes_nothing(worker: TestClient, run_i
         claim(worker, run_id, published_attempt=1)
         zombie.send_text(Batch(items=metrics((1, 100))).model_dump_json())
         with pytest.raises(WebSocketDisconnect) as closed:
-            while True:
-                zombie.receive_text()
+            zombie.receive_text()
         assert closed.value.code == CLOSE_FENCED
     assert upload(worker, run_id, 100, attempt=1) == 409
     assert steps_of(services, run_id) == []
@@ -348,7 +343,7 @@ def test_deleting_an_experiment_cuts_its_worker_off(client: TestClient, worker: 
 def test_every_message_renews_the_lease(worker: TestClient, run_id: str, services: Services) -> None:
     claim(worker, run_id)
     with services.database.write() as session:
-        session.execute(models.Run.__table__.update().values(lease_until=time.time() + 0.5))
+        session.execute(update(models.Run).values(lease_until=time.time() + 0.5))
     with link(worker, run_id, 1) as socket:
         hear(socket)
         say(socket, Batch())

@@ -2,11 +2,12 @@
 
 import signal
 import time
+from itertools import pairwise
 
 import psutil
 
 from server.doorbell import CeleryDoorbell
-from tests.services.stack import LEASE_SECONDS, Service, assert_one_unbroken_curve, tree, trainers, until
+from tests.services.stack import LEASE_SECONDS, Service, assert_one_unbroken_curve, trainers, tree, until
 
 # So many steps that no test sees their end.
 ENDLESS = 50_000_000
@@ -71,7 +72,7 @@ def test_a_server_that_dies_and_comes_back_loses_nothing(service: Service) -> No
     until(lambda: service.steps(run_id)[-1] > seen[-1])
     steps = service.steps(run_id)
     assert steps[: len(seen)] == seen
-    assert max(after - before for before, after in zip(steps, steps[1:], strict=False)) < seen[-1]
+    assert max(after - before for before, after in pairwise(steps)) < seen[-1]
     assert service.run(run_id)["attempt"] == 1
     service.api.post(f"/api/runs/{run_id}/stop").raise_for_status()
     stopped = service.until_state(run_id, "stopped")
