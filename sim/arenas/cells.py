@@ -1,0 +1,122 @@
+"""Where a robot fits: an arena as a grid of free cells, and which of them hang together. NumPy only."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arenas.geometry import Arena
+
+Mask = NDArray[np.bool_]
+Labels = NDArray[np.int32]
+
+# Edge of a cell, metres. Passages that are wider than a robot's own space by less than 2.5 cells may be missed.
+CELL = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Square cells over an arena, centred as it is; row 0 is the lowest y, column 0 the lowest x."""
+
+    rows: int
+    columns: int
+    cell: float
+
+    @classmethod
+    def over(cls, arena: Arena, cell: float = CELL) -> "Grid":
+        """As many whole cells as fit between the arena's walls."""
+        # A wall that stands on a cell's edge must not lose that cell to rounding.
+        fit = (int(2.0 * half / cell + 1e-9) for half in (arena.half_height, arena.half_width))
+        rows, columns = fit
+        return cls(max(rows, 1), max(columns, 1), cell)
+
+    def xs(self) -> NDArray[np.float64]:
+        """(columns,) x of the cells' centres, metres."""
+        return np.asarray((np.arange(self.columns) + 0.5 - 0.5 * self.columns) * self.cell, dtype=np.float64)
+
+    def ys(self) -> NDArray[np.float64]:
+        """(rows,) y of the cells' centres, metres."""
+        return np.asarray((np.arange(self.rows) + 0.5 - 0.5 * self.rows) * self.cell, dtype=np.float64)
+
+    def window(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
+        """The rows and columns whose centres may lie within `reach` of a point."""
+        low_row, high_row = self._span(y, reach, self.rows)
+        low_column, high_column = self._span(x, reach, self.columns)
+        return slice(low_row, high_row), slice(low_column, high_column)
+
+    def _span(self, centre: float, reach: float, count: int) -> tuple[int, int]:
+        low = int(np.floor((centre - reach) / self.cell + 0.5 * count - 0.5))
+        high = int(np.ceil((centre + reach) / self.cell + 0.5 * count + 0.5))
+        return min(max(low, 0), count), min(max(high, 0), count)
+
+
+def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:
+    """(rows, columns) whether every point of a cell keeps `clearance` from walls and obstacles.
+
+    So a path through free cells, also from corner to corner, keeps the clearance all the way. Each obstacle costs only the
+    cells around it: about 15 microseconds at 10 x 10 m.
+    """
+    grid = Grid.over(arena, cell)
+    reach = clearance + cell / np.sqrt(2.0)  # from a cell's centre to its corner
+    xs, ys = grid.xs(), grid.ys()
+    inside_x = arena.half_width - np.abs(xs) >= clearance + 0.5 * cell - 1e-9
+    inside_y = arena.half_height - np.abs(ys) >= clearance + 0.5 * cell - 1e-9
+    free = inside_y[:, None] & inside_x[None, :]
+    for x, y, radius in arena.circles:
+        rows, columns = grid.window(x, y, radius + reach)
+        square = (xs[columns] - x)[None, :] ** 2 + (ys[rows] - y)[:, None] ** 2
+        free[rows, columns] &= square >= (radius + reach) ** 2
+    for x, y, half_length, half_width, angle in arena.boxes:
+        rows, columns = grid.window(x, y, float(np.hypot(half_length, half_width)) + reach)
+        dx, dy = (xs[columns] - x)[None, :], (ys[rows] - y)[:, None]
+        cos, sin = np.cos(angle), np.sin(angle)
+        along = np.maximum(np.abs(cos * dx + sin * dy) - half_length, 0.0)
+        across = np.maximum(np.abs(cos * dy - sin * dx) - half_width, 0.0)
+        free[rows, columns] &= along**2 + across**2 >= reach**2
+    return free
+
+
+def components(free: Mask) -> tuple[Labels, NDArray[np.int64]]:
+    """Free cells that hang together, over edges or corners.
+
+    Returns:
+        (rows, columns) labels, -1 where blocked, 0 for the largest component, the others by size; and (K,) their sizes in
+        cells.
+    """
+    rows, columns = free.shape
+    padded = np.zeros((rows, columns + 2), dtype=np.int8)
+    padded[:, 1:-1] = free
+    steps = np.diff(padded, axis=1)
+    run_rows, starts = np.nonzero(steps == 1)
+    ends = np.nonzero(steps == -1)[1]
+    roots = _join_runs(run_rows.tolist(), starts.tolist(), ends.tolist())
+    names, of_run = np.unique(roots, return_inverse=True)
+    lengths = ends - starts
+    sizes = np.bincount(of_run, weights=lengths, minlength=len(names)).astype(np.int64)
+    order = np.argsort(-sizes, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    labels = np.full(free.shape, -1, dtype=np.int32)
+    labels[free] = np.repeat(rank[of_run], lengths)
+    return labels, sizes[order]
+
+
+def _join_runs(rows: list[int], starts: list[int], ends: list[int]) -> NDArray[np.int64]:
+    """The root of every horizontal run of free cells, after joining runs that touch; runs come in row-major order."""
+    parent = list(range(len(rows)))
+
+    def find(run: int) -> int:
+        while parent[run] != run:
+            parent[run] = parent[parent[run]]
+            run = parent[run]
+        return run
+
+    above = 0
+    for run, row in enumerate(rows):
+        while rows[above] < row - 1 or (rows[above] == row - 1 and ends[above] < starts[run]):
+            above += 1
+        other = above
+        while other < run and rows[other] == row - 1 and starts[other] <= ends[run]:
+            parent[find(other)] = find(run)
+            other += 1
+    return np.array([find(run) for run in range(len(rows))], dtype=np.int64)

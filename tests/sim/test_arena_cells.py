@@ -1,0 +1,102 @@
+"""Free cells, their components, and rectangles that cover cells."""
+
+from collections import deque
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from sim.arenas import Arena, free_distance
+from sim.arenas.cells import Grid, components, free_mask
+from sim.arenas.rectangles import cover, to_boxes
+
+masks = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12))
+
+
+def flood_sizes(free: np.ndarray) -> list[int]:
+    """Sizes of the 8-connected components, largest first, by plain flood fill."""
+    waiting = {(int(r), int(c)) for r, c in np.argwhere(free)}
+    sizes = []
+    while waiting:
+        queue, size = deque([waiting.pop()]), 0
+        while queue:
+            row, column = queue.popleft()
+            size += 1
+            for near in [(row + i, column + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]:
+                if near in waiting:
+                    waiting.remove(near)
+                    queue.append(near)
+        sizes.append(size)
+    return sorted(sizes, reverse=True)
+
+
+@given(masks)
+def test_components_are_those_of_a_flood_fill(free: np.ndarray) -> None:
+    labels, sizes = components(free)
+    assert sizes.tolist() == flood_sizes(free)
+    assert ((labels >= 0) == free).all()
+    for label, size in enumerate(sizes):
+        part = labels == label
+        assert part.sum() == size
+        assert flood_sizes(part) == [size]
+
+
+def test_the_largest_component_comes_first() -> None:
+    free = np.array([[1, 0, 1, 1], [0, 0, 1, 1]], dtype=bool)
+    labels, sizes = components(free)
+    assert labels.tolist() == [[1, -1, 0, 0], [-1, -1, 0, 0]]
+    assert sizes.tolist() == [4, 1]
+
+
+@given(masks, st.integers(1, 5))
+def test_rectangles_cover_what_is_required_and_nothing_that_is_forbidden(allowed: np.ndarray, drop: int) -> None:
+    required = allowed.copy()
+    required.ravel()[::drop] = False
+    covered = np.zeros_like(allowed)
+    for low_row, low_column, high_row, high_column in cover(required, allowed, 1000):
+        covered[low_row:high_row, low_column:high_column] = True
+    assert (covered | ~required).all()
+    assert (~covered | allowed).all()
+
+
+def test_a_solid_block_is_one_rectangle_and_an_l_two() -> None:
+    block = np.ones((3, 5), dtype=bool)
+    assert cover(block, block, 10).tolist() == [[0, 0, 3, 5]]
+    ell = np.array([[1, 1, 1], [1, 0, 0], [1, 0, 0]], dtype=bool)
+    assert len(cover(ell, ell, 10)) == 2
+
+
+def test_covering_stops_one_beyond_its_limit() -> None:
+    checkerboard = np.indices((20, 20)).sum(axis=0) % 2 == 0
+    assert len(cover(checkerboard, checkerboard, 7)) == 8
+
+
+def test_rectangles_become_boxes_in_metres() -> None:
+    boxes = to_boxes(np.array([[0, 1, 2, 5]]), -1.0, -2.0, 0.5)
+    assert boxes.tolist() == [[0.5, -1.5, 1.0, 0.5, 0.0]]
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32), st.sampled_from([0.05, 0.2, 0.35]))
+def test_every_point_of_a_free_cell_keeps_the_clearance(seed: int, clearance: float) -> None:
+    random = np.random.default_rng(seed)
+    arena = Arena(
+        "random",
+        half_width=2.0,
+        half_height=1.5,
+        circles=np.column_stack([random.uniform(-2, 2, (4, 2)), random.uniform(0.05, 0.4, 4)]),
+        boxes=np.column_stack([random.uniform(-2, 2, (4, 2)), random.uniform(0.05, 0.6, (4, 2)), random.uniform(-4, 4, 4)]),
+    )
+    grid, free = Grid.over(arena), free_mask(arena, clearance)
+    rows, columns = np.nonzero(free)
+    offsets = random.uniform(-0.5, 0.5, (len(rows), 2)) * grid.cell
+    points = np.stack([grid.xs()[columns], grid.ys()[rows]], axis=1) + offsets
+    assert (free_distance(arena, points) >= clearance - 1e-6).all()
+
+
+def test_no_cell_with_room_to_spare_is_lost() -> None:
+    arena = Arena("pillar", circles=np.array([[0.3, -0.2, 0.5]]))
+    grid, free = Grid.over(arena), free_mask(arena, 0.2)
+    centres = np.stack(np.meshgrid(grid.xs(), grid.ys()), axis=-1)
+    assert free[free_distance(arena, centres) >= 0.2 + grid.cell].all()
