@@ -5,28 +5,18 @@ derives from these models is the launch form: `title` and `description` are what
 field under *Advanced*.
 """
 
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
-from pydantic.config import JsonDict
+from pydantic import Field, model_validator
 
-ADVANCED: JsonDict = {"x-advanced": True}
+from sim.arena_file import ArenaFile
+from sim.schema import ADVANCED as ADVANCED
+from sim.schema import HIDDEN
+from sim.schema import Frozen as Frozen
 
 ArenaName = Literal["simple", "complex"]
+FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages"]
 ObservationName = Literal["paper", "improved"]
-
-
-class Frozen(BaseModel):
-    """Base of every configuration model: immutable, and an unknown key is an error rather than ignored."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        validate_default=True,
-        allow_inf_nan=False,
-        # What is read back is always complete, and the generated types say so.
-        json_schema_serialization_defaults_required=True,
-    )
 
 
 class ArenaConfig(Frozen):
@@ -37,6 +27,68 @@ class ArenaConfig(Frozen):
         title="Arena",
         description="Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles.",
     )
+
+
+MAX_MAPS = 4096
+"""Maps of the largest pool; pools of different seeds never share a map."""
+
+
+class GeneratedArenaConfig(Frozen):
+    """A pool of arenas drawn from a seed; the robots are spread over all of them."""
+
+    name: FamilyName = Field(
+        "clutter",
+        title="Arena",
+        description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
+        "warehouse aisles, a maze, or narrow passages.",
+    )
+    difficulty: float = Field(
+        0.5,
+        ge=0.0,
+        le=1.0,
+        title="Difficulty",
+        description="More obstacles and narrower passages: at 1 they are 0.9 m wide for the default robot.",
+    )
+    maps: int = Field(
+        64,
+        ge=1,
+        le=MAX_MAPS,
+        title="Maps",
+        description="Different arenas of the training; with few of them the policy learns them by heart.",
+        json_schema_extra=ADVANCED,
+    )
+    seed: int = Field(
+        0,
+        ge=0,
+        le=2**31 - 1,
+        title="Map seed",
+        description="Which maps; the suites' maps are never among them.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class ImportedArenaConfig(Frozen):
+    """An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash."""
+
+    name: Literal["imported"] = Field("imported", title="Imported", description="Read from a file; see the gallery.")
+    sha256: str = Field(
+        "", pattern="^([0-9a-f]{64})?$", title="Imported arena", description="The hash that the gallery shows."
+    )
+    arena: ArenaFile | None = Field(None, title="Geometry", json_schema_extra=HIDDEN)
+
+    @model_validator(mode="after")
+    def _geometry_is_the_hashed_one(self) -> Self:
+        if self.arena is not None and self.arena.sha256 != self.sha256:
+            raise ValueError(f"the geometry's hash is {self.arena.sha256}, not {self.sha256!r}")
+        return self
+
+    @classmethod
+    def of(cls, arena: ArenaFile) -> Self:
+        """The configuration that carries this arena."""
+        return cls(sha256=arena.sha256, arena=arena)
+
+
+AnyArenaConfig = Annotated[ArenaConfig | GeneratedArenaConfig | ImportedArenaConfig, Field(discriminator="name")]
 
 
 class RobotConfig(Frozen):
@@ -123,7 +175,7 @@ class RewardConfig(Frozen):
 class TaskConfig(Frozen):
     """Everything that defines the environment: arena, robot, LiDAR, observation, reward, limits."""
 
-    arena: ArenaConfig = Field(default_factory=ArenaConfig, title="Arena")
+    arena: AnyArenaConfig = Field(default_factory=ArenaConfig, title="Arena")
     robot: RobotConfig = Field(default_factory=RobotConfig, title="Robot")
     lidar: LidarConfig = Field(default_factory=LidarConfig, title="LiDAR")
     observation: ObservationName = Field(

@@ -2,6 +2,10 @@
 
 SimError
 ├── ArenaError       an arena cannot be built or driven in
+│   └── ArenaFileError       a file is not taken as an arena
+│       ├── ArenaFormatError     it is not what it should be, or holds what cannot be represented
+│       ├── ArenaLimitError      it is larger than we accept
+│       └── NoFreeSpaceError     a robot has no room in it
 ├── PlacementError   a requested pose or target is not in the arena's free space
 └── SuiteError       a suite is unknown, or its content is not what its hash says
 """
@@ -13,6 +17,22 @@ class SimError(Exception):
 
 class ArenaError(SimError):
     """An arena cannot be built, read or driven in."""
+
+
+class ArenaFileError(ArenaError):
+    """A file is not taken as an arena."""
+
+
+class ArenaFormatError(ArenaFileError):
+    """A file is not what it should be, or holds what cannot be represented."""
+
+
+class ArenaLimitError(ArenaFileError):
+    """A file, or the arena in it, is larger than we accept."""
+
+
+class NoFreeSpaceError(ArenaFileError):
+    """There is no room for a robot in an arena."""
 
 
 class PlacementError(SimError):

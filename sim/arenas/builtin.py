@@ -1,11 +1,10 @@
-"""The two fixed arenas of the paper's experiments, 10 x 10 m, and the way from a configuration to arenas."""
+"""The two fixed arenas of the paper's experiments, 10 x 10 m."""
 
 from functools import cache
 
 import numpy as np
 
 from sim.arenas.geometry import Arena
-from sim.config import ArenaConfig
 
 # The lineage of the paper's environment draws targets within 3.6 m of the centre and starts within 4.5 m.
 _START_INSET = 0.5
@@ -54,9 +53,4 @@ def complex_arena() -> Arena:
     )
 
 
-_BUILTIN = {"simple": simple_arena, "complex": complex_arena}
-
-
-def build_arenas(config: ArenaConfig) -> tuple[Arena, ...]:
-    """The arenas that a configuration names: one for a fixed arena; robots of a pool meet all of its arenas."""
-    return (_BUILTIN[config.name](),)
+BUILTIN = {"simple": simple_arena, "complex": complex_arena}

@@ -1,0 +1,76 @@
+"""Between our own format and the geometry that the simulator drives in; and whether a robot can drive there at all."""
+
+import math
+
+import numpy as np
+
+from sim.arena_file import ArenaFile, Box, Circle
+from sim.arenas.cells import CELL, components, free_mask
+from sim.arenas.geometry import Arena
+from sim.errors import NoFreeSpaceError
+
+MIN_FREE_AREA = 1.0
+"""Square metres that must hang together for a robot to drive in."""
+
+IMPORT_CLEARANCE = 0.2
+"""What a robot needs around its centre for that, metres: the Burger's collision distance."""
+
+# Cells along the longer side of a large hall: through larger ones the check stays well below a second.
+_MAX_CELLS = 1000
+
+
+def to_arena(document: ArenaFile) -> Arena:
+    """The geometry of an arena file."""
+    return Arena(
+        document.name,
+        half_width=0.5 * document.width,
+        half_height=0.5 * document.height,
+        circles=np.array([(c.x, c.y, c.radius) for c in document.circles], dtype=np.float64).reshape(-1, 3),
+        boxes=np.array(
+            [(b.x, b.y, 0.5 * b.length, 0.5 * b.width, math.radians(b.angle)) for b in document.boxes], dtype=np.float64
+        ).reshape(-1, 5),
+    )
+
+
+def to_document(arena: Arena) -> ArenaFile:
+    """An arena as a file, for any arena that is small enough for one; lengths to a tenth of a millimetre."""
+    return ArenaFile(
+        name=arena.name,
+        width=round(2.0 * arena.half_width, 4),
+        height=round(2.0 * arena.half_height, 4),
+        circles=tuple(
+            Circle(x=round(x, 4), y=round(y, 4), radius=round(radius, 4)) for x, y, radius in arena.circles.tolist()
+        ),
+        boxes=tuple(
+            Box(
+                x=round(x, 4),
+                y=round(y, 4),
+                length=round(2.0 * half_length, 4),
+                width=round(2.0 * half_width, 4),
+                angle=round(math.degrees(angle) % 360.0, 4),
+            )
+            for x, y, half_length, half_width, angle in arena.boxes.tolist()
+        ),
+    )
+
+
+def free_area(arena: Arena, clearance: float = IMPORT_CLEARANCE) -> float:
+    """Square metres in which the robot's centre can move without leaving the largest part of the free space."""
+    cell = max(CELL, 2.0 * max(arena.half_width, arena.half_height) / _MAX_CELLS)
+    _, sizes = components(free_mask(arena, clearance, cell))
+    return float(sizes[0]) * cell * cell if len(sizes) else 0.0
+
+
+def check_free_space(document: ArenaFile) -> float:
+    """The free area of an imported arena, square metres.
+
+    Raises:
+        NoFreeSpaceError: there is less than `MIN_FREE_AREA` in one piece.
+    """
+    area = free_area(to_arena(document))
+    if area < MIN_FREE_AREA:
+        raise NoFreeSpaceError(
+            f"{document.name}: a robot that keeps {IMPORT_CLEARANCE} m from everything has {area:.1f} square metres in one "
+            f"piece, and needs {MIN_FREE_AREA:g}. Check the scale and, of a map, its thresholds and `negate`."
+        )
+    return area

@@ -1,0 +1,124 @@
+"""Generated arenas: always passable, always the same, and never those of a suite."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.arenas import Arena, build_arenas, free_distance
+from sim.arenas.cells import Grid, components, free_mask
+from sim.arenas.families import CLEARANCE, FAMILIES, SUITE_SEEDS, generate_arena, pool_seeds
+from sim.config import MAX_MAPS, FamilyName, GeneratedArenaConfig, TaskConfig
+from sim.errors import ArenaError
+from sim.planner import Planner
+
+families = st.sampled_from(sorted(FAMILIES))
+difficulties = st.floats(0.0, 1.0)
+seeds = st.integers(0, 2**63 - 1)
+
+
+def same(one: Arena, other: Arena) -> bool:
+    return np.array_equal(one.circles, other.circles) and np.array_equal(one.boxes, other.boxes)
+
+
+@settings(max_examples=150, deadline=None)
+@given(families, difficulties, seeds)
+def test_every_arena_hangs_together_and_reaches_from_wall_to_wall(family: FamilyName, difficulty: float, seed: int) -> None:
+    arena = generate_arena(family, difficulty, seed)
+    labels, sizes = components(free_mask(arena, CLEARANCE))
+    assert sizes[0] >= 0.98 * sizes.sum()
+    assert sizes[0] * 0.05**2 > 8.0  # square metres, of 100
+    rows, columns = np.nonzero(labels == 0)
+    assert np.ptp(rows) * 0.05 > 7.0
+    assert np.ptp(columns) * 0.05 > 7.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(families, difficulties, seeds)
+def test_there_is_a_path_between_any_two_places(family: FamilyName, difficulty: float, seed: int) -> None:
+    arena = generate_arena(family, difficulty, seed)
+    labels, _ = components(free_mask(arena, CLEARANCE))
+    grid, random = Grid.over(arena), np.random.default_rng(seed)
+    rows, columns = np.nonzero(labels == 0)
+    start, target = ((grid.xs()[columns[i]], grid.ys()[rows[i]]) for i in random.integers(len(rows), size=2))
+    path = Planner(arena, CLEARANCE).shortest_path(start, target)
+    assert path.length >= np.hypot(target[0] - start[0], target[1] - start[1]) - 1e-9
+    assert free_distance(arena, path.points).min() >= CLEARANCE - 1e-6
+
+
+@settings(max_examples=60, deadline=None)
+@given(families, difficulties, seeds)
+def test_obstacles_stay_inside_the_walls(family: FamilyName, difficulty: float, seed: int) -> None:
+    arena = generate_arena(family, difficulty, seed)
+    assert 0 < len(arena.circles) + len(arena.boxes) < 120
+    x, y, radius = arena.circles.T
+    assert (np.maximum(np.abs(x), np.abs(y)) + radius <= 5.0 + 1e-9).all()
+    x, y, half_length, half_width, angle = arena.boxes.T
+    cos, sin = np.abs(np.cos(angle)), np.abs(np.sin(angle))
+    assert (np.abs(x) + cos * half_length + sin * half_width <= 5.0 + 1e-9).all()
+    assert (np.abs(y) + sin * half_length + cos * half_width <= 5.0 + 1e-9).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(families, difficulties, st.floats(5.0, 20.0), st.floats(0.1, 0.45), seeds)
+def test_other_sizes_and_robots_are_served_as_well(
+    family: FamilyName, difficulty: float, size: float, clearance: float, seed: int
+) -> None:
+    arena = generate_arena(family, difficulty, seed, size=size, clearance=clearance)
+    _, sizes = components(free_mask(arena, clearance))
+    assert sizes[0] >= 0.98 * sizes.sum()
+    assert arena.half_width == arena.half_height == size / 2
+
+
+@given(families, difficulties, seeds)
+@settings(max_examples=20, deadline=None)
+def test_the_same_three_give_the_same_arena(family: FamilyName, difficulty: float, seed: int) -> None:
+    assert same(generate_arena(family, difficulty, seed), generate_arena(family, difficulty, seed))
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_another_seed_is_another_arena_and_difficulty_fills_it(family: FamilyName) -> None:
+    easy, other, hard = (generate_arena(family, difficulty, seed) for difficulty, seed in ((0.1, 1), (0.1, 2), (0.9, 1)))
+    assert not same(easy, other)
+    narrow = np.mean([free_mask(generate_arena(family, 1.0, seed), 0.6).mean() for seed in range(5)])
+    wide = np.mean([free_mask(generate_arena(family, 0.0, seed), 0.6).mean() for seed in range(5)])
+    assert narrow < wide
+    assert not same(easy, hard)
+
+
+def test_no_training_ever_meets_a_map_of_a_suite_and_pools_of_different_seeds_are_disjoint() -> None:
+    last = pool_seeds(2**31 - 1, MAX_MAPS)
+    assert last[-1] < SUITE_SEEDS[0]
+    assert SUITE_SEEDS[-1] < 2**63
+    assert pool_seeds(4, MAX_MAPS)[-1] < pool_seeds(5, 1)[0]
+
+
+def test_a_pool_has_as_many_maps_as_asked_for() -> None:
+    pool = build_arenas(GeneratedArenaConfig(name="rooms", maps=3, seed=5))
+    assert len(pool) == 3
+    assert not same(pool[0], pool[1])
+    assert same(pool[1], generate_arena("rooms", 0.5, pool_seeds(5, 3)[1]))
+
+
+def test_a_fixed_arena_has_no_difficulty_and_stays_as_it_was_written() -> None:
+    assert TaskConfig.model_validate({"arena": {"name": "simple"}}) == TaskConfig()
+    with pytest.raises(ValueError, match="difficulty"):
+        TaskConfig.model_validate({"arena": {"name": "simple", "difficulty": 0.5}})
+    task = TaskConfig.model_validate({"arena": {"name": "maze", "difficulty": 0.7}})
+    assert TaskConfig.model_validate_json(task.model_dump_json()) == task
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ({"difficulty": 1.1}, "difficulty"),
+        ({"difficulty": float("nan")}, "difficulty"),
+        ({"seed": -1}, "seed"),
+        ({"size": 3.0}, "wide"),
+        ({"clearance": 2.0}, "clearances"),
+        ({"family": "swamp"}, "choose one of clutter"),
+    ],
+)
+def test_arguments_out_of_range_are_refused(arguments: dict[str, object], reason: str) -> None:
+    with pytest.raises(ArenaError, match=reason):
+        generate_arena(**({"family": "clutter", "difficulty": 0.5, "seed": 1} | arguments))  # type: ignore[arg-type]
