@@ -1,0 +1,89 @@
+"""Any arena file that we know, recognised by its content."""
+
+from collections.abc import Mapping
+from pathlib import Path, PurePath
+
+from sim.arena_file import ArenaFile
+from sim.arenas.document import check_free_space
+from sim.arenas.files.limits import MAX_IMAGE_BYTES, MAX_SDF_BYTES, MAX_TEXT_BYTES
+from sim.arenas.files.own_yaml import load_yaml, read_own
+from sim.arenas.files.ros_map import parse_info, read_map
+from sim.arenas.files.sdf import read_sdf
+from sim.errors import ArenaFileError, ArenaFormatError, ArenaLimitError
+
+_IMAGES = (".pgm", ".png")
+_WORLDS = (".world", ".sdf", ".xml")
+_TEXTS = (".yaml", ".yml", ".json")
+_LIMITS = (
+    dict.fromkeys(_IMAGES, MAX_IMAGE_BYTES) | dict.fromkeys(_WORLDS, MAX_SDF_BYTES) | dict.fromkeys(_TEXTS, MAX_TEXT_BYTES)
+)
+_KNOWN = "an arena in our own YAML, a Gazebo .world or .sdf, or a ROS map (.yaml with its .pgm or .png)"
+
+
+def read_arena(files: Mapping[str, bytes]) -> ArenaFile:
+    """The arena in a file, or in a map's YAML and image.
+
+    Args:
+        files: content by file name: one, or for a ROS map two.
+
+    Raises:
+        ArenaFileError: they are refused; the message says why and what to do.
+    """
+    images = {name: content for name, content in files.items() if _suffix(name) in _IMAGES}
+    others = [name for name in files if name not in images]
+    if len(others) != 1:
+        raise ArenaFormatError(f"give {_KNOWN}; here are {len(others)} files besides images")
+    name = others[0]
+    content = files[name]
+    if _suffix(name) not in _LIMITS:
+        raise ArenaFormatError(f"{name}: not a kind of file that is read: give {_KNOWN}")
+    if content.startswith((b"PK\x03\x04", b"\x1f\x8b")):
+        raise ArenaFormatError(f"{name}: a compressed archive; unpack it and give the files in it")
+    if _suffix(name) in _WORLDS:
+        document = read_sdf(name, content)
+    elif "image" in (mapping := load_yaml(name, content)):
+        document = _read_map(name, mapping, images)
+    else:
+        document = read_own(name, content)
+    check_free_space(document)
+    return document
+
+
+def _read_map(name: str, mapping: dict[str, object], images: Mapping[str, bytes]) -> ArenaFile:
+    info = parse_info(name, mapping)
+    if info.image not in images:
+        raise ArenaFormatError(f"{name}: a ROS map needs its image: give {info.image} together with it")
+    return read_map(name, info, images[info.image])
+
+
+def load_arena(*paths: Path) -> ArenaFile:
+    """The arena in a file on disk; a map's image is looked for beside its YAML if it is not given.
+
+    Raises:
+        ArenaFileError: the files are refused; nothing larger than its limit is read.
+    """
+    files = {path.name: _content(path) for path in paths}
+    if len(files) == 1 and len(paths) == 1 and _suffix(paths[0].name) in _TEXTS:
+        mapping = load_yaml(paths[0].name, files[paths[0].name])
+        if "image" in mapping:
+            image = parse_info(paths[0].name, mapping).image
+            files[image] = _content(paths[0].parent / image)
+    return read_arena(files)
+
+
+def _content(path: Path) -> bytes:
+    limit = _LIMITS.get(_suffix(path.name))
+    if limit is None:
+        raise ArenaFormatError(f"{path.name}: not a kind of file that is read: give {_KNOWN}")
+    try:
+        if not path.is_file():
+            raise ArenaFileError(f"{path}: no such file")
+        if path.stat().st_size > limit:
+            raise ArenaLimitError(f"{path.name}: {path.stat().st_size / 2**20:.0f} MiB; at most {limit // 2**20} are read")
+        return path.read_bytes()
+    except OSError as error:
+        raise ArenaFileError(f"{path}: {error.strerror or error}") from error
+
+
+def _suffix(name: str) -> str:
+    return PurePath(name).suffix.lower()
