@@ -432,12 +432,10 @@ export interface components {
          */
         "ArenaConfig-Input": {
             /**
-             * Arena
-             * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles.
-             * @default simple
+             * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "simple" | "complex";
+            name: "complex" | "simple";
         };
         /**
          * ArenaConfig
@@ -445,12 +443,144 @@ export interface components {
          */
         "ArenaConfig-Output": {
             /**
-             * Arena
-             * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles.
-             * @default simple
+             * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "simple" | "complex";
+            name: "complex" | "simple";
+        };
+        /**
+         * Mapless arena
+         * @description A walled rectangle with obstacles. Metres; the origin is the middle, x to the right, y up.
+         */
+        "ArenaFile-Input": {
+            /**
+             * Boxes
+             * @default []
+             */
+            boxes: components["schemas"]["Box-Input"][];
+            /**
+             * Circles
+             * @default []
+             */
+            circles: components["schemas"]["Circle"][];
+            /**
+             * Format
+             * @description This format and its version.
+             * @default mapless-arena/1
+             * @constant
+             */
+            format: "mapless-arena/1";
+            /**
+             * Height
+             * @description Between the walls along y, metres.
+             */
+            height: number;
+            /**
+             * Name
+             * @description What people call it.
+             */
+            name: string;
+            /** @description Where a scenario starts, if the arena comes with one. */
+            start?: components["schemas"]["Start-Input"] | null;
+            /** @description Where that scenario leads. */
+            target?: components["schemas"]["Target"] | null;
+            /**
+             * Width
+             * @description Between the walls along x, metres.
+             */
+            width: number;
+        };
+        /**
+         * Mapless arena
+         * @description A walled rectangle with obstacles. Metres; the origin is the middle, x to the right, y up.
+         */
+        "ArenaFile-Output": {
+            /**
+             * Boxes
+             * @default []
+             */
+            boxes: components["schemas"]["Box-Output"][];
+            /**
+             * Circles
+             * @default []
+             */
+            circles: components["schemas"]["Circle"][];
+            /**
+             * Format
+             * @description This format and its version.
+             * @default mapless-arena/1
+             * @constant
+             */
+            format: "mapless-arena/1";
+            /**
+             * Height
+             * @description Between the walls along y, metres.
+             */
+            height: number;
+            /**
+             * Name
+             * @description What people call it.
+             */
+            name: string;
+            /** @description Where a scenario starts, if the arena comes with one. */
+            start: components["schemas"]["Start-Output"] | null;
+            /** @description Where that scenario leads. */
+            target: components["schemas"]["Target"] | null;
+            /**
+             * Width
+             * @description Between the walls along x, metres.
+             */
+            width: number;
+        };
+        /**
+         * Box
+         * @description A rectangular obstacle; `angle` is that of its length against the x axis, degrees, anticlockwise.
+         */
+        "Box-Input": {
+            /**
+             * Angle
+             * @default 0
+             */
+            angle: number;
+            /**
+             * Length
+             * @description Along the box's own x axis, metres.
+             */
+            length: number;
+            /**
+             * Width
+             * @description Along the box's own y axis, metres.
+             */
+            width: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * Box
+         * @description A rectangular obstacle; `angle` is that of its length against the x axis, degrees, anticlockwise.
+         */
+        "Box-Output": {
+            /**
+             * Angle
+             * @default 0
+             */
+            angle: number;
+            /**
+             * Length
+             * @description Along the box's own x axis, metres.
+             */
+            length: number;
+            /**
+             * Width
+             * @description Along the box's own y axis, metres.
+             */
+            width: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
         };
         /**
          * Checkpoint
@@ -476,6 +606,18 @@ export interface components {
             size: number;
             /** Step */
             step: number;
+        };
+        /**
+         * Circle
+         * @description A round obstacle.
+         */
+        Circle: {
+            /** Radius */
+            radius: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
         };
         /**
          * ComparedExperiment
@@ -964,10 +1106,106 @@ export interface components {
             /** Name */
             name: string;
         };
+        /**
+         * GeneratedArenaConfig
+         * @description A pool of arenas drawn from a seed; the robots are spread over all of them.
+         */
+        "GeneratedArenaConfig-Input": {
+            /**
+             * Difficulty
+             * @description More obstacles and narrower passages: at 1 they are 0.9 m wide for the default robot.
+             * @default 0.5
+             */
+            difficulty: number;
+            /**
+             * Maps
+             * @description Different arenas of the training; with few of them the policy learns them by heart.
+             * @default 64
+             */
+            maps: number;
+            /**
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            name: "clutter" | "corridors" | "maze" | "passages" | "rooms" | "warehouse";
+            /**
+             * Map seed
+             * @description Which maps; the suites' maps are never among them.
+             * @default 0
+             */
+            seed: number;
+        };
+        /**
+         * GeneratedArenaConfig
+         * @description A pool of arenas drawn from a seed; the robots are spread over all of them.
+         */
+        "GeneratedArenaConfig-Output": {
+            /**
+             * Difficulty
+             * @description More obstacles and narrower passages: at 1 they are 0.9 m wide for the default robot.
+             * @default 0.5
+             */
+            difficulty: number;
+            /**
+             * Maps
+             * @description Different arenas of the training; with few of them the policy learns them by heart.
+             * @default 64
+             */
+            maps: number;
+            /**
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            name: "clutter" | "corridors" | "maze" | "passages" | "rooms" | "warehouse";
+            /**
+             * Map seed
+             * @description Which maps; the suites' maps are never among them.
+             * @default 0
+             */
+            seed: number;
+        };
         /** HTTPValidationError */
         HTTPValidationError: {
             /** Detail */
             detail?: components["schemas"]["ValidationError"][];
+        };
+        /**
+         * ImportedArenaConfig
+         * @description An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash.
+         */
+        "ImportedArenaConfig-Input": {
+            /** Geometry */
+            arena?: components["schemas"]["ArenaFile-Input"] | null;
+            /**
+             * @description Read from a file; see the gallery. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            name: "imported";
+            /**
+             * Imported arena
+             * @description The hash that the gallery shows.
+             * @default
+             */
+            sha256: string;
+        };
+        /**
+         * ImportedArenaConfig
+         * @description An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash.
+         */
+        "ImportedArenaConfig-Output": {
+            /** Geometry */
+            arena: components["schemas"]["ArenaFile-Output"] | null;
+            /**
+             * @description Read from a file; see the gallery. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            name: "imported";
+            /**
+             * Imported arena
+             * @description The hash that the gallery shows.
+             * @default
+             */
+            sha256: string;
         };
         /**
          * LidarConfig
@@ -1887,6 +2125,36 @@ export interface components {
             values: (number | null)[];
         };
         /**
+         * Start
+         * @description Where a robot starts; heading in degrees against the x axis, anticlockwise.
+         */
+        "Start-Input": {
+            /**
+             * Heading
+             * @default 0
+             */
+            heading: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * Start
+         * @description Where a robot starts; heading in degrees against the x axis, anticlockwise.
+         */
+        "Start-Output": {
+            /**
+             * Heading
+             * @default 0
+             */
+            heading: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
          * Status
          * @description The service at a glance.
          */
@@ -1912,12 +2180,22 @@ export interface components {
             workers: components["schemas"]["WorkerStatus"][];
         };
         /**
+         * Target
+         * @description Where it should go.
+         */
+        Target: {
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
          * TaskConfig
          * @description Everything that defines the environment: arena, robot, LiDAR, observation, reward, limits.
          */
         "TaskConfig-Input": {
             /** Arena */
-            arena?: components["schemas"]["ArenaConfig-Input"];
+            arena?: components["schemas"]["ArenaConfig-Input"] | components["schemas"]["GeneratedArenaConfig-Input"] | components["schemas"]["ImportedArenaConfig-Input"];
             /**
              * Arrival distance
              * @description Metres between robot and target that count as arrived.
@@ -1962,7 +2240,7 @@ export interface components {
          */
         "TaskConfig-Output": {
             /** Arena */
-            arena: components["schemas"]["ArenaConfig-Output"];
+            arena: components["schemas"]["ArenaConfig-Output"] | components["schemas"]["GeneratedArenaConfig-Output"] | components["schemas"]["ImportedArenaConfig-Output"];
             /**
              * Arrival distance
              * @description Metres between robot and target that count as arrived.

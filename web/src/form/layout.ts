@@ -104,7 +104,7 @@ function properties(
   // The form itself is no heading of its fields.
   const trail = place.path.length === 0 ? place.trail : [...place.trail, heading]
   return Object.entries(schema.properties ?? {})
-    .filter(([key]) => key !== skip)
+    .filter(([key, one]) => key !== skip && !one['x-hidden'])
     .flatMap(([key, one]) =>
       fieldsAt(one, root, values, { ...place, path: [...place.path, key], trail }, key),
     )

@@ -1,4 +1,5 @@
 /** The part of JSON schema that pydantic writes for our configuration models, and its defaults. */
+import { words } from '../lib/format'
 
 export interface Schema {
   $ref?: string
@@ -24,6 +25,8 @@ export interface Schema {
   minItems?: number
   maxItems?: number
   'x-advanced'?: boolean
+  /** Not for the form: a program fills it in. */
+  'x-hidden'?: boolean
 }
 
 /** Values of a form: what JSON can hold. */
@@ -62,15 +65,20 @@ export function branches(schema: Schema, root: Schema): Branch[] {
   if (!discriminator) return []
   // The mapping is sorted by tag; the union itself keeps the model's order.
   const place = ($ref: string) => schema.oneOf?.findIndex((one) => one.$ref === $ref) ?? 0
-  const mapping = Object.entries(discriminator.mapping).sort(([, a], [, b]) => place(a) - place(b))
-  return mapping.map(([tag, $ref]) => {
+  const name = discriminator.propertyName
+  const all = Object.entries(discriminator.mapping).map(([tag, $ref]) => {
     const branch = resolve({ $ref }, root)
-    return {
-      tag,
-      label: branch.properties?.[discriminator.propertyName]?.title ?? branch.title ?? tag,
-      schema: branch,
-    }
+    const own = branch.properties?.[name]
+    // A model that stands for several tags is a branch for each of them, which starts with that tag.
+    const several = own?.enum?.map(String)
+    const schema = several
+      ? { ...branch, properties: { ...branch.properties, [name]: { ...own, default: tag } } }
+      : branch
+    const label = several ? words(tag) : (own?.title ?? branch.title ?? tag)
+    return { tag, label, schema, order: [place($ref), several?.indexOf(tag) ?? 0] as const }
   })
+  all.sort((a, b) => a.order[0] - b.order[0] || a.order[1] - b.order[1])
+  return all.map(({ tag, label, schema }) => ({ tag, label, schema }))
 }
 
 /** What a fresh form holds: the schema's defaults all the way down. */
