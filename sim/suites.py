@@ -7,22 +7,31 @@ differs in anything is another suite, and a file that does not match its hash is
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from sim.arenas import Arena, build_arenas
-from sim.config import ArenaConfig, TaskConfig
+from sim.arenas.families import SUITE_SEEDS, generate_arena
+from sim.config import AnyArenaConfig, ArenaConfig, FamilyName, Frozen, GeneratedArenaConfig, TaskConfig
 from sim.errors import SuiteError
+from sim.scenarios import draw_scenarios
 from sim.world import World
 
 Floats = NDArray[np.float32]
 PolicyFunction = Callable[[Floats], Floats]
 """Observations (n, numbers) to actions (n, 2)."""
+
+# Maps and scenarios of a suite that is drawn for a task.
+_DRAWN_MAPS = 20
+_DRAWN_SCENARIOS = 200
+# Characters of an imported arena's name in the name of its suite.
+_NAME = 40
 
 _DECIMALS = 6  # of the geometry that is hashed: micrometres, coarser than any rounding of a platform
 
@@ -91,6 +100,34 @@ class Situation:
     targets: Floats
 
 
+class GeneratedPlace(Frozen):
+    """One generated arena of a suite; its seed is one of `SUITE_SEEDS`, and so of no training."""
+
+    family: FamilyName
+    difficulty: float
+    seed: int
+
+
+Place = ArenaConfig | GeneratedPlace
+_PLACES: TypeAdapter[tuple[Place, ...]] = TypeAdapter(tuple[Place, ...])
+
+
+def suite_places(family: FamilyName, difficulty: float, maps: int) -> tuple[GeneratedPlace, ...]:
+    """The maps of a family at a difficulty on which suites are driven."""
+    return tuple(GeneratedPlace(family=family, difficulty=difficulty, seed=seed) for seed in SUITE_SEEDS[:maps])
+
+
+def build_places(places: Iterable[Place]) -> tuple[Arena, ...]:
+    """The arenas of a suite."""
+    arenas: list[Arena] = []
+    for place in places:
+        if isinstance(place, GeneratedPlace):
+            arenas.append(generate_arena(place.family, place.difficulty, place.seed))
+        else:
+            arenas += build_arenas(place)
+    return tuple(arenas)
+
+
 def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str:
     """SHA-256 of what a policy meets."""
     geometry = [
@@ -120,16 +157,20 @@ def load_suite(name: str) -> Suite:
     if name not in suite_names():
         raise SuiteError(f"there is no suite {name!r}; there are {', '.join(suite_names())}")
     content = json.loads((resources.files("sim") / "suite_data" / f"{name}.json").read_text("utf-8"))
-    arenas = tuple(arena for config in content["arenas"] for arena in build_arenas(ArenaConfig.model_validate(config)))
+    arenas = build_places(_PLACES.validate_python(content["arenas"]))
     if content_hash(arenas, content["scenarios"]) != content["hash"]:
         raise SuiteError(
             f"suite {name!r} is not what its hash says: its file or its arenas have changed. Restore them, or give the new "
             "scenarios a new name (python -m sim.suite_builder NAME)"
         )
-    table = np.array(content["scenarios"], dtype=np.float64)
+    return _suite(name, content["hash"], arenas, content["scenarios"])
+
+
+def _suite(name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> Suite:
+    table = np.array(scenarios, dtype=np.float64)
     return Suite(
         name=name,
-        hash=content["hash"],
+        hash=content,
         arenas=arenas,
         arena_indices=table[:, 0].astype(np.int32),
         starts=table[:, 1:4],
@@ -139,8 +180,29 @@ def load_suite(name: str) -> Suite:
 
 
 def suite_for(task: TaskConfig) -> Suite:
-    """The suite on which policies trained for a task are measured."""
-    return load_suite(f"{task.arena.name}-200")
+    """The suite on which policies trained for a task are measured: a frozen one, or one drawn for its arena.
+
+    A drawn suite depends on the arena alone, so all policies that were trained for it meet the same scenarios: 20 generated
+    maps of the same family and difficulty, none of which is in any training, or the imported arena itself.
+
+    Raises:
+        ArenaError: the default robot has no room in the arena.
+    """
+    if isinstance(task.arena, ArenaConfig):
+        return load_suite(f"{task.arena.name}-{_DRAWN_SCENARIOS}")
+    return _draw_suite(task.arena)
+
+
+@lru_cache(maxsize=8)
+def _draw_suite(arena: AnyArenaConfig) -> Suite:
+    if isinstance(arena, GeneratedArenaConfig):
+        name = f"{arena.name}-{arena.difficulty:g}-{_DRAWN_SCENARIOS}"
+        arenas = build_places(suite_places(arena.name, arena.difficulty, _DRAWN_MAPS))
+    else:
+        arenas = build_arenas(arena)
+        name = f"{arenas[0].name[:_NAME]}-{_DRAWN_SCENARIOS}"
+    scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
 
 
 def run_suite(policy: PolicyFunction, task: TaskConfig, suite: Suite) -> EpisodeTable:

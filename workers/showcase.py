@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.config import TaskConfig
+from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.scan import scan
 from sim.vector_env import NavigationVectorEnv
 from workers.frames import Frame
@@ -39,6 +39,13 @@ def along_arc(
     )
 
 
+def _in_first_map(task: TaskConfig) -> TaskConfig:
+    """The task in one map of its pool, which the view draws, instead of in all of them."""
+    if not isinstance(task.arena, GeneratedArenaConfig):
+        return task
+    return task.model_copy(update={"arena": task.arena.model_copy(update={"maps": 1})})
+
+
 class Showcase:
     """Robots that show what a policy can do, moment by moment; between two control steps they are interpolated.
 
@@ -48,7 +55,7 @@ class Showcase:
     """
 
     def __init__(self, task: TaskConfig, robots: int) -> None:
-        self._env = NavigationVectorEnv(task, robots)
+        self._env = NavigationVectorEnv(_in_first_map(task), robots)
         self._lidar = task.lidar
         self._period = task.control_period
         self._limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)

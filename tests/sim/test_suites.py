@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import sim
-from sim.arenas import Arena, free_distance
-from sim.arenas.paths import PathPlanner
+from sim.arenas import Arena, build_arenas, free_distance
+from sim.arenas.document import to_document
 from sim.baselines import bearings, go_to_goal, random_policy
-from sim.config import ArenaConfig, ObservationName, TaskConfig
+from sim.config import ArenaConfig, GeneratedArenaConfig, ImportedArenaConfig, ObservationName, TaskConfig
 from sim.errors import SuiteError
 from sim.suite_builder import build_suite
 from sim.suites import Suite, content_hash, load_suite, run_suite, suite_for, suite_names
@@ -20,7 +20,8 @@ COMPLEX = TaskConfig(arena=ArenaConfig(name="complex"))
 
 HASHES = {
     "simple-200": "a4a8d01a0e689b5e6d55e0a0b51fe56ba9d967ed21afd1b68b8447c69b417016",
-    "complex-200": "4ea595e6f5bd05aa3742b0bf3085c453155c1b4a6bb04dbfe97fe83299a446b6",
+    "complex-200": "d83965c11e81fb0a12650ffc8d17ef283d1b282a725cfb5843992ecea7cbff87",
+    "clutter-500": "645046dcb548e0964133b56604757fbd91c65942585dada333152c47054485dc",
 }
 
 
@@ -34,7 +35,7 @@ def test_a_suite_is_what_it_was_and_its_procedure_makes_it_again(name: str) -> N
 @pytest.mark.parametrize("name", HASHES)
 def test_scenarios_fit_and_their_shortest_paths_are_no_shorter_than_a_crow_flies(name: str) -> None:
     suite = load_suite(name)
-    assert len(suite) == 200
+    assert len(suite) == int(name.rpartition("-")[2])
     for index, arena in enumerate(suite.arenas):
         here = suite.arena_indices == index
         assert free_distance(arena, suite.starts[here, :2]).min() >= 0.4
@@ -104,23 +105,25 @@ def test_the_bearing_can_be_read_from_an_observation(observation: ObservationNam
     assert np.cos(bearings(task, observations) - expected).min() > 1.0 - 1e-6
 
 
-def test_a_shortest_path_worked_by_hand() -> None:
-    # Around a disc of radius 1 in the middle, from (-2, 0) to (2, 0), for a disc of 0.
-    planner = PathPlanner(Arena("disc", circles=np.array([[0.0, 0.0, 1.0]])), 1e-9)
-    tangent, arc = np.sqrt(3.0), np.pi / 3
-    assert planner.length(np.array([-2.0, 0.0]), np.array([2.0, 0.0])) == pytest.approx(2 * tangent + arc, rel=5e-3)
-    assert planner.length(np.array([-2.0, 0.0]), np.array([-2.0, 3.0])) == pytest.approx(3.0)
-    # Around the end of a wall from (0, -1) to (0, 5), 0.2 m thick, at 0.5 m: two quarter circles of 0.5 m.
-    wall = Arena("wall", boxes=np.array([[0.0, 2.0, 0.1, 3.0, 0.0]]))
-    planner = PathPlanner(wall, 0.5)
-    straight = planner.length(np.array([-1.0, -1.5]), np.array([1.0, -1.5]))
-    assert straight == pytest.approx(2.0)
-    assert planner.length(np.array([-0.6, 0.0]), np.array([0.6, 0.0])) == pytest.approx(2.0 + 0.2 + np.pi / 2, rel=1e-2)
+def test_a_generated_arena_is_measured_on_maps_that_no_training_has() -> None:
+    small, large = (TaskConfig(arena=GeneratedArenaConfig(name="rooms", difficulty=0.3, maps=maps)) for maps in (2, 50))
+    suite = suite_for(small)
+    assert (suite.name, len(suite), len(suite.arenas)) == ("rooms-0.3-200", 200, 20)
+    # How many maps a training has makes no difference to the scenarios; the difficulty does.
+    assert suite_for(large).hash == suite.hash
+    assert suite_for(TaskConfig(arena=GeneratedArenaConfig(name="rooms", difficulty=0.4))).hash != suite.hash
+    trained = {arena.boxes.tobytes() for arena in build_arenas(large.arena)}
+    assert not trained & {arena.boxes.tobytes() for arena in suite.arenas}
+    assert np.isfinite(suite.shortest_paths).all()
 
 
-def test_there_is_no_path_through_a_wall() -> None:
-    wall = Arena("closed", boxes=np.array([[0.0, 0.0, 0.1, 5.0, 0.0]]))
-    assert PathPlanner(wall, 0.1).length(np.array([-2.0, 0.0]), np.array([2.0, 0.0])) == np.inf
+def test_an_imported_arena_is_its_own_suite() -> None:
+    document = to_document(Arena("Hall", 4.0, 3.0, boxes=np.array([[0.0, 0.0, 0.1, 2.0, 0.0]])))
+    task = TaskConfig(arena=ImportedArenaConfig.of(document))
+    suite = suite_for(task)
+    assert (suite.name, len(suite), len(suite.arenas)) == ("Hall-200", 200, 1)
+    table = run_suite(go_to_goal(task), task, suite)
+    assert 0.2 < (table.outcomes == 1).mean() < 1.0
 
 
 def test_a_suite_that_was_tampered_with_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
