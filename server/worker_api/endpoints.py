@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import sys
 from collections.abc import AsyncIterator
 from typing import Annotated
 
@@ -47,7 +48,8 @@ def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep) -> Cla
     return service.claim(run_id, body)
 
 
-@router.put("/runs/{run_id}/checkpoints/{step}", status_code=204)
+# The file store has a cap of its own, which the settings say.
+@router.put("/runs/{run_id}/checkpoints/{step}", status_code=204, max_body_size=sys.maxsize)
 async def put_checkpoint(
     run_id: str, step: int, attempt: AttemptQuery, request: Request, services: ServicesDep, service: WorkerServiceDep
 ) -> None:

@@ -198,6 +198,22 @@ def test_a_body_over_the_cap_is_refused(settings: Settings) -> None:
     with TestClient(app, base_url=BASE_URL, headers=bearer(TOKEN)) as client:
         assert client.post("/api/experiments", json={"name": "x" * 2_000}).status_code == 413
         assert client.post("/api/experiments", content=iter([b"x" * 600] * 2)).status_code == 413
+        # A checkpoint may be larger; this one is not described by its first line.
+        upload = client.put(
+            "/api/worker/runs/r/checkpoints/1?attempt=1",
+            content=b"x" * 900 + b"\n" + b"x" * 9_000,
+            headers=bearer(WORKER_TOKEN),
+        )
+        assert upload.status_code == 422
+        assert "does not describe a checkpoint" in upload.json()["detail"]
+
+
+@pytest.mark.parametrize("body", ["[" * 100_000, '{"seeds": [' + "9" * 5_000 + "]}", "{", '"\ud800"', b"\xff\xfe"])
+def test_json_that_is_meant_to_do_harm(client: TestClient, body: str | bytes) -> None:
+    content = body if isinstance(body, bytes) else body.encode(errors="surrogatepass")
+    response = client.post("/api/experiments", content=content, headers={"Content-Type": "application/json"})
+
+    assert response.status_code in (400, 422)
 
 
 def test_the_network_needs_a_token_of_ones_own() -> None:
