@@ -6,11 +6,8 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontext
 from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
 
-from server import (
-    pages,
-)
+from server import pages
 from server.checkpoints import endpoints as checkpoints
-from server.checkpoints.repository import CheckpointRepository
 from server.comparison import endpoints as comparison
 from server.database import Database
 from server.events import endpoints as events
@@ -81,7 +78,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             stack.callback(services.database.dispose)
             stack.callback(services.bus.close)
             stack.push_async_callback(services.live.close)
-            await run_in_threadpool(_sweep_files, services)
+            await run_in_threadpool(services.files.remove_torn)
             for background in BACKGROUND:
                 await stack.enter_async_context(background(services))
             yield
@@ -119,9 +116,3 @@ def describe(
     for router in ROUTERS:
         app.include_router(router)
     return app
-
-
-def _sweep_files(services: Services) -> None:
-    with services.database.read() as session:
-        known = CheckpointRepository(session).ids()
-    services.files.keep_only(known)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
+from typing import Any
 
 from sqlalchemy import Connection, create_engine, event, make_url, text
 from sqlalchemy.engine import Engine
@@ -29,7 +30,11 @@ class Database:
 
     def __init__(self, url: str) -> None:
         self.engine = _create_engine(url)
-        self._read_engine = self.engine.execution_options(**{_READ_ONLY: True, "postgresql_readonly": True})
+        read_only: dict[str, Any] = {_READ_ONLY: True}
+        if self.engine.dialect.name == "postgresql":
+            # All of a block sees one state; in SQLite every transaction does.
+            read_only |= {"postgresql_readonly": True, "isolation_level": "REPEATABLE READ"}
+        self._read_engine = self.engine.execution_options(**read_only)
 
     @contextmanager
     def read(self) -> Iterator[Session]:

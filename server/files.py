@@ -9,10 +9,15 @@ from typing import IO, Any, cast
 import fsspec
 from starlette.concurrency import run_in_threadpool
 
-from server.errors import CorruptUploadError, NotFoundError, TooLargeError
+from server.errors import CorruptUploadError, NotFoundError, ServiceError, TooLargeError
 
 _BLOCK = 256 * 1024
 _SUFFIX = ".zip"
+_TORN_SUFFIX = ".part"
+
+
+class UnusableStoreError(ServiceError):
+    """No such kind of store, or its package is not installed."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +30,21 @@ class StoredFile:
 
 
 class FileStore:
-    """Archives by id. A file counts only once a row names it, so a torn upload is never read; `keep_only` sweeps it away."""
+    """Archives by id, each complete: while it is being written it goes by another name.
+
+    Args:
+        url: a directory, or an fsspec URL.
+        max_bytes: of one archive.
+
+    Raises:
+        UnusableStoreError: the URL's kind of store is not known here.
+    """
 
     def __init__(self, url: str, max_bytes: int) -> None:
-        self._filesystem, self._root = fsspec.core.url_to_fs(url)
+        try:
+            self._filesystem, self._root = fsspec.core.url_to_fs(url)
+        except (ImportError, ValueError) as error:
+            raise UnusableStoreError(f"Checkpoints can't be kept at {url} (MAPLESS_FILES_URL): {error}") from error
         self._max_bytes = max_bytes
         self._filesystem.makedirs(self._root, exist_ok=True)
 
@@ -40,10 +56,11 @@ class FileStore:
             CorruptUploadError: the bytes' SHA-256 is not `sha256`.
         """
         path = self._path(identifier)
+        torn = path + _TORN_SUFFIX
         digest = hashlib.sha256()
         size = 0
         try:
-            file = cast("IO[bytes]", await run_in_threadpool(self._filesystem.open, path, "wb"))
+            file = cast("IO[bytes]", await run_in_threadpool(self._filesystem.open, torn, "wb"))
             try:
                 async for block in stream:
                     size += len(block)
@@ -57,8 +74,9 @@ class FileStore:
                 await run_in_threadpool(file.close)
             if sha256 is not None and digest.hexdigest() != sha256.lower():
                 raise CorruptUploadError("What arrived does not have the SHA-256 that was announced: send it again.")
+            await run_in_threadpool(self._filesystem.mv, torn, path)
         except BaseException:
-            await run_in_threadpool(self.delete, identifier)
+            await run_in_threadpool(self._remove, torn)
             raise
         return StoredFile(identifier, size, digest.hexdigest())
 
@@ -76,22 +94,25 @@ class FileStore:
 
     def delete(self, identifier: str) -> None:
         """Remove an archive; one that is not there is none to remove."""
-        path = self._path(identifier)
-        if self._filesystem.exists(path):
-            self._filesystem.rm_file(path)
+        self._remove(self._path(identifier))
 
     def ids(self) -> set[str]:
         """The ids of all archives in the store."""
-        self._filesystem.invalidate_cache()
-        paths = cast("list[str]", self._filesystem.ls(self._root, detail=False))
-        return {PurePosixPath(path).stem for path in paths if path.endswith(_SUFFIX)}
+        return {PurePosixPath(path).stem for path in self._list() if path.endswith(_SUFFIX)}
 
-    def keep_only(self, known: set[str]) -> int:
-        """Remove what no row names (an upload cut short by a crash); returns how many. Only while no upload runs."""
-        orphans = self.ids() - known
-        for identifier in orphans:
-            self.delete(identifier)
-        return len(orphans)
+    def remove_torn(self) -> None:
+        """Remove uploads that a crash cut short. Only while none is under way."""
+        for path in self._list():
+            if path.endswith(_SUFFIX + _TORN_SUFFIX):
+                self._remove(path)
+
+    def _list(self) -> list[str]:
+        self._filesystem.invalidate_cache()
+        return cast("list[str]", self._filesystem.ls(self._root, detail=False))
+
+    def _remove(self, path: str) -> None:
+        if self._filesystem.exists(path):
+            self._filesystem.rm_file(path)
 
     def _path(self, identifier: str) -> str:
         # Ids are generated; this holds the line should one ever come from outside.

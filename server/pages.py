@@ -30,7 +30,7 @@ def mount_pages(app: FastAPI, dist: Path) -> None:
     """Serve `dist` beside the API; to be called last, since it answers every path that is left."""
     app.mount("/assets", _Assets(directory=dist / "assets", check_dir=False), name="assets")
 
-    @app.get("/{path:path}", include_in_schema=False)
+    @app.api_route("/{path:path}", methods=["GET", "HEAD"], include_in_schema=False)
     def page(path: str, request: Request) -> Response:
         if path.startswith(("api/", "live/")):
             raise NotFoundError(f"There is no route {request.url.path}.")

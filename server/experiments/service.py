@@ -115,7 +115,7 @@ class ExperimentService:
             run_ids = [run.id for run in experiment.runs]
             checkpoint_ids = CheckpointRepository(session).ids(run_ids)
             repository.delete(experiment)
-        # Rows first: a file without a row is swept away at the next start, a row without its file would be a lie.
+        # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
         for checkpoint_id in checkpoint_ids:

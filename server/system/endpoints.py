@@ -21,7 +21,7 @@ def get_status(services: ServicesDep) -> Status:
     return service.status(services)
 
 
-@router.get("/healthz", include_in_schema=False)
+@router.api_route("/healthz", methods=["GET", "HEAD"], include_in_schema=False)
 def check_health(services: ServicesDep) -> dict[str, str]:
     """Answers once the database does; open to everybody, and tells nothing."""
     services.database.ping()

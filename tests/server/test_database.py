@@ -37,6 +37,16 @@ def test_a_reader_cannot_write(database: Database) -> None:
     assert names(database) == ["allowed again"]
 
 
+def test_a_reader_sees_one_state(database: Database) -> None:
+    with database.read() as session:
+        assert session.query(models.Worker).count() == 0
+        with database.write() as other:
+            other.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
+        assert session.query(models.Worker).count() == 0
+
+    assert names(database) == ["w"]
+
+
 def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
     def fail_midway() -> None:
         with database.write() as session:

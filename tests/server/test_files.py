@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from server.errors import CorruptUploadError, NotFoundError, TooLargeError
-from server.files import FileStore, StoredFile
+from server.files import FileStore, StoredFile, UnusableStoreError
 from server.ids import new_id
 
 
@@ -66,12 +66,21 @@ def test_an_archive_that_is_gone(store: FileStore) -> None:
     store.delete("abc")  # nothing to do, and no error
 
 
-def test_what_no_row_names_is_swept_away(store: FileStore) -> None:
-    for identifier in ("kept", "torn1", "torn2"):
-        write(store, identifier, b"x")
+def test_an_upload_that_a_crash_cut_short_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    store = FileStore(str(tmp_path), max_bytes=1_000)
+    write(store, "kept", b"x")
+    (tmp_path / "torn.zip.part").write_bytes(b"wei")
+    (tmp_path / "somebody-elses.zip").write_bytes(b"x")
 
-    assert store.keep_only({"kept", "elsewhere"}) == 2
-    assert store.ids() == {"kept"}
+    assert store.ids() == {"kept", "somebody-elses"}
+    store.remove_torn()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["kept.zip", "somebody-elses.zip"]
+
+
+@pytest.mark.parametrize("url", ["nothing://bucket/checkpoints", "abfs://bucket/checkpoints"])
+def test_a_store_that_is_not_known_here_is_named(url: str) -> None:
+    with pytest.raises(UnusableStoreError, match="MAPLESS_FILES_URL"):
+        FileStore(url, max_bytes=1_000)
 
 
 @pytest.mark.parametrize("identifier", ["../secret", "a/b", "", ".", "a.zip", "/etc/passwd"])

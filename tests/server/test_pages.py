@@ -42,6 +42,7 @@ def test_assets_never_change(dist: Path, client: TestClient) -> None:
 
 def test_other_files_of_the_build(dist: Path, client: TestClient) -> None:
     assert client.get("/favicon.svg").headers["content-type"] == "image/svg+xml"
+    assert client.head("/favicon.svg").status_code == 200
 
 
 @pytest.mark.parametrize(
