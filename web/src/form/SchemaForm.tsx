@@ -1,15 +1,16 @@
 /** The fields of a form in two parts: what most people set, and everything else under *Advanced*. */
-import { Accordion, Anchor, Text, Title } from '@mantine/core'
-import { useEffect, useState } from 'react'
+import { Accordion, Anchor, Input, Text, Title } from '@mantine/core'
+import { useEffect, useRef, useState } from 'react'
 import { IconAdjustmentsHorizontal } from '../components/icons'
 import { Notice } from '../components/ui'
 import { FieldInput, fieldId } from './FieldInput'
 import classes from './form.module.css'
+import { labelsOf } from './labels'
 import { type Field, grouped } from './layout'
 import type { Problems } from './problems'
 import type { Json, Schema } from './schema'
 import type { Form } from './useForm'
-import { sameValue, valueAt } from './values'
+import { pathKey, sameValue, valueAt } from './values'
 
 interface FieldGridProps {
   fields: readonly Field[]
@@ -32,7 +33,9 @@ export function FieldGrid({ fields, ...rest }: FieldGridProps) {
 export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
   const { form, initial } = rest
   const [open, setOpen] = useState<string | null>(null)
-  const troubled = fields.some((field) => Object.keys(form.problems).some((path) => isAt(field, path)))
+  const troubled = fields.some((field) =>
+    Object.keys(form.problems).some((path) => isAt(field, path) || path === parentOf(field)),
+  )
   useEffect(() => {
     if (troubled) setOpen('advanced')
   }, [troubled])
@@ -54,6 +57,7 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
               <Title order={3} className={classes.heading}>
                 {heading}
               </Title>
+              <GroupProblem fields={some} problems={form.problems} />
               <FieldGrid fields={some} {...rest} />
             </section>
           ))}
@@ -62,6 +66,16 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
     </Accordion>
   )
 }
+
+/** What is wrong with the fields of a group together, such as two that don't fit each other. */
+function GroupProblem({ fields, problems }: { fields: readonly Field[]; problems: Problems }) {
+  const parents = [...new Set(fields.map(parentOf))]
+  const messages = parents.flatMap((path) => problems[path] ?? [])
+  return messages.length > 0 ? <Input.Error mb="sm">{messages.join('; ')}</Input.Error> : null
+}
+
+/** The path of the object that a field belongs to. */
+const parentOf = (field: Field): string => pathKey(field.path.slice(0, -1))
 
 /** Whether a problem's path leads to this field: to itself, or into its list. */
 function isAt(field: Field, path: string): boolean {
@@ -76,28 +90,45 @@ function focusField(field: Field): void {
   input?.focus({ preventScroll: true })
 }
 
-/** All that the server refused, each leading to its field; what belongs to no field stands here in words. */
-export function ProblemSummary({ fields, problems }: { fields: readonly Field[]; problems: Problems }) {
+interface ProblemSummaryProps {
+  fields: readonly Field[]
+  problems: Problems
+  root: Schema
+}
+
+/** All that the server refused, each leading to its field; comes into view when there is something new. */
+export function ProblemSummary({ fields, problems, root }: ProblemSummaryProps) {
+  const summary = useRef<HTMLDivElement>(null)
   const entries = Object.entries(problems)
-  if (entries.length === 0) return null
+  const refused = entries.length > 0
+  useEffect(() => {
+    if (refused) summary.current?.scrollIntoView({ block: 'center' })
+  }, [refused])
+  if (!refused) return null
   return (
-    <Notice bad title="Not launched: some values were refused" role="alert" data-testid="problems">
-      <ul style={{ margin: 0, paddingLeft: 18 }}>
-        {entries.map(([path, message]) => {
-          const field = fields.find((one) => isAt(one, path))
-          return (
-            <li key={path}>
-              {field ? (
-                <Anchor component="button" type="button" inherit onClick={() => focusField(field)}>
-                  {field.label}
-                </Anchor>
-              ) : null}
-              {field ? ': ' : ''}
-              {message}
-            </li>
-          )
-        })}
-      </ul>
-    </Notice>
+    <div ref={summary}>
+      <Notice bad title="Not launched: some values were refused" role="alert" data-testid="problems">
+        <ul style={{ margin: 0, paddingLeft: 18 }}>
+          {entries.map(([path, message]) => {
+            const field =
+              fields.find((one) => isAt(one, path)) ??
+              fields.find((one) => path !== '' && parentOf(one) === path)
+            return (
+              <li key={path}>
+                {field && (
+                  <>
+                    <Anchor component="button" type="button" inherit onClick={() => focusField(field)}>
+                      {isAt(field, path) ? field.label : labelsOf(root, path.split('.')).at(-1)}
+                    </Anchor>
+                    {': '}
+                  </>
+                )}
+                {message}
+              </li>
+            )
+          })}
+        </ul>
+      </Notice>
+    </div>
   )
 }

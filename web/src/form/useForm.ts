@@ -14,7 +14,11 @@ export interface Form {
   refuse: (details: readonly ValidationProblem[]) => void
 }
 
-/** A form that starts with `initial`. Changing a field takes its problem away, and those inside it. */
+/** Whether `path` is `outer`, or lies in it; everything lies in the form itself, ''. */
+const isWithin = (path: string, outer: string): boolean =>
+  outer === '' || path === outer || path.startsWith(`${outer}.`)
+
+/** A form that starts with `initial`. Changing a field takes its problems away, and those of what it lies in. */
 export function useForm(initial: Json): Form {
   const [values, setValues] = useState(initial)
   const [problems, setProblems] = useState<Problems>({})
@@ -24,7 +28,7 @@ export function useForm(initial: Json): Form {
     const key = pathKey(path)
     setValues((before) => withValue(before, path, value))
     setProblems((before) =>
-      Object.fromEntries(Object.entries(before).filter(([at]) => at !== key && !at.startsWith(`${key}.`))),
+      Object.fromEntries(Object.entries(before).filter(([at]) => !isWithin(at, key) && !isWithin(key, at))),
     )
   }, [])
 

@@ -93,8 +93,8 @@ test('what the server refuses stands at its field, in the summary, and goes when
         type: 'x',
       },
       {
-        loc: ['body', 'training', 'task'],
-        msg: 'Value error, the target is out of reach',
+        loc: ['body', 'training', 'algorithm', 'ppo'],
+        msg: 'Value error, robots and rate do not fit',
         type: 'value_error',
       },
     ]),
@@ -108,7 +108,7 @@ test('what the server refuses stands at its field, in the summary, and goes when
 
   const summary = await screen.findByTestId('problems')
   expect(summary).toHaveTextContent('Learning rate: Input should be less than 0.1')
-  expect(summary).toHaveTextContent('The target is out of reach')
+  expect(summary).toHaveTextContent('Algorithm: Robots and rate do not fit')
   expect(rate).toBeInvalid()
   expect(rate).toHaveAccessibleDescription(/Input should be less than 0.1/)
 
@@ -116,6 +116,7 @@ test('what the server refuses stands at its field, in the summary, and goes when
   expect(rate).toHaveFocus()
   await user.clear(rate)
   expect(rate).toBeValid()
+  expect(screen.queryByTestId('problems')).not.toBeInTheDocument()
 })
 
 test('seeds can be chosen one by one', async () => {

@@ -125,7 +125,7 @@ function LaunchForm({ schema, defaults, initial, presets }: LaunchFormProps) {
       }}
     >
       <Stack gap="md" className={classes.fields}>
-        <ProblemSummary fields={fields} problems={form.problems} />
+        <ProblemSummary fields={fields} problems={form.problems} root={schema} />
         <Panel>
           <Stack gap="lg">
             <FieldGrid fields={name} {...shared} />
