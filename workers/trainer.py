@@ -79,10 +79,12 @@ def train(
 
 
 def warm_up() -> None:
-    """Loads compiled kernels and the default suite, about a second's work that the first training would do otherwise."""
-    task = TrainingConfig().task
+    """Loads compiled kernels, the default suite, and what PyTorch imports at its first optimiser."""
+    config = TrainingConfig()
+    task = config.task
     run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
     NavigationVectorEnv(task, 1, seed=0).reset()
+    build_algorithm(config.algorithm, observation_layout(task).size, 0, torch.device("cpu"))
 
 
 class _Training:
