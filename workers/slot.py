@@ -117,6 +117,8 @@ class Slot:
         """Whether the server has heard that this worker is there."""
         try:
             self.client.heartbeat(self.name, self.settings.worker_queue)
+            # For who watches over this worker without asking the server, as a container's health check does.
+            (self.settings.work_dir / "heartbeat").touch()
         except ServerError as error:
             logger.warning("heartbeat: %s", error)
             return False

@@ -1,0 +1,91 @@
+"""docker-compose.yml and the Dockerfile name only what exists, and hold no secret."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from typer.main import get_command
+
+from server.cli import app as server_commands
+from server.settings import Settings
+from workers.cli import app as worker_commands
+from workers.settings import WorkerSettings
+
+ROOT = Path(__file__).parents[2]
+COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()
+COMPOSE: dict[str, Any] = yaml.safe_load(COMPOSE_TEXT)
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
+OURS = ("server", "worker")
+
+
+def substituted(text: str) -> str:
+    """With every variable set, or at its default."""
+    return re.sub(r"\$\{(\w+)(?::([-?])([^}]*))?\}", lambda m: m[3] if m[2] == "-" else "x" * 24, text)
+
+
+@pytest.mark.parametrize("service", OURS)
+def test_every_setting_exists_and_accepts_its_value(service: str) -> None:
+    environment = COMPOSE["services"][service]["environment"]
+    fields = Settings.model_fields if service == "server" else WorkerSettings.model_fields
+    assert {name.removeprefix("MAPLESS_").lower() for name in environment} <= set(fields)
+
+
+def test_the_server_starts_on_these_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in COMPOSE["services"]["server"]["environment"].items():
+        monkeypatch.setenv(name, substituted(value))
+    settings = Settings()
+    assert settings.resolved_broker_url.startswith("redis://")
+    assert settings.resolved_database_url.startswith("postgresql+psycopg://")
+    assert settings.resolved_server_url == "http://server:8400"
+
+
+def test_workers_know_neither_the_database_nor_the_login() -> None:
+    environment = COMPOSE["services"]["worker"]["environment"]
+    assert "MAPLESS_TOKEN" not in environment
+    assert not any("POSTGRES" in str(value) for value in environment.values())
+    assert "volumes" not in COMPOSE["services"]["worker"]
+
+
+def test_every_command_exists_with_its_options() -> None:
+    server, *_ = COMPOSE["services"]["server"]["command"]
+    worker, *options = COMPOSE["services"]["worker"]["command"]
+    assert server in get_command(server_commands).commands  # type: ignore[attr-defined]
+    command = get_command(worker_commands).commands[worker]  # type: ignore[attr-defined]
+    known = {name for parameter in command.params for name in parameter.opts}
+    assert {option.partition("=")[0] for option in options} <= known
+
+
+def test_secrets_have_no_default_and_their_absence_is_explained() -> None:
+    variables = re.findall(r"\$\{(\w+)(?::([-?])([^}]*))?\}", COMPOSE_TEXT)
+    secret = [found for found in variables if re.search("TOKEN|PASSWORD", found[0])]
+    assert {name for name, _, _ in secret} == {
+        "MAPLESS_TOKEN",
+        "MAPLESS_WORKER_TOKEN",
+        "POSTGRES_PASSWORD",
+        "REDIS_PASSWORD",
+    }
+    assert all(operator == "?" and "is not set" in message for _, operator, message in secret)
+
+
+def test_everything_is_checked_for_health_and_only_the_server_is_reachable_from_this_machine_only() -> None:
+    services = COMPOSE["services"]
+    assert all("healthcheck" in service for service in services.values())
+    assert [name for name, service in services.items() if "ports" in service] == ["server"]
+    assert services["server"]["ports"] == ["${MAPLESS_PUBLISH:-127.0.0.1}:${MAPLESS_PORT:-8400}:8400"]
+    assert all(
+        volume.partition(":")[0] in COMPOSE["volumes"]
+        for service in services.values()
+        for volume in service.get("volumes", [])
+    )
+
+
+def test_the_image_runs_without_rights_on_files_that_exist() -> None:
+    last_stage = DOCKERFILE.split("\nFROM ")[-1]
+    assert re.findall(r"^USER (\w+)$", last_stage, re.MULTILINE) == ["mapless"]
+    ignored = (ROOT / ".dockerignore").read_text().splitlines()
+    for copied in re.findall(r"^COPY (?!--from)(.+) \S+$", DOCKERFILE, re.MULTILINE):
+        for source in copied.split():
+            assert (ROOT / source).exists()
+            assert f"!{source}" in ignored
