@@ -58,7 +58,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """
     members = {
         POLICY: save_safetensors(dict(checkpoint.weights)),
-        STATE_ARRAYS: save_safetensors({name: np.ascontiguousarray(array) for name, array in checkpoint.arrays.items()}),
+        STATE_ARRAYS: save_safetensors({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}),
         STATE_COUNTERS: _json(checkpoint.counters),
     }
     files = {name: FileEntry(sha256=hashlib.sha256(data).hexdigest(), size=len(data)) for name, data in members.items()}

@@ -68,7 +68,7 @@ def train(
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of dead units decay into numbers that the processor handles slowly
     viewer = viewer or Unwatched()
-    training = _Training(config, seed, reporter, directory, viewer, report_interval)
+    training = Training(config, seed, reporter, directory, viewer, report_interval)
     try:
         if resume is not None:
             training.resume(resume)
@@ -87,7 +87,7 @@ def warm_up() -> None:
     build_algorithm(config.algorithm, observation_layout(task).size, 0, torch.device("cpu"))
 
 
-class _Training:
+class Training:
     """The state of one training and the stages of its loop."""
 
     def __init__(

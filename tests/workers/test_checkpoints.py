@@ -68,7 +68,7 @@ def test_archive_gives_back_everything(tmp_path: Path, network: Network) -> None
     for mine, theirs in ((read.weights, written.weights), (read.arrays, written.arrays)):
         assert mine.keys() == theirs.keys()
         for name, array in mine.items():
-            assert array.dtype == theirs[name].dtype
+            assert (array.dtype, array.shape) == (theirs[name].dtype, theirs[name].shape)
             np.testing.assert_array_equal(array, theirs[name])
 
 

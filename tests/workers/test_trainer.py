@@ -9,7 +9,7 @@ import torch
 
 from sim.config import TaskConfig
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy
-from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
+from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveMismatchError, NonFiniteError
 from workers.evaluation import evaluation_metrics
 from workers.frames import Frame
@@ -126,6 +126,26 @@ def test_stopped_and_resumed_equals_uninterrupted(whole: Recorder, tmp_path: Pat
         for name in mine:
             np.testing.assert_array_equal(mine[name], theirs[name], err_msg=name)
     assert interrupted.counters == uninterrupted.counters
+
+
+@pytest.mark.parametrize("algorithm", [DdpgConfig, Td3Config, SacConfig])
+def test_off_policy_training_resumes_exactly(
+    tmp_path: Path, algorithm: type[DdpgConfig] | type[Td3Config] | type[SacConfig]
+) -> None:
+    """Stopped among warm actions with a memory that has gone round."""
+    learner = algorithm(
+        network=MlpNetwork(hidden_sizes=(16,)), robots=50, batch_size=32, warmup_steps=500, replay_size=1_000
+    )
+    config = TINY.model_copy(update={"algorithm": learner, "steps": 2_000})
+    whole, first, second = Recorder(), Recorder(stop_after=27), Recorder()
+    train(config, 1, whole, tmp_path / "whole", report_interval=0.0)
+    assert train(config, 1, first, tmp_path / "first", report_interval=0.0) == "stopped"
+    train(config, 1, second, tmp_path / "second", resume=first.checkpoints[-1][1], report_interval=0.0)
+    assert learned(first.rows + second.rows) == learned(whole.rows)
+    mine, theirs = (read_checkpoint(recorder.checkpoints[-1][1]).arrays for recorder in (second, whole))
+    assert mine.keys() == theirs.keys()
+    for name in mine:
+        np.testing.assert_array_equal(mine[name], theirs[name], err_msg=name)
 
 
 def test_stop_before_the_first_update_still_leaves_a_checkpoint(tmp_path: Path) -> None:

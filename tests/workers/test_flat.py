@@ -1,0 +1,54 @@
+"""Parameters in one vector behave as they did in their layers, and our Adam steps as torch's."""
+
+import pytest
+import torch
+from torch import nn
+
+from workers.algorithms.flat import FlatAdam, FlatParameters
+
+
+def make_network() -> nn.Sequential:
+    torch.manual_seed(0)
+    return nn.Sequential(nn.Linear(3, 8), nn.Tanh(), nn.Linear(8, 2))
+
+
+def test_adam_steps_as_torchs() -> None:
+    ours, theirs = make_network(), make_network()
+    adam = FlatAdam(ours, learning_rate=1e-2)
+    reference = torch.optim.Adam(theirs.parameters(), lr=1e-2)
+    for step in range(50):
+        inputs = torch.randn(16, 3, generator=torch.Generator().manual_seed(step))
+        adam.learning_rate = reference.param_groups[0]["lr"] = 1e-2 * (1 - step / 50)
+        adam.descend(ours(inputs).square().sum())
+        reference.zero_grad()
+        theirs(inputs).square().sum().backward()
+        reference.step()
+    for mine, other in zip(ours.parameters(), theirs.parameters(), strict=True):
+        assert torch.allclose(mine, other, rtol=0, atol=1e-6)
+
+
+def test_values_and_gradients_are_the_modules_own() -> None:
+    network = make_network()
+    before = [parameter.clone() for parameter in network.parameters()]
+    flat = FlatParameters(network)
+    assert all(torch.equal(a, b) for a, b in zip(before, network.parameters(), strict=True))
+    flat.values.mul_(2.0)
+    assert all(torch.equal(2.0 * a, b) for a, b in zip(before, network.parameters(), strict=True))
+    flat.differentiate(network(torch.ones(1, 3)).sum())
+    assert torch.equal(flat.gradients[-2:], torch.ones(2))  # the last bias adds to the sum as it is
+
+
+def test_nan_is_seen() -> None:
+    flat = FlatParameters(make_network())
+    assert flat.finite
+    flat.values[5] = float("nan")
+    assert not flat.finite
+
+
+@pytest.mark.parametrize("norm", [0.1, 10.0])
+def test_clipping_only_ever_shrinks(norm: float) -> None:
+    flat = FlatParameters(nn.Linear(1, 1), nn.Linear(1, 1))
+    flat.gradients.copy_(torch.tensor([3.0, 4.0, 0.3, 0.4]))
+    flat.clip_gradients(norm)
+    for part, length in ((flat.gradients[:2], 5.0), (flat.gradients[2:], 0.5)):
+        assert part.norm().item() == pytest.approx(min(norm, length), rel=1e-4)
