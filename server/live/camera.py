@@ -24,7 +24,7 @@ class CameraRig:
         self._server = server
         self._overview: Point = (0.0, -1.72 * half_size, 1.84 * half_size)
         self._overview_target: Point = (0.0, -0.07 * half_size, 0.0)
-        self._close_up: Point = (0.0, -2.6, 1.9)
+        self._close_up: Point = (0.0, -2.1, 2.6)
         self._follow: int | None = None
         self._flight_started = float("-inf")
         self._origin = (0.0, 0.0)

@@ -73,8 +73,9 @@ async def show_page(run: RunDep, theme: Theme, request: Request) -> Response:
     return HTMLResponse(live_page(theme), headers=HEADERS)
 
 
+@router.websocket("/live/{run_id}")
 @router.websocket("/live/{run_id}/{theme}")
-async def stream_scene(websocket: WebSocket, run_id: str, theme: Theme, services: ServicesDep) -> None:
+async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep, theme: Theme = "light") -> None:
     """The socket of viser itself, bridged to the scene of the run; whoever holds it counts as a watcher."""
     training = await _training(run_id, services)
     if training is None or VISER_PROTOCOL not in websocket.scope.get("subprotocols", []):

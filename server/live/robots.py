@@ -13,10 +13,14 @@ from sim.lidar import ray_angles
 from workers.frames import Frame
 
 _SCANNER_HEIGHT = 0.17
-_HIT_OFFSET = 0.025
+_FLOOR_HEIGHT = 0.02
+_HIT_OFFSET = 0.035
 _INSIDE_THE_ROBOT = 0.1
 # What light falls on looks paler than the line of the same colour.
-_LIT = 0.72
+_LIT = 0.9
+_FAN_OPACITY = 0.13
+# The rays of a crowd are drawn fainter.
+_CROWD_RAYS = 0.4
 _FLASH_SECONDS = 0.9
 # From this many robots on, filled scans and long trails would paint the whole floor.
 _FEW = 16
@@ -46,7 +50,8 @@ class RobotNodes:
         self._bearings = ray_angles(task.lidar)
         self._rays_visible = True
         self._ends = np.empty((robots, rays, 2, 3), np.float32)
-        self._ends[..., 2] = _SCANNER_HEIGHT
+        # Rays at the scanner's true height would hide the robots: they are drawn on the floor.
+        self._ends[..., 2] = _FLOOR_HEIGHT
         self._trails = Trails(frame.poses, 40 if few else 16, task.robot.max_linear_speed)
         self._targets = np.full((robots, 2), np.nan, np.float32)
         self._last_seen = frame.poses[:, :2].copy()
@@ -110,7 +115,7 @@ class RobotNodes:
             thickness=2.5,
             thickness_units="screen",
         )
-        strength = np.array([0.5, 1.0])[:, None] * colours.ray_strength
+        strength = np.array([0.5, 1.0])[:, None] * colours.ray_strength * (1.0 if few else _CROWD_RAYS)
         ray = np.array(colours.ray) * strength + np.array(colours.floor) * (1.0 - strength)
         self._ray_lines = scene.add_line_segments(
             f"{parent}/rays",
@@ -131,8 +136,8 @@ class RobotNodes:
                 f"{parent}/fan",
                 np.zeros((robots * (rays + 1), 3), np.float32),
                 _fan_faces(robots, rays),
-                color=colours.ray,
-                opacity=colours.fan,
+                color=colours.fan,
+                opacity=_FAN_OPACITY,
                 side="double",
                 cast_shadow=False,
                 receive_shadow=False,

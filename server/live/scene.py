@@ -69,7 +69,9 @@ def _light(server: viser.ViserServer, theme: Theme, colours: Colours) -> None:
     scene = server.scene
     scene.world_axes.visible = False
     scene.set_up_direction("+z")
-    scene.configure_environment_map("studio", environment_intensity=colours.ambient)
+    # No picture of a studio is needed for flat surfaces; without one, the scene is there at once.
+    scene.configure_environment_map(None)
+    scene.add_light_hemisphere("/sky", sky_color=colours.sky, ground_color=colours.ground, intensity=colours.ambient)
     # viser's own lights are three times as bright as the colours of the theme bear.
     scene.configure_default_lights(enabled=False)
     scene.add_light_directional("/sun", intensity=colours.sun, cast_shadow=True, position=(-2.0, -3.0, 8.0))

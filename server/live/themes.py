@@ -22,9 +22,11 @@ class Colours:
     chassis: Rgb
     ray: Rgb
     hit: Rgb
-    fan: float
+    fan: Rgb
     shadow: float
     sun: float
+    sky: Rgb
+    ground: Rgb
     ambient: float
     ray_strength: float
 
@@ -35,14 +37,16 @@ COLOURS: dict[Theme, Colours] = {
         cell=(33, 38, 50),
         section=(48, 55, 71),
         wall=(58, 67, 88),
-        obstacle=(74, 85, 110),
-        chassis=(60, 66, 78),
+        obstacle=(72, 83, 108),
+        chassis=(92, 100, 116),
         ray=(70, 200, 235),
         hit=(255, 110, 88),
-        fan=0.10,
+        fan=(18, 70, 120),
         shadow=0.5,
-        sun=1.35,
-        ambient=0.35,
+        sun=1.8,
+        sky=(200, 215, 255),
+        ground=(90, 98, 122),
+        ambient=2.6,
         ray_strength=0.34,
     ),
     "light": Colours(
@@ -51,13 +55,15 @@ COLOURS: dict[Theme, Colours] = {
         section=(219, 224, 232),
         wall=(150, 163, 186),
         obstacle=(124, 140, 168),
-        chassis=(62, 68, 82),
+        chassis=(98, 106, 122),
         ray=(20, 140, 200),
         hit=(232, 62, 40),
-        fan=0.10,
+        fan=(90, 190, 240),
         shadow=0.18,
-        sun=1.45,
-        ambient=0.75,
+        sun=1.7,
+        sky=(255, 255, 255),
+        ground=(205, 212, 224),
+        ambient=2.2,
         ray_strength=0.5,
     ),
 }
