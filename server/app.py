@@ -12,6 +12,7 @@ from server.comparison import endpoints as comparison
 from server.database import Database
 from server.events import endpoints as events
 from server.experiments import endpoints as experiments
+from server.exports import endpoints as exports
 from server.files import FileStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
@@ -37,6 +38,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     runs.router,
     metrics.router,
     checkpoints.router,
+    exports.router,
     comparison.router,
     events.router,
     live.router,

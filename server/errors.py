@@ -9,7 +9,9 @@ ServiceError                        500
 │   └── (server.runs.states.TransitionError)
 ├── TooLargeError                   413  a body over its cap
 ├── CorruptUploadError              422  the bytes are not what their checksum says
-└── TooManyAttemptsError            429  too many wrong tokens
+├── TooManyAttemptsError            429  too many wrong tokens
+├── ExportFailedError               500  a policy could not be exported faithfully
+└── ExportTimeoutError              503  exporting took too long
 """
 
 from pydantic import BaseModel
@@ -82,3 +84,15 @@ class TooManyAttemptsError(ServiceError):
     """Too many wrong tokens from one address."""
 
     status = 429
+
+
+class ExportFailedError(ServiceError):
+    """A checkpoint's policy could not be exported, or the export does not equal it."""
+
+    status = 500
+
+
+class ExportTimeoutError(ServiceError):
+    """Exporting took too long; later it may not."""
+
+    status = 503

@@ -13,6 +13,10 @@ Responses = dict[int | str, dict[str, Any]]
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
 NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}
 CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
+EXPORT_FAILED: Responses = {
+    500: {"model": ErrorBody, "description": "Not exported: the reason is in the detail"},
+    503: {"model": ErrorBody, "description": "Took too long"},
+}
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 

@@ -3,10 +3,19 @@
 import os
 import socket
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
+import numpy as np
 import psycopg
 import pytest
+
+from sim.config import TaskConfig
+from sim.observations import observation_layout
+from workers.checkpoints import Checkpoint, write_checkpoint
+from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
+from workers.layout import layout, weight_shapes
+from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 
 POSTGRES = ("127.0.0.1", 5432)
 
@@ -34,3 +43,41 @@ def postgres_url() -> Iterator[str]:
             yield f"postgresql+psycopg://postgres@{host}:{port}/{name}"
         finally:
             connection.execute(f'DROP DATABASE "{name}" WITH (FORCE)'.encode())
+
+
+@pytest.fixture
+def make_checkpoint(tmp_path: Path) -> Callable[..., Path]:
+    """Writes an archive of a policy with random weights, large enough for actions to be spread over their range."""
+
+    def make(network: Network | None = None, task: TaskConfig | None = None) -> Path:
+        network, task = network or MlpNetwork(hidden_sizes=(16,)), task or TaskConfig()
+        numbers = observation_layout(task)
+        manifest = Manifest(
+            training=TrainingConfig(task=task, algorithm=PpoConfig(network=network)),
+            seed=4,
+            step=81_920,
+            observation=Observation(
+                name=numbers.name,
+                version=numbers.version,
+                numbers=tuple(
+                    Number(index=index, name=number.name, meaning=number.formula, low=number.low, high=number.high)
+                    for index, number in enumerate(numbers.numbers)
+                ),
+            ),
+            action=(),
+            network=layout(network),
+            evaluation=EvaluationSummary(suite="simple-200", suite_hash="0f" * 32, episodes=200, arrivals=198),
+            versions={},
+            files={},
+        )
+        rng = np.random.default_rng(4)
+        weights = {
+            name: rng.normal(scale=1.2 / np.sqrt(shape[-1]), size=shape).astype(np.float32)
+            for name, shape in weight_shapes(network, numbers.size).items()
+        }
+        archive = tmp_path / "checkpoint.zip"
+        counters = TrainingCounters(step=81_920, updates=20, evaluations=1)
+        write_checkpoint(archive, Checkpoint(manifest, weights, {"none": np.zeros(1)}, counters))
+        return archive
+
+    return make

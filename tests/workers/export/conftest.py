@@ -1,60 +1,11 @@
-"""Checkpoints with untrained policies, and a fake ROS 2 for machines without one."""
+"""A fake ROS 2 for machines without one."""
 
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
-import torch
-
-from sim.config import TaskConfig
-from sim.observations import observation_layout
-from workers.checkpoints import Checkpoint, write_checkpoint
-from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
-from workers.layout import layout
-from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
-from workers.networks import build_network
-
-MakeCheckpoint = Callable[..., Path]
-
-
-@pytest.fixture
-def make_checkpoint(tmp_path: Path) -> MakeCheckpoint:
-    """Writes an archive with random weights, large enough for actions to be spread over their range."""
-
-    def make(network: Network | None = None, task: TaskConfig | None = None) -> Path:
-        network, task = network or MlpNetwork(hidden_sizes=(16,)), task or TaskConfig()
-        numbers = observation_layout(task)
-        torch.manual_seed(4)
-        module = build_network(network, numbers.size, 2)
-        manifest = Manifest(
-            training=TrainingConfig(task=task, algorithm=PpoConfig(network=network)),
-            seed=4,
-            step=81_920,
-            observation=Observation(
-                name=numbers.name,
-                version=numbers.version,
-                numbers=tuple(
-                    Number(index=index, name=number.name, meaning=number.formula, low=number.low, high=number.high)
-                    for index, number in enumerate(numbers.numbers)
-                ),
-            ),
-            action=(),
-            network=layout(network),
-            evaluation=EvaluationSummary(suite="simple-200", suite_hash="0f" * 32, episodes=200, arrivals=198),
-            versions={},
-            files={},
-        )
-        weights = {name: 2.0 * tensor.numpy() for name, tensor in module.state_dict().items()}
-        archive = tmp_path / "checkpoint.zip"
-        counters = TrainingCounters(step=81_920, updates=20, evaluations=1)
-        write_checkpoint(archive, Checkpoint(manifest, weights, {"none": np.zeros(1)}, counters))
-        return archive
-
-    return make
 
 
 class FakeClock:

@@ -1,0 +1,1 @@
+"""Policies on their way out: the deployment bundle of a checkpoint."""
