@@ -1,4 +1,4 @@
-"""Training and evaluation from the command line: the same code as in the service, without it."""
+"""Training, evaluation and export from the command line: the same code as in the service, without it."""
 
 import signal
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.statistics import wilson_interval
 from workers.worker import worker
 
-app = typer.Typer(help="Train and evaluate policies on this machine.", no_args_is_help=True)
+app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)
 app.command()(export)
 
 _console = Console()
