@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NoReturn
 
 import numpy as np
 import torch
@@ -33,6 +33,9 @@ TrainingOutcome = Literal["completed", "stopped"]
 # Five reports a second are smooth to the eye and cost nothing.
 REPORT_INTERVAL = 0.2
 """Least wall time between two reports of metrics, in seconds."""
+
+# A failure is repeated within seconds, and a replay memory of millions is copied often enough.
+_REMEMBER_INTERVAL = 5.0
 
 
 def train(
@@ -111,6 +114,8 @@ class Training:
         self.total_updates = math.ceil(config.steps / self.steps_per_update)
         self.step = self.updates = self.evaluations = 0
         self.reported = self.saved = -1
+        self.remembered: Checkpoint | None = None
+        self.remembered_at = 0.0
 
     def run(self) -> TrainingOutcome:
         """The loop."""
@@ -119,6 +124,7 @@ class Training:
                 self.report(None)
                 self.save(None)
                 return "stopped"
+            self.remember()
             self.collect()
             self.update()
             if self.evaluation_due:
@@ -141,7 +147,7 @@ class Training:
             self.observations, rewards, terminations, truncations, _ = env.step(actions)
             stepped = clock()
             algorithm.record(self.observations, rewards, terminations, truncations, env.final_observations)
-            self.metrics.step(env, rewards)
+            self.metrics.step(env, self.observations, actions, rewards)
             self.step += algorithm.robots
             self.viewer.on_step(env, self.step)
             simulation += stepped - acted
@@ -154,13 +160,28 @@ class Training:
         with self.metrics.phase("update"):
             diagnostics = self.algorithm.update(self.updates / self.total_updates)
             self.updates += 1
-            if not self.algorithm.finite:
-                raise NonFiniteError(
-                    f"the weights became infinite or NaN in the update at step {self.step}: lower the learning rate or "
-                    "the gradient clipping, check the reward's size, and resume from an earlier checkpoint"
-                )
         self.metrics.update(diagnostics)
+        if not self.algorithm.finite:
+            self.fail()
         self.viewer.on_weights(lambda: self.policy(Policy), self.step)
+
+    def fail(self) -> NoReturn:
+        """The weights are no longer numbers: says so, and saves the last state that was remembered before it.
+
+        Resuming that checkpoint repeats the failure bit for bit: a training depends on state and configuration only.
+        """
+        self.metrics.update({"policy/finite": 0.0})
+        self.report(None)
+        assert self.remembered is not None
+        step = self.remembered.counters.step
+        if step != self.saved:
+            archive = self.directory / f"step-{step}.zip"
+            write_checkpoint(archive, self.remembered)
+            self.reporter.checkpoint(step, archive, None)
+        raise NonFiniteError(
+            f"the weights became infinite or NaN in the update at step {self.step}: lower the learning rate or the gradient "
+            f"clipping, check the reward's size; resuming the checkpoint of step {step} repeats it"
+        )
 
     @property
     def evaluation_due(self) -> bool:
@@ -189,16 +210,24 @@ class Training:
             self.reporter.metrics(self.step, values)
         self.reported = self.step
 
+    def remember(self) -> None:
+        """Keeps a copy of the whole state now and then, from which a failure can be repeated."""
+        now = time.monotonic()
+        if self.remembered is None or now - self.remembered_at >= _REMEMBER_INTERVAL:
+            self.remembered, self.remembered_at = self.checkpoint(None), now
+
+    def checkpoint(self, result: EvaluationResult | None) -> Checkpoint:
+        """A copy of the whole state; `result` belongs to exactly these weights."""
+        counters = TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
+        return Checkpoint(self._manifest(result), self.algorithm.policy_weights(), self._arrays(), counters)
+
     def save(self, result: EvaluationResult | None) -> None:
         """A checkpoint of this step, unless there is one."""
         if self.saved == self.step:
             return
         with self.metrics.phase("reporting"):
             archive = self.directory / f"step-{self.step}.zip"
-            counters = TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
-            write_checkpoint(
-                archive, Checkpoint(self._manifest(result), self.algorithm.policy_weights(), self._arrays(), counters)
-            )
+            write_checkpoint(archive, self.checkpoint(result))
             self.reporter.checkpoint(self.step, archive, result)
         self.saved = self.step
 
@@ -226,7 +255,7 @@ class Training:
         return {
             **with_prefix("algorithm", self.algorithm.state()),
             **with_prefix("environment", self.env.get_state()),
-            "observations": self.observations,
+            "observations": self.observations.copy(),
         }
 
     def _manifest(self, result: EvaluationResult | None) -> Manifest:

@@ -6,6 +6,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
+
+from workers.behavior import BehaviorMetrics
 
 if TYPE_CHECKING:
     from sim.vector_env import NavigationVectorEnv
@@ -20,6 +23,7 @@ class TrainingMetrics:
 
     def __init__(self, robots: int) -> None:
         self._robots = robots
+        self._behavior = BehaviorMetrics()
         self._clear()
 
     def _clear(self) -> None:
@@ -53,8 +57,15 @@ class TrainingMetrics:
         """Counts seconds as one kind of work."""
         self._phases[name] += seconds
 
-    def step(self, env: "NavigationVectorEnv", rewards: np.ndarray[tuple[int], np.dtype[np.float32]]) -> None:
-        """Takes in one step of all robots."""
+    def step(
+        self,
+        env: "NavigationVectorEnv",
+        observations: NDArray[np.float32],
+        actions: NDArray[np.float32],
+        rewards: NDArray[np.float32],
+    ) -> None:
+        """Takes in one step of all robots: what they see now, and what they did before."""
+        self._behavior.step(observations, actions)
         self._steps += 1
         self._rewards += float(rewards.sum())
         outcomes = env.outcomes
@@ -82,6 +93,7 @@ class TrainingMetrics:
                 metrics[name] = count / attempts
             metrics["train/return"] = self._attempt_rewards / attempts
             metrics["train/episode_length"] = self._attempt_steps / attempts
+        metrics.update(self._behavior.flush())
         metrics["time/steps_per_second"] = steps / seconds
         metrics.update({f"time/{name}": spent / seconds for name, spent in self._phases.items()})
         self._clear()

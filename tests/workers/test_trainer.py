@@ -21,6 +21,7 @@ METRICS = {
     *("train/reward", "loss/policy", "loss/value", "policy/kl", "policy/entropy", "policy/clip_fraction"),
     *("policy/std_linear", "policy/std_angular", "value/explained_variance", "optim/learning_rate"),
     *("time/steps_per_second", "time/simulation", "time/inference", "time/update", "time/reporting", "time/evaluation"),
+    *("train/linear_speed", "train/angular_speed", "train/spin", "policy/saturation", "observation/constant"),
 }
 ATTEMPT_METRICS = {  # only where an attempt ended
     *("train/success_rate", "train/collision_rate", "train/timeout_rate", "train/return", "train/episode_length"),
@@ -53,7 +54,7 @@ class Recorder:
         self.events.append(message)
 
     def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
-        assert self.rows[-1][0] == step, "a checkpoint is never ahead of its metrics"
+        assert self.rows[-1][0] >= step, "a checkpoint is never ahead of its metrics"
         self.checkpoints.append((step, archive, evaluation))
 
     def frames(self, frames: Sequence[Frame]) -> None:
@@ -171,8 +172,12 @@ def test_checkpoint_of_another_training_is_refused(whole: Recorder, tmp_path: Pa
 
 def test_nan_ends_the_training_with_advice(tmp_path: Path) -> None:
     exploding = TINY.model_copy(update={"algorithm": TINY.algorithm.model_copy(update={"learning_rate": float("inf")})})
+    recorder = Recorder()
     with pytest.raises(NonFiniteError, match="lower the learning rate"):
-        train(exploding, 5, Recorder(), tmp_path)
+        train(exploding, 5, recorder, tmp_path)
+    # The state before it, from which it can be repeated.
+    assert [step for step, _, _ in recorder.checkpoints] == [0]
+    assert recorder.rows[-1][1]["policy/finite"] == 0.0
 
 
 def test_default_training_reaches_the_target_every_time(tmp_path: Path) -> None:
