@@ -10,6 +10,7 @@ from server import pages
 from server.checkpoints import endpoints as checkpoints
 from server.comparison import endpoints as comparison
 from server.database import Database
+from server.diagnoses import endpoints as diagnoses
 from server.events import endpoints as events
 from server.experiments import endpoints as experiments
 from server.exports import endpoints as exports
@@ -37,6 +38,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     experiments.router,
     runs.router,
     metrics.router,
+    diagnoses.router,
     checkpoints.router,
     exports.router,
     comparison.router,

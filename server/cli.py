@@ -104,6 +104,12 @@ def evaluate(context: typer.Context) -> None:
 
 
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
+def export(context: typer.Context) -> None:
+    """Export a checkpoint's policy: ONNX, or a bundle with a ROS 2 node."""
+    _workers_command("export", context)
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
 def worker(context: typer.Context) -> None:
     """Start a worker for a server, here or on another machine."""
     _workers_command("worker", context)

@@ -1,0 +1,1 @@
+"""Is it learning? A run's diagnoses."""

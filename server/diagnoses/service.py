@@ -1,0 +1,31 @@
+"""Reads a run's curves and hands them to the rules."""
+
+import numpy as np
+
+from server.diagnoses.schemas import Diagnoses
+from server.metrics.repository import MetricRepository
+from server.runs.repository import RunRepository
+from server.services import Services
+from workers.config import TrainingConfig
+from workers.diagnoses import History, Series, diagnose
+
+
+class DiagnosisService:
+    """Diagnoses runs."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+
+    def of_run(self, run_id: str) -> Diagnoses:
+        """What the run's curves say now.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._services.database.read() as session:
+            run = RunRepository(session).get(run_id)
+            training = TrainingConfig.model_validate(run.experiment.training)
+            series = MetricRepository(session).read(run_id)
+        curves = {name: Series(points.steps, points.values.astype(np.float64)) for name, points in series.items()}
+        history = History(training, curves)
+        return Diagnoses(run_id=run_id, step=history.step, diagnoses=diagnose(history))
