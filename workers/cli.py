@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
@@ -152,6 +153,28 @@ def evaluate(
     except (WorkerError, SimError, KeyError) as error:
         _fail(str(error.args[0]))
     _console.print(describe(result), highlight=False)
+
+
+@app.command()
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Directory of the campaign; an interrupted one goes on.")] = Path("reproduction"),
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Seeds of each row of the paper's tables.")] = 5,
+    jobs: Annotated[int, typer.Option(min=1, max=256, help="Trainings side by side, one core each.")] = 2,
+    page: Annotated[Path | None, typer.Option("--report", help="Also write the tables here, as Markdown.")] = None,
+) -> None:
+    """Train every row of the paper's tables with several seeds, and say which of its claims hold."""
+    from workers.reproduction.campaign import RunResult
+    from workers.reproduction.campaign import reproduce as run
+    from workers.reproduction.report import report
+
+    def tell(result: RunResult) -> None:
+        _console.print(f"{result.row:32} seed {result.seed}: {result.measured.success:7.2%} success", highlight=False)
+
+    results = run(out, seeds, jobs, on_result=tell)
+    text = report(results, f"mapless reproduce --seeds {seeds}", datetime.now(UTC).date().isoformat())
+    if page is not None:
+        page.write_text(text)
+    _console.print(text, markup=False, highlight=False)
 
 
 def _changes(
