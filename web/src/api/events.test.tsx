@@ -21,6 +21,8 @@ describe('which questions a change makes old', () => {
     [change('metrics'), key('/api/runs/{run_id}', ofRun), true],
     [change('metrics'), key('/api/runs/{run_id}/checkpoints', ofRun), false],
     [change('checkpoint'), key('/api/runs/{run_id}/checkpoints', ofRun), true],
+    [change('metrics'), key('/api/runs/{run_id}/diagnoses', ofRun), false],
+    [change('run'), key('/api/runs/{run_id}/diagnoses', ofRun), true],
     [change('run'), key('/api/runs/{run_id}/events', ofRun), true],
     [change('run', null), key('/api/runs/{run_id}', { path: { run_id: 'any' } }), true],
     [change('metrics'), key('/api/experiments'), true],

@@ -119,6 +119,35 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
     ],
   },
   {
+    title: 'Behaviour',
+    charts: [
+      {
+        title: 'Commands',
+        note: 'fractions of the limits',
+        metrics: [
+          { name: 'train/linear_speed', label: 'linear' },
+          { name: 'train/angular_speed', label: 'angular' },
+          { name: 'train/spin', label: 'turning one way' },
+        ],
+        smoothable: true,
+        ...rate,
+      },
+      {
+        title: 'Turning at its limit',
+        note: 'share of commands',
+        metrics: [{ name: 'policy/saturation', label: 'commands' }],
+        smoothable: true,
+        ...rate,
+      },
+      {
+        title: 'Constant observations',
+        note: 'share of their numbers',
+        metrics: [{ name: 'observation/constant', label: 'numbers' }],
+        ...rate,
+      },
+    ],
+  },
+  {
     title: 'Evaluation',
     charts: [
       {

@@ -1,5 +1,5 @@
 /** The policies of a run, to take away. */
-import { Badge, Button, Table } from '@mantine/core'
+import { Badge, Button, Group, Table } from '@mantine/core'
 import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
@@ -28,7 +28,7 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
             <Table.Th ta="right">Steps to target</Table.Th>
             <Table.Th ta="right">Size</Table.Th>
             <Table.Th ta="right">Saved</Table.Th>
-            <Table.Th w={120} aria-label="Download" />
+            <Table.Th w={250} aria-label="Download" />
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -58,18 +58,31 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
               <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`}>
                 {dateTime(checkpoint.created_at)}
               </Table.Td>
-              <Table.Td ta="right">
-                <Button
-                  component="a"
-                  href={`/api/checkpoints/${checkpoint.id}/download`}
-                  download
-                  size="compact-sm"
-                  variant={checkpoint.best ? 'filled' : 'default'}
-                  leftSection={<IconDownload size={14} />}
-                  aria-label={`Download step ${checkpoint.step}`}
-                >
-                  Download
-                </Button>
+              <Table.Td>
+                <Group gap={6} justify="flex-end" wrap="nowrap">
+                  <Button
+                    component="a"
+                    href={`/api/checkpoints/${checkpoint.id}/bundle`}
+                    download
+                    size="compact-sm"
+                    variant="default"
+                    title="ONNX, a NumPy runner and a ROS 2 package, checked against the policy: takes a few seconds"
+                    aria-label={`Robot bundle of step ${checkpoint.step}`}
+                  >
+                    Robot bundle
+                  </Button>
+                  <Button
+                    component="a"
+                    href={`/api/checkpoints/${checkpoint.id}/download`}
+                    download
+                    size="compact-sm"
+                    variant={checkpoint.best ? 'filled' : 'default'}
+                    leftSection={<IconDownload size={14} />}
+                    aria-label={`Download step ${checkpoint.step}`}
+                  >
+                    Download
+                  </Button>
+                </Group>
               </Table.Td>
             </Table.Tr>
           ))}

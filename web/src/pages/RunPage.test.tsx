@@ -38,13 +38,53 @@ test('its policies, the newest first, the best marked, each to take away', async
   startServer(routes)
   open('/runs/run1')
   const rows = await screen.findAllByTestId('checkpoint')
-  expect(rows.map((row) => within(row).getByRole('link').getAttribute('href'))).toEqual([
-    '/api/checkpoints/cp2/download',
-    '/api/checkpoints/cp1/download',
+  const links = rows.map((row) => within(row).getAllByRole('link'))
+  expect(links.map((row) => row.map((link) => link.getAttribute('href')))).toEqual([
+    ['/api/checkpoints/cp2/bundle', '/api/checkpoints/cp2/download'],
+    ['/api/checkpoints/cp1/bundle', '/api/checkpoints/cp1/download'],
   ])
   expect(rows[0]).toHaveTextContent('Best')
   expect(rows[0]).toHaveTextContent(/88\.5\s%\s*83\.3–92\.2\s%\s*N = 200/)
   expect(rows[1]).not.toHaveTextContent('Best')
+})
+
+test('what is wrong, with its evidence and what to try', async () => {
+  const diagnosis = {
+    id: 'kl_exploded',
+    severity: 'error',
+    title: 'KL divergence exploded',
+    explanation: 'An update changed the policy by a KL divergence of 4.',
+    evidence: [
+      { metric: 'policy/kl', value: 4.0123, expected: 'below 0.05' },
+      { metric: 'loss/value', value: null, expected: 'a finite number' },
+    ],
+    advice: ['Lower the learning rate.', 'Use fewer epochs.'],
+    step: 90_000,
+  }
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/diagnoses': { run_id: 'run1', step: 90_000, diagnoses: [diagnosis] },
+  })
+  open('/runs/run1')
+  const finding = await screen.findByTestId('diagnosis-kl_exploded')
+  expect(finding).toHaveTextContent('KL divergence exploded')
+  const evidence = within(within(finding).getByRole('list', { name: 'Evidence' })).getAllByRole('listitem')
+  expect(evidence.map((line) => line.textContent)).toEqual([
+    'policy/kl 4.01 healthy: below 0.05',
+    'loss/value not a number healthy: a finite number',
+  ])
+  expect(within(finding).getByText('Lower the learning rate.')).toBeInTheDocument()
+})
+
+test('a healthy run shows no diagnosis', async () => {
+  const server = startServer({
+    ...routes,
+    'GET /api/runs/run1/diagnoses': { run_id: 'run1', step: 90_000, diagnoses: [] },
+  })
+  open('/runs/run1')
+  await screen.findByTestId('vitals')
+  await waitFor(() => expect(server.asked).toContain('/api/runs/run1/diagnoses'))
+  expect(screen.queryByTestId('diagnoses')).not.toBeInTheDocument()
 })
 
 test('what happened, the newest first', async () => {

@@ -12,6 +12,7 @@ import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
 import { chartOf } from '../charts/shape'
 import { CheckpointTable } from '../components/CheckpointTable'
+import { Diagnoses } from '../components/Diagnoses'
 import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
@@ -96,6 +97,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Text>
           </Notice>
         )}
+        <Diagnoses runId={run.id} state={run.state} />
         <div className={classes.stage}>
           <Panel flush>
             <LiveView runId={run.id} state={run.state} />
