@@ -118,7 +118,7 @@ def seeds_estimate(episodes: Sequence[FloatArray]) -> Interval:
 
 
 def curve_band(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bootstrap interval over seeds of the interquartile mean, at each point of a curve.
+    """Bootstrap interval of the mean over seeds, at each point of a curve.
 
     Args:
         values: (seeds, points); nan where a seed has no value.
@@ -138,7 +138,7 @@ def curve_band(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         drawn = np.random.default_rng(_RANDOM_SEED).integers(count, size=(_RESAMPLES, count))
         points = np.flatnonzero(group.ravel() == index)
         for part in np.array_split(points, -(-points.size * drawn.size // _MAX_DRAWS)):
-            replicates = iqm(values[np.ix_(mask, part)][drawn], axis=1)
+            replicates = values[np.ix_(mask, part)][drawn].mean(axis=1)
             low[part], high[part] = np.quantile(replicates, _QUANTILES, axis=0)
     return low, high
 

@@ -46,14 +46,13 @@ class SeedCurve(Schema):
 class ExperimentCurves(Schema):
     """An experiment's runs on the common grid, and what they are together.
 
-    `low` and `high` are the 95 % stratified bootstrap interval of `iqm`, over seeds; null where fewer than two have a value.
+    `low` and `high` are the 95 % bootstrap interval of `mean`, over seeds; null where fewer than two have a value.
     """
 
     id: str
     name: str
     seeds: list[SeedCurve]
     mean: list[float | None]
-    iqm: list[float | None] = Field(description="Interquartile mean: the mean of the middle half.")
     low: list[float | None]
     high: list[float | None]
     count: list[int] = Field(description="Seeds with a value.")

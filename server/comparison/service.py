@@ -85,17 +85,14 @@ def _curves(experiment: models.Experiment, series: dict[str, Points], grid: NDAr
     present = np.isfinite(values)
     count = present.sum(axis=0)
     mean = np.full(grid.size, np.nan)
-    centre = mean.copy()
     for index in np.flatnonzero(count):
-        scores = values[present[:, index], index]
-        mean[index], centre[index] = scores.mean(), float(statistics.iqm(scores))
+        mean[index] = values[present[:, index], index].mean()
     low, high = statistics.curve_band(values)
     return ExperimentCurves(
         id=experiment.id,
         name=experiment.name,
         seeds=[SeedCurve(seed=run.seed, values=json_numbers(row)) for run, row in zip(experiment.runs, values, strict=True)],
         mean=json_numbers(mean),
-        iqm=json_numbers(centre),
         low=json_numbers(low),
         high=json_numbers(high),
         count=count.tolist(),

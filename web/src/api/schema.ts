@@ -1171,7 +1171,7 @@ export interface components {
          * ExperimentCurves
          * @description An experiment's runs on the common grid, and what they are together.
          *
-         *     `low` and `high` are the 95 % stratified bootstrap interval of `iqm`, over seeds; null where fewer than two have a value.
+         *     `low` and `high` are the 95 % bootstrap interval of `mean`, over seeds; null where fewer than two have a value.
          */
         ExperimentCurves: {
             /**
@@ -1183,11 +1183,6 @@ export interface components {
             high: (number | null)[];
             /** Id */
             id: string;
-            /**
-             * Iqm
-             * @description Interquartile mean: the mean of the middle half.
-             */
-            iqm: (number | null)[];
             /** Low */
             low: (number | null)[];
             /** Mean */
