@@ -12,8 +12,8 @@ from sim.config import TaskConfig
 from sim.lidar import ray_angles
 from workers.frames import Frame
 
-_SCANNER_HEIGHT = 0.17
 _FLOOR_HEIGHT = 0.02
+_HIT_HEIGHT = 0.05
 _HIT_OFFSET = 0.035
 _INSIDE_THE_ROBOT = 0.1
 # What light falls on looks paler than the line of the same colour.
@@ -74,7 +74,7 @@ class RobotNodes:
         self._shells = batch("shells", meshes.shell(radius), linear(_LIT * own), flat_shading=True)
         self._halos = batch(
             "halos",
-            meshes.prism(meshes.circle(max(task.collision_distance, 1.5 * radius), 32), 0.0, 0.004),
+            meshes.prism(meshes.circle(max(task.collision_distance, 1.5 * radius), 32), 0.021, 0.024),
             linear(_LIT * own),
             opacity=0.4,
             cast_shadow=False,
@@ -204,7 +204,7 @@ class RobotNodes:
         hits = self._ends[:, :, 0].copy()
         hits[..., 0] += length * np.cos(angles)
         hits[..., 1] += length * np.sin(angles)
-        hits[..., 2] = np.where(length > 0.0, _SCANNER_HEIGHT, _INSIDE_THE_ROBOT)
+        hits[..., 2] = np.where(length > 0.0, _HIT_HEIGHT, _INSIDE_THE_ROBOT)
         self._hits.points = hits.reshape(-1, 3)
         if self._fan is not None:
             corners = np.concatenate([self._ends[:, :1, 0], self._ends[:, :, 1]], axis=1)
