@@ -20,12 +20,18 @@ CLIP_STEPS = 90
 # With fewer frames than this left to play, the next clip is recorded.
 _RUNNING_OUT = 10
 
+# Steps of simulated time between two clips that show different robots.
+_LEAP = 1000
+
 
 class ClipRecorder:
     """Records on the training's thread; another one takes the frames away.
 
+    A clip shows robots of one arena, the one where most of them are. A robot that starts anew in another arena stays as it
+    was last seen until the clip is over.
+
     Args:
-        robots: how many of the training robots to show, from the first on.
+        robots: how many of the training robots to show at most.
         control_period: simulated seconds per step.
         frame_rate: frames per second at which the clips are played.
     """
@@ -37,35 +43,60 @@ class ClipRecorder:
         self._frames: deque[Frame] = deque()
         self._steps = 0
         self._left = 0
+        self._arena = 0
+        self._shown = np.zeros(0, np.intp)
+        self._gone = np.zeros(0, np.bool_)
+        self._last: Frame | None = None
         self._outcomes = np.zeros(0, np.uint8)
 
     def record(self, env: "NavigationVectorEnv", step: int) -> None:
         """Looks at the environment after a step; keeps a frame while a clip is being recorded."""
-        count = min(self.robots, env.num_envs)
-        if len(self._outcomes) != count:
-            self._outcomes = np.zeros(count, np.uint8)
-        outcomes = env.outcomes[:count]
-        ended = outcomes > 0
-        self._outcomes[ended] = outcomes[ended]
+        if len(self._outcomes) != env.num_envs:
+            self._outcomes = np.zeros(env.num_envs, np.uint8)
+        ended = env.outcomes > 0
+        self._outcomes[ended] = env.outcomes[ended]
         self._steps += 1
         if self._left == 0:
             if len(self._frames) >= _RUNNING_OUT:
                 return
-            self._left = CLIP_STEPS
+            self._begin(env)
         self._left -= 1
-        self._frames.append(
-            Frame(
-                mode="training",
-                step=step,
-                sim_time=self._steps * self._period,
-                speed=self._speed,
-                poses=env.poses[:count].copy(),
-                targets=env.targets[:count].copy(),
-                ranges=env.ranges[:count].copy(),
-                rewards=np.where(ended, 0.0, env.attempt_rewards[:count]).astype(np.float32),
-                outcomes=self._outcomes.copy(),
-            )
+        self._frames.append(self._frame(env, step))
+
+    def _begin(self, env: "NavigationVectorEnv") -> None:
+        self._left = CLIP_STEPS
+        self._arena = int(np.bincount(env.arena_indices).argmax())
+        shown = np.flatnonzero(env.arena_indices == self._arena)[: self.robots]
+        if not np.array_equal(shown, self._shown):
+            # Other robots: nobody should take this clip for the continuation of the one before.
+            self._steps += _LEAP
+        self._shown = shown
+        self._gone = np.zeros(len(self._shown), np.bool_)
+
+    def _frame(self, env: "NavigationVectorEnv", step: int) -> Frame:
+        shown, gone = self._shown, self._gone
+        gone |= env.arena_indices[shown] != self._arena
+        frame = Frame(
+            mode="training",
+            step=step,
+            sim_time=self._steps * self._period,
+            speed=self._speed,
+            poses=env.poses[shown],
+            targets=env.targets[shown],
+            ranges=env.ranges[shown],
+            rewards=np.where(env.outcomes[shown] > 0, 0.0, env.attempt_rewards[shown]).astype(np.float32),
+            outcomes=self._outcomes[shown],
+            arena=self._arena,
         )
+        last = self._last
+        if last is not None and gone.any():
+            frame.poses[gone] = last.poses[gone]
+            frame.targets[gone] = last.targets[gone]
+            frame.ranges[gone] = 0.0
+            frame.rewards[gone] = last.rewards[gone]
+            frame.outcomes[gone] = last.outcomes[gone]
+        self._last = frame
+        return frame
 
     def take(self) -> Frame | None:
         """The next frame to play; None while there is none."""

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 ViewMode = Literal["training", "policy"]
 
-# version, mode, robots, rays, step, seconds of simulated time, seconds of simulated time per wall second
-_HEADER = struct.Struct("<BBHHQdf")
-_VERSION = 1
+# version, mode, robots, rays, arena, step, seconds of simulated time, seconds of simulated time per wall second
+_HEADER = struct.Struct("<BBHHHQdf")
+_VERSION = 2
 _MODES: tuple[ViewMode, ...] = ("training", "policy")
 
 
@@ -34,6 +34,7 @@ class Frame:
         ranges: (robots, rays) float32, at most the LiDAR's range.
         rewards: (robots,) float32, reward since the last target.
         outcomes: (robots,) uint8: how the attempt that ended last ended (0 none yet, 1 arrival, 2 collision, 3 time-out).
+        arena: which arena of the task's pool all of this is in.
     """
 
     mode: ViewMode
@@ -45,11 +46,14 @@ class Frame:
     ranges: NDArray[np.float32]
     rewards: NDArray[np.float32]
     outcomes: NDArray[np.uint8]
+    arena: int = 0
 
     def encode(self) -> bytes:
         """The frame as bytes: a fixed header, then the arrays one after another, little-endian."""
         robots, rays = self.ranges.shape
-        header = _HEADER.pack(_VERSION, _MODES.index(self.mode), robots, rays, self.step, self.sim_time, self.speed)
+        header = _HEADER.pack(
+            _VERSION, _MODES.index(self.mode), robots, rays, self.arena, self.step, self.sim_time, self.speed
+        )
         floats = np.concatenate(
             [np.ravel(a).astype("<f4") for a in (self.poses, self.targets, self.ranges, self.rewards)], dtype="<f4"
         )
@@ -64,7 +68,7 @@ class Frame:
         """
         if len(data) < _HEADER.size:
             raise FrameError("shorter than a frame's header")
-        version, mode, robots, rays, step, sim_time, speed = _HEADER.unpack_from(data)
+        version, mode, robots, rays, arena, step, sim_time, speed = _HEADER.unpack_from(data)
         if version != _VERSION or mode >= len(_MODES):
             raise FrameError(f"frame version {version}, mode {mode}: not known here")
         sizes = (3 * robots, 2 * robots, rays * robots, robots)
@@ -87,4 +91,5 @@ class Frame:
             ranges=ranges.reshape(robots, rays),
             rewards=rewards,
             outcomes=outcomes,
+            arena=arena,
         )

@@ -49,6 +49,8 @@ def _in_first_map(task: TaskConfig) -> TaskConfig:
 class Showcase:
     """Robots that show what a policy can do, moment by moment; between two control steps they are interpolated.
 
+    All of them drive in the same arena, the first where the training has a pool of them.
+
     Args:
         task: environment of the training.
         robots: how many.
@@ -116,3 +118,9 @@ class Showcase:
         # A reward that belongs to an attempt that has just ended is history.
         self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()
+
+
+def _in_one_arena(task: TaskConfig) -> TaskConfig:
+    if isinstance(task.arena, GeneratedArenaConfig):
+        return task.model_copy(update={"arena": task.arena.model_copy(update={"maps": 1})})
+    return task

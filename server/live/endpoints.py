@@ -19,6 +19,7 @@ from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail
 from server.runs.service import RunService
 from server.services import Services, ServicesDep
+from sim.errors import ArenaError
 from workers.config import TrainingConfig
 
 router = APIRouter(tags=["live"])
@@ -26,6 +27,8 @@ router = APIRouter(tags=["live"])
 # RFC 6455 and its registry: what a socket is closed with.
 _POLICY_VIOLATION = 1008
 _TRY_AGAIN_LATER = 1013
+# Bytes; ours are of one byte a character.
+_MAX_REASON = 120
 
 _DISPLAY_SECONDS = 0.25
 
@@ -84,8 +87,8 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
     try:
         async with services.live.watch(run_id, training.task, theme) as view:
             await bridge(websocket, view.port)
-    except TooManyViewsError as error:
-        await websocket.close(_TRY_AGAIN_LATER, str(error))
+    except (TooManyViewsError, ArenaError) as error:
+        await websocket.close(_TRY_AGAIN_LATER, str(error)[:_MAX_REASON])
 
 
 @router.websocket("/live/{run_id}/{theme}/display")

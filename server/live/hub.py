@@ -45,7 +45,11 @@ class View(Protocol):
         """Port of the scene's WebSocket on 127.0.0.1."""
 
     def show(self, frame: Frame) -> None:
-        """Queues a frame; returns at once, and drops what cannot be shown in time."""
+        """Queues a frame; returns at once, and drops what cannot be shown in time.
+
+        Raises:
+            FrameError: the frame is of another task.
+        """
 
     def apply(self, settings: LiveSettings, connected: bool) -> None:
         """Changes what is shown; `connected` tells whether a worker is there to send frames."""
@@ -133,7 +137,7 @@ class LiveHub:
         """A frame has arrived; dropped where nobody watches.
 
         Raises:
-            FrameError: `data` is no frame of this version (checked only while somebody watches).
+            FrameError: `data` is no frame of this version or task (checked only while somebody watches).
         """
         channel = self._channels.get(run_id)
         if channel is None or not (views := channel.views):

@@ -5,7 +5,7 @@ import viser
 from numpy.typing import NDArray
 
 from server.live import meshes
-from server.live.scoreboard import ended
+from server.live.continuity import continues, ended
 from server.live.themes import OUTCOMES, Colours, linear, robot_colours
 from server.live.trails import Trails, trail_colours
 from sim.config import TaskConfig
@@ -14,6 +14,9 @@ from workers.frames import Frame
 
 _FLOOR_HEIGHT = 0.02
 _HIT_HEIGHT = 0.05
+_TARGET_HEIGHT = 0.025
+_FLASH_HEIGHT = 0.03
+_ARRIVAL = 1
 _HIT_OFFSET = 0.035
 _INSIDE_THE_ROBOT = 0.1
 # What light falls on looks paler than the line of the same colour.
@@ -53,8 +56,7 @@ class RobotNodes:
         # Rays at the scanner's true height would hide the robots: they are drawn on the floor.
         self._ends[..., 2] = _FLOOR_HEIGHT
         self._trails = Trails(frame.poses, 40 if few else 16, task.robot.max_linear_speed)
-        self._targets = np.full((robots, 2), np.nan, np.float32)
-        self._last_seen = frame.poses[:, :2].copy()
+        self._last: Frame | None = None
         self._flashes = np.full(robots, -np.inf)
         self._flashing = False
 
@@ -160,13 +162,16 @@ class RobotNodes:
             part.batched_positions = positions
             part.batched_wxyzs = headings
         self._halos.batched_positions = positions
-        self._trails.update(frame.poses, frame.sim_time)
+        going_on = continues(self._last, frame)
+        self._trails.update(frame.poses, frame.sim_time, anew=not going_on)
         self._trail_lines.points = self._trails.segments()
         if self._rays_visible:
             self._draw_rays(frame)
-        self._draw_targets(frame, now)
+        self._draw_targets(frame)
+        if going_on and self._last is not None:
+            self._start_flashes(self._last, frame, now)
         self._draw_flashes(now)
-        self._last_seen = frame.poses[:, :2].copy()
+        self._last = frame
 
     def show_rays(self, visible: bool) -> None:
         """Shows or hides rays, hits and the scanned area."""
@@ -211,28 +216,26 @@ class RobotNodes:
             corners[..., 2] = 0.015
             self._fan.vertices = corners.reshape(-1, 3)
 
-    def _draw_targets(self, frame: Frame, now: float) -> None:
-        """Targets move only when an attempt has ended; that is also when the ring at the old one flashes."""
-        changed = ended(self._targets, frame.targets)
-        if not changed.any():
+    def _draw_targets(self, frame: Frame) -> None:
+        if self._last is not None and (self._last.targets == frame.targets).all():
             return
-        flashing = changed & np.isfinite(self._targets).all(axis=1) & (frame.outcomes > 0)
-        if flashing.any():
-            places = self._rings.batched_positions.copy()
-            # An arrival flashes at the target that was reached, anything else where the robot ended up.
-            arrived = frame.outcomes[:, None] == 1
-            where = np.where(arrived, self._targets, self._last_seen)
-            places[flashing, :2] = where[flashing]
-            places[:, 2] = 0.03
-            tints = self._rings.batched_colors.copy()
-            tints[flashing] = linear(np.array(OUTCOMES, np.float64))[frame.outcomes[flashing]]
-            self._rings.batched_positions = places
-            self._rings.batched_colors = tints
-            self._flashes[flashing] = now
-        self._targets = frame.targets.copy()
-        spots = np.column_stack([frame.targets, np.full(len(frame.targets), 0.025, np.float32)])
+        spots = np.column_stack([frame.targets, np.full(len(frame.targets), _TARGET_HEIGHT, np.float32)])
         self._goals.batched_positions = spots
         self._beacons.batched_positions = spots
+
+    def _start_flashes(self, last: Frame, frame: Frame, now: float) -> None:
+        """An arrival flashes at the target that was reached, anything else where the robot ended up."""
+        flashing = ended(last, frame)
+        if not flashing.any():
+            return
+        places = self._rings.batched_positions.copy()
+        places[flashing, :2] = np.where(frame.outcomes[:, None] == _ARRIVAL, last.targets, last.poses[:, :2])[flashing]
+        places[:, 2] = _FLASH_HEIGHT
+        tints = self._rings.batched_colors.copy()
+        tints[flashing] = linear(np.array(OUTCOMES, np.float64))[frame.outcomes[flashing]]
+        self._rings.batched_positions = places
+        self._rings.batched_colors = tints
+        self._flashes[flashing] = now
 
     def _draw_flashes(self, now: float) -> None:
         age = (now - self._flashes) / _FLASH_SECONDS

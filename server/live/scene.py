@@ -5,12 +5,13 @@ import viser
 
 from server.live.robots import RobotNodes
 from server.live.themes import COLOURS, Colours, Theme
-from sim.arenas import Arena
+from sim.arenas import Arena, build_arena
 from sim.config import TaskConfig
 from workers.frames import Frame
 
 # Everything hangs below this node, so that one message moves the world under the camera when it follows a robot.
 _WORLD = "/world"
+_ARENA = f"{_WORLD}/arena"
 _WALL_HEIGHT = 0.3
 _WALL_THICKNESS = 0.1
 _OBSTACLE_HEIGHT = 0.45
@@ -21,12 +22,11 @@ class Scene:
 
     Args:
         server: where the nodes live.
-        arena: the place, in its own coordinates.
-        task: geometry of robot and LiDAR.
+        task: the place, and the geometry of robot and LiDAR.
         theme: light or dark.
     """
 
-    def __init__(self, server: viser.ViserServer, arena: Arena, task: TaskConfig, theme: Theme) -> None:
+    def __init__(self, server: viser.ViserServer, task: TaskConfig, theme: Theme) -> None:
         self._server = server
         self._task = task
         self._colours = COLOURS[theme]
@@ -35,7 +35,12 @@ class Scene:
         self._shape: tuple[int, ...] = ()
         self._world = server.scene.add_frame(_WORLD, show_axes=False)
         _light(server, theme, self._colours)
-        _build(server, arena, self._colours)
+        self._enter(0)
+
+    @property
+    def half_size(self) -> float:
+        """Half the longer side of the arena, metres."""
+        return max(self._arena.half_width, self._arena.half_height)
 
     def centre_on(self, x: float, y: float) -> None:
         """Moves the world so that the point (x, y) of the arena lies where the camera looks."""
@@ -56,6 +61,9 @@ class Scene:
             frame: what to draw.
             now: seconds of the wall clock, for what fades.
         """
+        if frame.arena != self._arena_index:
+            self._place.remove()
+            self._enter(frame.arena)
         if self._robots is None or self._shape != frame.ranges.shape:
             if self._robots is not None:
                 self._robots.remove()
@@ -63,6 +71,13 @@ class Scene:
             self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
             self._robots.show_rays(self._rays_visible)
         self._robots.update(frame, now)
+
+    def _enter(self, index: int) -> None:
+        """Builds the arena of that number in the task's pool."""
+        self._arena_index = index
+        self._arena = build_arena(self._task.arena, index)
+        self._place = self._server.scene.add_frame(_ARENA, show_axes=False)
+        _build(self._server, self._arena, self._colours)
 
 
 def _light(server: viser.ViserServer, theme: Theme, colours: Colours) -> None:
@@ -82,7 +97,7 @@ def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
     scene = server.scene
     width, height = 2 * arena.half_width, 2 * arena.half_height
     scene.add_grid(
-        f"{_WORLD}/floor",
+        f"{_ARENA}/floor",
         width,
         height,
         cell_size=0.5,
@@ -104,11 +119,11 @@ def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
         ("south", 0.0, -end, long, _WALL_THICKNESS),
     ):
         scene.add_box(
-            f"{_WORLD}/walls/{name}", colours.wall, (size_x, size_y, _WALL_HEIGHT), position=(x, y, _WALL_HEIGHT / 2)
+            f"{_ARENA}/walls/{name}", colours.wall, (size_x, size_y, _WALL_HEIGHT), position=(x, y, _WALL_HEIGHT / 2)
         )
     for index, (x, y, radius) in enumerate(arena.circles):
         scene.add_cylinder(
-            f"{_WORLD}/circles/{index}",
+            f"{_ARENA}/circles/{index}",
             float(radius),
             _OBSTACLE_HEIGHT,
             colours.obstacle,
@@ -117,7 +132,7 @@ def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
         )
     for index, (x, y, half_x, half_y, angle) in enumerate(arena.boxes):
         scene.add_box(
-            f"{_WORLD}/boxes/{index}",
+            f"{_ARENA}/boxes/{index}",
             colours.obstacle,
             (2 * float(half_x), 2 * float(half_y), _OBSTACLE_HEIGHT),
             position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),

@@ -3,9 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from server.live.continuity import continues, ended
 from workers.frames import Frame, ViewMode
 
 # More robots than this are summed up rather than listed.
@@ -45,19 +45,19 @@ class Score(BaseModel):
 
 
 class Scoreboard:
-    """Counts attempts frame by frame. An attempt has ended where the target has changed."""
+    """Counts attempts frame by frame."""
 
     def __init__(self) -> None:
         self._counts = np.zeros(4, np.int64)
         self._frame: Frame | None = None
 
     def update(self, frame: Frame) -> None:
-        """Takes the next frame into account; another mode or number of robots starts the counts anew."""
+        """Takes the next frame into account; another mode starts the counts anew."""
         last, self._frame = self._frame, frame
-        if last is None or last.mode != frame.mode or last.targets.shape != frame.targets.shape:
+        if last is None or last.mode != frame.mode:
             self._counts[:] = 0
-        else:
-            self._counts += np.bincount(frame.outcomes[ended(last.targets, frame.targets)] & 3, minlength=4)
+        elif continues(last, frame):
+            self._counts += np.bincount(frame.outcomes[ended(last, frame)], minlength=4)
 
     def score(self, state: ViewState, follow: int | None) -> Score:
         """The numbers as they stand."""
@@ -78,9 +78,3 @@ class Scoreboard:
                 RobotLine(index=i, reward=round(float(frame.rewards[i]), 1), outcome=int(frame.outcomes[i])) for i in listed
             ],
         )
-
-
-def ended(before: NDArray[np.float32], after: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """(robots,) whose attempt has ended between two frames, told by their targets, (robots, 2) each."""
-    changed: NDArray[np.bool_] = (before != after).any(axis=1)
-    return changed

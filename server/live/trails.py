@@ -27,27 +27,23 @@ class Trails:
         self._points = np.full((len(poses), points + 1, 3), _HEIGHT, np.float32)
         self._points[:, :, :2] = poses[:, None, :2]
 
-    def update(self, poses: NDArray[np.float32], sim_time: float) -> NDArray[np.bool_]:
-        """The robots have moved on.
+    def update(self, poses: NDArray[np.float32], sim_time: float, *, anew: bool = False) -> None:
+        """The robots have moved on; where one has been put somewhere else, its trail starts there.
 
         Args:
             poses: (robots, 3) where they are.
-            sim_time: simulated seconds; going back or leaping ahead starts all trails anew.
-
-        Returns:
-            (robots,) which of them have been put somewhere else instead of driving there.
+            sim_time: simulated seconds.
+            anew: start all trails here.
         """
         elapsed = sim_time - self._sim_time
         self._sim_time = sim_time
-        reach = 0.05 + _TELEPORT * self._max_speed * max(elapsed, 0.0) if elapsed < 1.0 else 0.0
         moved = np.hypot(*(poses[:, :2] - self._points[:, 0, :2]).T)
-        jumped: NDArray[np.bool_] = moved > reach
+        jumped = (moved > 0.05 + _TELEPORT * self._max_speed * elapsed) | anew
         if not 0.0 <= sim_time - self._kept_at < _SPACING:
             self._kept_at = sim_time
             self._points[:, 1:] = self._points[:, :-1]
         self._points[:, 0, :2] = poses[:, :2]
         self._points[jumped] = self._points[jumped, :1]
-        return jumped
 
     def segments(self) -> NDArray[np.float32]:
         """(robots x points, 2, 3) line segments, each robot's newest first."""

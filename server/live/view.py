@@ -13,11 +13,10 @@ from server.live.camera import CameraRig
 from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
 from server.live.scene import Scene
 from server.live.scoreboard import Score, Scoreboard, ViewState
-from server.live.settings import RECEIVING_SECONDS, LiveSettings
+from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
 from server.live.themes import Theme
-from sim.arenas import build_arenas
-from sim.config import TaskConfig
-from workers.frames import Frame
+from sim.config import GeneratedArenaConfig, TaskConfig
+from workers.frames import Frame, FrameError
 
 _console = threading.Lock()
 
@@ -46,14 +45,15 @@ class LiveView:
     """
 
     def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
-        arena = build_arenas(task.arena)[0]
         with _silence():
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             # With these, any browser could open a public tunnel to this port.
             self._server._websock_server.unregister_handler(message)  # noqa: SLF001
-        self._scene = Scene(self._server, arena, task, theme)
-        self._camera = CameraRig(self._server, max(arena.half_width, arena.half_height))
+        self._rays = task.lidar.rays
+        self._arenas = task.arena.maps if isinstance(task.arena, GeneratedArenaConfig) else 1
+        self._scene = Scene(self._server, task, theme)
+        self._camera = CameraRig(self._server, self._scene.half_size)
         self._scoreboard = Scoreboard()
         self._lock = threading.Lock()
         self._buffer = PlayoutBuffer()
@@ -70,7 +70,14 @@ class LiveView:
         return self._server.get_port()
 
     def show(self, frame: Frame) -> None:
-        """Queues a frame; returns at once, and drops what cannot be shown in time."""
+        """Queues a frame; returns at once, and drops what cannot be shown in time.
+
+        Raises:
+            FrameError: the frame is of another task.
+        """
+        robots, rays = frame.ranges.shape
+        if rays != self._rays or frame.arena >= self._arenas or not 1 <= robots <= MAX_ROBOTS:
+            raise FrameError(f"{robots} robots with {rays} rays in arena {frame.arena}: not what this training has")
         with self._lock:
             self._buffer.put(frame)
             self._arrived = time.monotonic()

@@ -21,13 +21,23 @@ def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tup
     if isinstance(config, ArenaConfig):
         return (BUILTIN[config.name](),)
     if isinstance(config, GeneratedArenaConfig):
-        return tuple(
-            generate_arena(config.name, config.difficulty, seed, clearance=clearance)
-            for seed in pool_seeds(config.seed, config.maps)
-        )
+        return tuple(build_arena(config, index, clearance=clearance) for index in range(config.maps))
     if config.arena is None:
         raise ArenaError(
             f"the imported arena {config.sha256[:12] or '(none)'} is here by its hash only: read its file with "
             "sim.arenas.files.load_arena and pass ImportedArenaConfig.of(...)"
         )
     return (to_arena(config.arena),)
+
+
+def build_arena(config: AnyArenaConfig, index: int, *, clearance: float = CLEARANCE) -> Arena:
+    """One of the arenas of `build_arenas`, without the trouble of building the others.
+
+    Raises:
+        ArenaError: as there.
+        IndexError: there are not as many.
+    """
+    if isinstance(config, GeneratedArenaConfig):
+        seed = pool_seeds(config.seed, config.maps)[index]
+        return generate_arena(config.name, config.difficulty, seed, clearance=clearance)
+    return build_arenas(config, clearance=clearance)[index]

@@ -1,6 +1,7 @@
 """The live view: scenes come and go with their watchers, frames reach browsers, browsers reach nothing but the camera."""
 
 import asyncio
+import dataclasses
 import re
 import socket
 import time
@@ -24,7 +25,8 @@ from server.live.settings import LiveSettings
 from server.live.themes import Theme
 from server.live.view import LiveView
 from server.services import Services
-from sim.config import TaskConfig
+from sim.arenas import build_arena
+from sim.config import GeneratedArenaConfig, TaskConfig
 from workers.frames import Frame, FrameError
 from workers.reporting import WatchRequest
 
@@ -225,6 +227,36 @@ async def _play(view: LiveView) -> bool:
     return False
 
 
+def test_a_scene_follows_the_training_into_another_arena() -> None:
+    task = TaskConfig(arena=GeneratedArenaConfig(maps=2))
+    view = LiveView(task, "light", LiveSettings(mode="training"))
+    try:
+        for number in range(20):
+            view.show(dataclasses.replace(make_frame(number, robots=1 + number // 10), mode="training", arena=number // 10))
+            time.sleep(1 / 30)
+        deadline = time.monotonic() + 10
+        while view.score().step != 4096 + 19:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        shapes = build_arena(task.arena, 1)
+        kept = [name for name in view._server.scene._handle_from_node_name if "/circles/" in name or "/boxes/" in name]
+        assert len(kept) == len(shapes.circles) + len(shapes.boxes)
+    finally:
+        view.close()
+
+
+@pytest.mark.parametrize("other", [{"arena": 1}, {"ranges": np.ones((2, 7), np.float32)}])
+def test_frames_of_another_task_are_refused(other: dict[str, Any]) -> None:
+    view = LiveView(TaskConfig(), "light", LiveSettings())
+    try:
+        with pytest.raises(FrameError, match="not what this training has"):
+            view.show(dataclasses.replace(make_frame(), **other))
+        with pytest.raises(FrameError):
+            view.show(make_frame(robots=65))
+    finally:
+        view.close()
+
+
 # -- settings -------------------------------------------------------------------------------------------------------------
 
 
@@ -309,7 +341,7 @@ def test_frames_of_the_worker_reach_the_browser(client: TestClient, services: Se
     portal.call(services.live.attach, run_id, asked.tell)
     with connect(client, f"/live/{run_id}/light") as browser:
         assert str(browser.accepted_subprotocol) == VISER_PROTOCOL
-        receive_until(browser, b"/world/floor")
+        receive_until(browser, b"/world/arena/floor")
         assert asked.all == [None, WatchRequest()]
         for number in range(6):
             portal.call(services.live.frames, run_id, make_frame(number).encode())
@@ -324,7 +356,7 @@ def test_frames_of_the_worker_reach_the_browser(client: TestClient, services: Se
 
 def test_the_camera_gets_through_and_nothing_else(client: TestClient, services: Services, run_id: str) -> None:
     with connect(client, f"/live/{run_id}/light") as browser:
-        receive_until(browser, b"/world/floor")
+        receive_until(browser, b"/world/arena/floor")
         for forbidden in ({"type": "ShareUrlRequest"}, {"type": "GuiUpdateMessage", "uuid": "x", "updates": {}}):
             browser.send_bytes(msgspec.msgpack.encode(forbidden))
         browser.send_text("no bytes")
@@ -374,7 +406,7 @@ def test_the_display_says_how_it_stands(client: TestClient, services: Services, 
         portal.call(services.live.attach, run_id, lambda _: None)
         assert display.receive_json()["state"] == "waiting"
         with connect(client, f"/live/{run_id}/light") as browser:
-            receive_until(browser, b"/world/floor")
+            receive_until(browser, b"/world/arena/floor")
             for number in range(6):
                 portal.call(services.live.frames, run_id, make_frame(number).encode())
             score = display.receive_json()

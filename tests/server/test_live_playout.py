@@ -97,6 +97,16 @@ def test_attempts_are_counted_when_the_target_changes() -> None:
     assert [robot.index for robot in board.score("live", follow=1).robots] == [1]
 
 
+def test_nothing_has_ended_between_two_clips() -> None:
+    board = Scoreboard()
+    board.update(frame(0))
+    # Other targets, and outcomes of attempts that nobody saw: the clip begins a minute later, or in another arena.
+    later = dataclasses.replace(frame(1), targets=np.ones((1, 2), np.float32), outcomes=np.ones(1, np.uint8), sim_time=60.0)
+    board.update(later)
+    board.update(dataclasses.replace(frame(2), sim_time=60.1, outcomes=np.ones(1, np.uint8), arena=1))
+    assert board.score("live", None).arrivals == 0
+
+
 def test_counts_start_anew_with_another_mode() -> None:
     board = Scoreboard()
     board.update(frame(0))
@@ -117,24 +127,23 @@ def test_a_crowd_is_not_listed_one_by_one() -> None:
 def test_a_trail_follows_its_robot_and_ends_where_it_is_put_elsewhere() -> None:
     trails = Trails(np.zeros((1, 3), np.float32), points=4, max_speed=0.25)
     for tick in range(10):
-        jumped = trails.update(np.array([[0.05 * tick, 0.0, 0.0]], np.float32), tick * 0.2)
-        assert not jumped.any()
+        trails.update(np.array([[0.05 * tick, 0.0, 0.0]], np.float32), tick * 0.2)
     segments = trails.segments()
     assert segments.shape == (4, 2, 3)
     # The newest end is the robot, and each segment goes on where the one before ended.
     assert segments[0, 0, 0] == pytest.approx(0.45)
     np.testing.assert_array_equal(segments[:-1, 1], segments[1:, 0])
-    assert (np.diff(segments[:, 0, 0]) <= 0).all()
+    assert (np.diff(segments[:, 0, 0]) < 0).all()
 
-    assert trails.update(np.array([[3.0, 3.0, 0.0]], np.float32), 2.0).all()
+    trails.update(np.array([[3.0, 3.0, 0.0]], np.float32), 2.0)
     np.testing.assert_allclose(trails.segments()[..., :2], 3.0)
 
 
-def test_a_trail_starts_anew_when_time_leaps() -> None:
+def test_a_trail_starts_anew_with_another_clip() -> None:
     trails = Trails(np.zeros((1, 3), np.float32), points=4, max_speed=0.25)
     for tick in range(5):
         trails.update(np.array([[0.05 * tick, 0.0, 0.0]], np.float32), tick * 0.2)
-    trails.update(np.array([[0.3, 0.0, 0.0]], np.float32), 60.0)
+    trails.update(np.array([[0.3, 0.0, 0.0]], np.float32), 60.0, anew=True)
     np.testing.assert_allclose(trails.segments()[..., 0], 0.3, rtol=1e-6)
 
 

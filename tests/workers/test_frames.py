@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workers.frames import Frame, FrameError
 
-HEADER_BYTES = 1 + 1 + 2 + 2 + 8 + 8 + 4
+HEADER_BYTES = 1 + 1 + 2 + 2 + 2 + 8 + 8 + 4
 
 
 def floats(*shape: int) -> st.SearchStrategy[NDArray[np.float32]]:
@@ -31,6 +31,7 @@ def frames(draw: st.DrawFn) -> Frame:
         ranges=draw(floats(robots, rays)),
         rewards=draw(floats(robots)),
         outcomes=draw(hnp.arrays(np.uint8, (robots,), elements=st.integers(0, 3))),
+        arena=draw(st.integers(0, 65_535)),
     )
 
 
@@ -65,7 +66,7 @@ def test_a_frame_of_64_robots_takes_ten_kilobytes() -> None:
         rewards=np.zeros(robots, np.float32),
         outcomes=np.zeros(robots, np.uint8),
     )
-    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1) + 1) == 9306
+    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1) + 1) == 9308
 
 
 @given(frames(), st.data())

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sim.arenas import build_arenas
-from sim.config import ArenaConfig, TaskConfig
+from sim.arenas import build_arena, build_arenas
+from sim.config import ArenaConfig, GeneratedArenaConfig, TaskConfig
 from sim.scan import scan
 from sim.vector_env import NavigationVectorEnv
 from workers.clips import CLIP_STEPS, ClipRecorder
@@ -158,6 +158,43 @@ def test_a_clip_holds_consecutive_steps_of_the_training_robots() -> None:
     np.testing.assert_allclose(np.diff([frame.sim_time for frame in frames]), 0.2)
     # One step of 0.2 s a frame, thirty frames a second.
     np.testing.assert_allclose([frame.speed for frame in frames], 6.0)
+
+
+def test_a_clip_stays_in_one_arena_of_a_pool() -> None:
+    task = TaskConfig(arena=GeneratedArenaConfig(maps=3))
+    env = NavigationVectorEnv(task, 12, seed=5)
+    env.reset()
+    recorder = ClipRecorder(robots=4, control_period=0.2, frame_rate=30.0)
+    driven = []
+    for step in range(CLIP_STEPS):
+        env.step(np.tile(np.array([1.0, 0.1], np.float32), (12, 1)))
+        recorder.record(env, 12 * (step + 1))
+        driven.append((env.poses.copy(), env.arena_indices.copy()))
+    frames = list(iter(recorder.take, None))
+    assert len({(frame.arena, frame.poses.shape) for frame in frames}) == 1
+    arena = frames[0].arena
+    assert (driven[0][1] == arena).sum() == np.bincount(driven[0][1]).max()
+
+    shown = np.flatnonzero(driven[0][1] == arena)[:4]
+    gone = np.zeros(len(shown), np.bool_)
+    for number, (frame, (poses, arenas)) in enumerate(zip(frames, driven, strict=True)):
+        gone |= arenas[shown] != arena
+        np.testing.assert_array_equal(frame.poses[~gone], poses[shown][~gone])
+        if number:
+            # Whoever has gone to another arena stays where he was last seen.
+            np.testing.assert_array_equal(frame.poses[gone], frames[number - 1].poses[gone])
+    assert gone.any()
+
+
+def test_a_showcase_drives_in_one_arena_of_a_pool() -> None:
+    task = TaskConfig(arena=GeneratedArenaConfig(maps=64, seed=2))
+    showcase = Showcase(task, 2)
+    arena = build_arena(task.arena, 0)
+    for _ in range(30):
+        showcase.advance(curve_left, 10 / 30)
+        frame = showcase.frame(0, 10.0)
+        assert frame.arena == 0
+        np.testing.assert_allclose(frame.ranges, scan(arena, frame.poses, task.lidar), atol=1e-5)
 
 
 def test_a_clip_shows_no_more_robots_than_train() -> None:
