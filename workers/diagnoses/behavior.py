@@ -3,7 +3,7 @@
 import numpy as np
 
 from workers.diagnoses.history import MIN_POINTS, History
-from workers.diagnoses.model import Diagnosis, Evidence, Rule
+from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
 
 # Uniform noise spins at 0.5 in the shortest window, a healthy policy at 0.2.
 _SPIN = 0.6
@@ -36,7 +36,7 @@ def spins(history: History) -> Diagnosis | None:
         severity="warning",
         title="The robot only spins",
         explanation=(
-            f"Over the last quarter of the training the robots turned one way at {spin:.0%} of their turning rate, "
+            f"Over the last quarter of the training the robots turned one way at {percent(spin)} of their turning rate, "
             + ("on the spot." if on_the_spot else "in circles.")
         ),
         evidence=(
@@ -63,7 +63,7 @@ def actions_saturate(history: History) -> Diagnosis | None:
         severity="warning",
         title="Actions saturate",
         explanation=(
-            f"{saturation:.0%} of the turning commands are at their limit, whatever the robot sees; there tanh has no "
+            f"{percent(saturation)} of the turning commands are at their limit, whatever the robot sees; there tanh has no "
             "gradient left to learn from."
         ),
         evidence=(
@@ -96,8 +96,8 @@ def reward_hacked(history: History) -> Diagnosis | None:
         severity="warning",
         title="The reward is hacked",
         explanation=(
-            f"The return of an episode rose by {rise:,.0f} while success went from {arrived.mean():.1%} to "
-            f"{arrives.mean():.1%}: the robot has found something that pays better than arriving."
+            f"The return of an episode rose by {rise:,.0f} while success went from {percent(arrived.mean(), 1)} to "
+            f"{percent(arrives.mean(), 1)}: the robot has found something that pays better than arriving."
         ),
         evidence=(
             Evidence(metric="train/return", value=float(np.median(late)), expected="rising together with success"),
@@ -133,8 +133,8 @@ def success_stuck(history: History) -> Diagnosis | None:
         severity="warning",
         title="Success is stuck",
         explanation=(
-            f"Success was {was:.1%} in the first half of the training so far and is {now:.1%} now, after "
-            f"{history.progress:.0%} of the steps."
+            f"Success was {percent(was, 1)} in the first half of the training so far and is {percent(now, 1)} now, after "
+            f"{percent(history.progress)} of the steps."
         ),
         evidence=(Evidence(metric=name, value=now, expected="rising, or above 0.7"),),
         advice=(

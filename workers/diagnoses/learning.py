@@ -4,7 +4,7 @@ import numpy as np
 
 from workers.config import PpoConfig, TrainingConfig
 from workers.diagnoses.history import MIN_POINTS, History
-from workers.diagnoses.model import Diagnosis, Evidence, Rule
+from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
 
 # A third of the numbers: the whole scan of 10 batches is more, a velocity that has settled is one.
 _CONSTANT = 1 / 3
@@ -179,7 +179,7 @@ def entropy_collapsed(history: History) -> Diagnosis | None:
         severity="warning",
         title="Entropy collapsed",
         explanation=(
-            f"The policy's entropy is {entropy:.1f} nats: it hardly varies its actions, at {history.success:.0%} success."
+            f"The policy's entropy is {entropy:.1f} nats: its actions hardly vary, at {percent(history.success)} success."
         ),
         evidence=(
             Evidence(metric="policy/entropy", value=entropy, expected=f"above {_ENTROPY:g} until the robot arrives"),

@@ -25,7 +25,7 @@ class Evidence(Frozen):
     """A number that a diagnosis rests on."""
 
     metric: str = Field(description="Name of the curve.")
-    value: float | None = Field(description="Median of the curve's recent part; null where it is not a number.")
+    value: float | None = Field(description="The curve's recent median, or its peak; null where it is not a number.")
     expected: str = Field(description="What a healthy run has.")
 
 
@@ -43,3 +43,8 @@ class Diagnosis(Frozen):
 
 Rule = Callable[[History], Diagnosis | None]
 """Looks for one thing; None where it is not there, or where the curves are too short to tell."""
+
+
+def percent(fraction: float, digits: int = 0) -> str:
+    """A fraction as people read it: 0.494 is '49 %'."""
+    return f"{100.0 * fraction:.{digits}f} %"

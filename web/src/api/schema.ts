@@ -1094,7 +1094,7 @@ export interface components {
             metric: string;
             /**
              * Value
-             * @description Median of the curve's recent part; null where it is not a number.
+             * @description The curve's recent median, or its peak; null where it is not a number.
              */
             value: number | null;
         };
