@@ -7,6 +7,8 @@ from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from server import pages
+from server.arenas import endpoints as gallery
+from server.arenas.store import ArenaStore
 from server.checkpoints import endpoints as checkpoints
 from server.comparison import endpoints as comparison
 from server.database import Database
@@ -36,6 +38,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     system.router,
     login.router,
     experiments.router,
+    gallery.router,
     runs.router,
     metrics.router,
     diagnoses.router,
@@ -65,7 +68,8 @@ def create_services(settings: Settings) -> Services:
     database = Database(settings.resolved_database_url)
     upgrade(database)
     files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
-    return Services(settings=settings, secrets=secrets, database=database, files=files)
+    arenas = ArenaStore(settings.arenas_dir)
+    return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:

@@ -8,6 +8,7 @@ ServiceError                        500
 ├── ConflictError                   409  not in this state
 │   └── (server.runs.states.TransitionError)
 ├── TooLargeError                   413  a body over its cap
+├── UnusableArenaError              422  an arena's files are refused, or it is not there to train on
 ├── CorruptUploadError              422  the bytes are not what their checksum says
 ├── TooManyAttemptsError            429  too many wrong tokens
 ├── ExportFailedError               500  a policy could not be exported faithfully
@@ -72,6 +73,12 @@ class TooLargeError(ServiceError):
     """A body over its cap."""
 
     status = 413
+
+
+class UnusableArenaError(ServiceError):
+    """An arena's files are refused, or it is not there to train on."""
+
+    status = 422
 
 
 class CorruptUploadError(ServiceError):

@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from server.arenas.store import ArenaStore
 from server.database import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
@@ -25,6 +26,7 @@ class Services:
     secrets: Secrets
     database: Database
     files: FileStore
+    arenas: ArenaStore
     bus: EventBus = field(default_factory=EventBus)
     doorbell: Doorbell = field(default_factory=NoDoorbell)
     links: Links = field(default_factory=NoLinks)

@@ -99,6 +99,11 @@ class Settings(BaseSettings):
         return self.files_url or str(self.data_dir / "checkpoints")
 
     @property
+    def arenas_dir(self) -> Path:
+        """Directory of the imported arenas."""
+        return self.data_dir.resolve() / "arenas"
+
+    @property
     def resolved_server_url(self) -> str:
         """Base URL for workers, without a trailing slash."""
         if self.server_url:

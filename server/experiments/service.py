@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from sqlalchemy.orm import Session
 
 from server import models
+from server.arenas.references import without_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.errors import ConflictError
@@ -29,8 +30,13 @@ class ExperimentService:
         self._runs = RunService(services)
 
     def create(self, request: ExperimentCreate) -> Experiment:
-        """Queue one run a seed, and wake workers for them."""
-        experiment = models.Experiment(id=new_id(), name=request.name, training=request.training.model_dump(mode="json"))
+        """Queue one run a seed, and wake workers for them.
+
+        Raises:
+            UnusableArenaError: it trains on an imported arena that is not here.
+        """
+        training = without_geometry(request.training, self._services.arenas)
+        experiment = models.Experiment(id=new_id(), name=request.name, training=training.model_dump(mode="json"))
         experiment.runs = [models.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
         with self._services.database.write() as session:
             ExperimentRepository(session).add(experiment)

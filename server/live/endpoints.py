@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Request, WebSocket
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
+from server.arenas.references import with_geometry
 from server.errors import NotFoundError
 from server.live.bridge import bridge, until_one_ends
 from server.live.hub import TooManyViewsError
@@ -121,7 +122,8 @@ async def _training(run_id: str, services: Services) -> TrainingConfig | None:
 
     def read() -> TrainingConfig:
         with services.database.read() as session:
-            return TrainingConfig.model_validate(RunRepository(session).get(run_id).experiment.training)
+            training = TrainingConfig.model_validate(RunRepository(session).get(run_id).experiment.training)
+        return with_geometry(training, services.arenas)
 
     try:
         return await run_in_threadpool(read)

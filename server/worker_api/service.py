@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from sqlalchemy.orm import Session
 
 from server import models
+from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.errors import NotFoundError
 from server.events.bus import Change, ChangeKind
@@ -60,7 +61,7 @@ class WorkerService:
             claim = Claim(
                 attempt=run.attempt,
                 seed=run.seed,
-                training=TrainingConfig.model_validate(run.experiment.training),
+                training=with_geometry(TrainingConfig.model_validate(run.experiment.training), self._services.arenas),
                 last_seq=run.last_seq,
                 checkpoint=CheckpointReference(id=checkpoint.id, step=checkpoint.step, sha256=checkpoint.sha256)
                 if checkpoint

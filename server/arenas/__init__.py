@@ -1,0 +1,1 @@
+"""The gallery: arenas built in, generated and imported, drawn before anybody trains on them."""

@@ -1,0 +1,52 @@
+"""Arenas in JSON."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from server.schemas import Schema
+from sim.arena_file import ArenaFile
+from sim.config import AnyArenaConfig
+
+MAX_FILES = 2
+"""Of an upload: a ROS map has a YAML file and an image."""
+
+MAX_UPLOAD_BYTES = 24 * 2**20
+"""Of an upload's JSON: the largest image in base64, and its YAML."""
+
+
+class ArenaUploadFile(Schema):
+    """One file of an upload."""
+
+    name: str = Field(min_length=1, max_length=255)
+    content: str = Field(max_length=MAX_UPLOAD_BYTES, description="The file's bytes in base64.")
+
+
+class ArenaUpload(Schema):
+    """The file of an arena, or the two of a ROS map."""
+
+    files: list[ArenaUploadFile] = Field(min_length=1, max_length=MAX_FILES)
+    keep: bool = Field(False, description="Import it; else it is only looked at.")
+
+
+class ArenaSummary(Schema):
+    """An arena in the gallery."""
+
+    kind: Literal["fixed", "generated", "imported"]
+    key: str = Field(description="Unique in the gallery: the arena's name, or the hash of an imported one.")
+    title: str
+    config: AnyArenaConfig = Field(description="What a task's `arena` must be to train on it; without geometry.")
+    imported_at: float | None = Field(description="Epoch seconds; null where it was not imported.")
+
+
+class ArenaView(Schema):
+    """An arena, drawn."""
+
+    title: str
+    config: AnyArenaConfig
+    geometry: ArenaFile
+    obstacles: int
+    free_area: float = Field(description="Square metres in one piece, for a robot that keeps 0.2 m from everything.")
+    free_share: float = Field(description="The same over the floor's area, 0 to 1.")
+    known: bool = Field(description="Built in, generated, or imported already; false for an upload that was only looked at.")
+    trainings: int = Field(description="Experiments that use this imported arena; only one that none uses may be deleted.")

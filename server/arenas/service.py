@@ -1,0 +1,129 @@
+"""What a person may do with arenas."""
+
+import base64
+import binascii
+
+from sqlalchemy import func, select
+
+from server import models
+from server.arenas.schemas import ArenaSummary, ArenaUpload, ArenaView
+from server.errors import ConflictError, UnusableArenaError
+from server.services import Services
+from sim.arena_file import ArenaFile
+from sim.arenas import build_arenas
+from sim.arenas.document import free_area, to_arena, to_document
+from sim.arenas.files import read_arena
+from sim.config import AnyArenaConfig, ArenaConfig, FamilyName, GeneratedArenaConfig, ImportedArenaConfig
+from sim.errors import ArenaFileError
+
+_FIXED = (("Simple", ArenaConfig(name="simple")), ("Complex", ArenaConfig(name="complex")))
+_FAMILIES: tuple[tuple[str, FamilyName], ...] = (
+    ("Random clutter", "clutter"),
+    ("Corridors", "corridors"),
+    ("Rooms with doors", "rooms"),
+    ("Warehouse aisles", "warehouse"),
+    ("Maze", "maze"),
+    ("Narrow passages", "passages"),
+)
+_TITLES = {config.name: title for title, config in _FIXED} | {name: title for title, name in _FAMILIES}
+
+
+class ArenaService:
+    """Lists, draws, imports and deletes arenas."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._store = services.arenas
+
+    def gallery(self) -> list[ArenaSummary]:
+        """Every arena: built in, families, then imported ones by name."""
+        fixed = [
+            ArenaSummary(kind="fixed", key=config.name, title=title, config=config, imported_at=None)
+            for title, config in _FIXED
+        ]
+        generated = [
+            ArenaSummary(kind="generated", key=name, title=title, config=GeneratedArenaConfig(name=name), imported_at=None)
+            for title, name in _FAMILIES
+        ]
+        imported = [
+            ArenaSummary(
+                kind="imported",
+                key=stored.document.sha256,
+                title=stored.document.name,
+                config=ImportedArenaConfig(sha256=stored.document.sha256),
+                imported_at=stored.imported_at,
+            )
+            for stored in self._store.all()
+        ]
+        return fixed + generated + imported
+
+    def fixed(self, config: ArenaConfig) -> ArenaView:
+        """A built-in arena."""
+        return self._view(_TITLES[config.name], config, to_document(build_arenas(config)[0]))
+
+    def generated(self, config: GeneratedArenaConfig) -> ArenaView:
+        """The first map of a family's pool."""
+        (arena,) = build_arenas(config.model_copy(update={"maps": 1}))
+        return self._view(_TITLES[config.name], config, to_document(arena))
+
+    def imported(self, sha256: str) -> ArenaView:
+        """An imported arena.
+
+        Raises:
+            NotFoundError: there is none of this hash.
+        """
+        document = self._store.get(sha256).document
+        return self._view(document.name, ImportedArenaConfig(sha256=sha256), document, trainings=self._trainings(sha256))
+
+    def upload(self, upload: ArenaUpload) -> ArenaView:
+        """Read an arena's files, and keep it if that is asked for.
+
+        Raises:
+            UnusableArenaError: the files are refused, with the reason.
+            ConflictError: there are too many arenas already.
+        """
+        try:
+            document = read_arena({file.name: base64.b64decode(file.content, validate=True) for file in upload.files})
+        except binascii.Error as error:
+            raise UnusableArenaError("The upload is not base64: choose the file again.") from error
+        except ArenaFileError as error:
+            raise UnusableArenaError(str(error)) from error
+        if upload.keep:
+            return self.imported(self._store.add(document))
+        config = ImportedArenaConfig(sha256=document.sha256)
+        return self._view(document.name, config, document, known=False)
+
+    def delete(self, sha256: str) -> None:
+        """Remove an imported arena.
+
+        Raises:
+            NotFoundError: there is none of this hash.
+            ConflictError: an experiment trains on it.
+        """
+        self._store.get(sha256)
+        if count := self._trainings(sha256):
+            raise ConflictError(
+                f"{count} training{'s' if count > 1 else ''} use{'' if count > 1 else 's'} this arena: delete those first."
+            )
+        self._store.delete(sha256)
+
+    def _trainings(self, sha256: str) -> int:
+        used = models.Experiment.training["task"]["arena"]["sha256"].as_string()
+        with self._services.database.read() as session:
+            return session.scalar(select(func.count()).select_from(models.Experiment).where(used == sha256)) or 0
+
+    @staticmethod
+    def _view(
+        title: str, config: AnyArenaConfig, document: ArenaFile, *, known: bool = True, trainings: int = 0
+    ) -> ArenaView:
+        area = free_area(to_arena(document))
+        return ArenaView(
+            title=title,
+            config=config,
+            geometry=document,
+            obstacles=len(document.circles) + len(document.boxes),
+            free_area=round(area, 2),
+            free_share=round(area / (document.width * document.height), 4),
+            known=known,
+            trainings=trainings,
+        )
