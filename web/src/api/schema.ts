@@ -4,7 +4,7 @@
  */
 
 export interface paths {
-    "/api/checkpoints/{checkpoint_id}/bundle": {
+    "/api/arenas": {
         parameters: {
             query?: never;
             header?: never;
@@ -12,13 +12,97 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Download Bundle
-         * @description All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch just now.
+         * List Arenas
+         * @description Every arena that can be trained on.
          */
-        get: operations["download_bundle_api_checkpoints__checkpoint_id__bundle_get"];
+        get: operations["list_arenas_api_arenas_get"];
         put?: never;
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/arenas/fixed/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Fixed Arena
+         * @description A built-in arena.
+         */
+        get: operations["get_fixed_arena_api_arenas_fixed__name__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/arenas/generated/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Generated Arena
+         * @description The first of a family's maps.
+         */
+        get: operations["get_generated_arena_api_arenas_generated__name__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/arenas/imported": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Upload Arena
+         * @description Look at an arena's files, or import them.
+         */
+        post: operations["upload_arena_api_arenas_imported_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/arenas/imported/{sha256}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Imported Arena
+         * @description An imported arena.
+         */
+        get: operations["get_imported_arena_api_arenas_imported__sha256__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Arena
+         * @description Remove an imported arena that no training uses.
+         */
+        delete: operations["delete_arena_api_arenas_imported__sha256__delete"];
         options?: never;
         head?: never;
         patch?: never;
@@ -270,26 +354,6 @@ export interface paths {
          * @description The run's checkpoints by step.
          */
         get: operations["list_checkpoints_api_runs__run_id__checkpoints_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/runs/{run_id}/diagnoses": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Diagnoses
-         * @description Whether the run is learning, and if not, the evidence and what to try.
-         */
-        get: operations["get_diagnoses_api_runs__run_id__diagnoses_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -571,6 +635,94 @@ export interface components {
              * @description Between the walls along x, metres.
              */
             width: number;
+        };
+        /**
+         * ArenaSummary
+         * @description An arena in the gallery.
+         */
+        ArenaSummary: {
+            /**
+             * Config
+             * @description What a task's `arena` must be to train on it; without geometry.
+             */
+            config: components["schemas"]["ArenaConfig-Output"] | components["schemas"]["GeneratedArenaConfig-Output"] | components["schemas"]["ImportedArenaConfig-Output"];
+            /**
+             * Imported At
+             * @description Epoch seconds; null where it was not imported.
+             */
+            imported_at: number | null;
+            /**
+             * Key
+             * @description Unique in the gallery: the arena's name, or the hash of an imported one.
+             */
+            key: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "fixed" | "generated" | "imported";
+            /** Title */
+            title: string;
+        };
+        /**
+         * ArenaUpload
+         * @description The file of an arena, or the two of a ROS map.
+         */
+        ArenaUpload: {
+            /** Files */
+            files: components["schemas"]["ArenaUploadFile"][];
+            /**
+             * Keep
+             * @description Import it; else it is only looked at.
+             * @default false
+             */
+            keep: boolean;
+        };
+        /**
+         * ArenaUploadFile
+         * @description One file of an upload.
+         */
+        ArenaUploadFile: {
+            /**
+             * Content
+             * @description The file's bytes in base64.
+             */
+            content: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * ArenaView
+         * @description An arena, drawn.
+         */
+        ArenaView: {
+            /** Config */
+            config: components["schemas"]["ArenaConfig-Output"] | components["schemas"]["GeneratedArenaConfig-Output"] | components["schemas"]["ImportedArenaConfig-Output"];
+            /**
+             * Free Area
+             * @description Square metres in one piece, for a robot that keeps 0.2 m from everything.
+             */
+            free_area: number;
+            /**
+             * Free Share
+             * @description The same over the floor's area, 0 to 1.
+             */
+            free_share: number;
+            geometry: components["schemas"]["ArenaFile-Output"];
+            /**
+             * Known
+             * @description Built in, generated, or imported already; false for an upload that was only looked at.
+             */
+            known: boolean;
+            /** Obstacles */
+            obstacles: number;
+            /** Title */
+            title: string;
+            /**
+             * Trainings
+             * @description Experiments that use this imported arena; only one that none uses may be deleted.
+             */
+            trainings: number;
         };
         /**
          * Box
@@ -879,57 +1031,6 @@ export interface components {
             warmup_steps: number;
         };
         /**
-         * Diagnoses
-         * @description What a run's curves say about it.
-         */
-        Diagnoses: {
-            /**
-             * Diagnoses
-             * @description Causes before symptoms; empty for a healthy run.
-             */
-            diagnoses: components["schemas"]["Diagnosis"][];
-            /** Run Id */
-            run_id: string;
-            /**
-             * Step
-             * @description Environment step of the newest curve point; 0 before the first.
-             */
-            step: number;
-        };
-        /**
-         * Diagnosis
-         * @description Something that is wrong with a run.
-         */
-        Diagnosis: {
-            /**
-             * Advice
-             * @description What to try, the most promising first.
-             */
-            advice: string[];
-            /** Evidence */
-            evidence: components["schemas"]["Evidence"][];
-            /** Explanation */
-            explanation: string;
-            /**
-             * Id
-             * @enum {string}
-             */
-            id: "not_finite" | "constant_observations" | "kl_exploded" | "value_diverges" | "entropy_collapsed" | "actions_saturate" | "spins" | "reward_hacked" | "success_stuck";
-            /**
-             * Severity
-             * @description An error never mends itself.
-             * @enum {string}
-             */
-            severity: "warning" | "error";
-            /**
-             * Step
-             * @description Environment step of the newest number behind it.
-             */
-            step: number;
-            /** Title */
-            title: string;
-        };
-        /**
          * Difference
          * @description A setting in which the experiments differ.
          */
@@ -1076,27 +1177,6 @@ export interface components {
              * @default 50000
              */
             every_steps: number;
-        };
-        /**
-         * Evidence
-         * @description A number that a diagnosis rests on.
-         */
-        Evidence: {
-            /**
-             * Expected
-             * @description What a healthy run has.
-             */
-            expected: string;
-            /**
-             * Metric
-             * @description Name of the curve.
-             */
-            metric: string;
-            /**
-             * Value
-             * @description The curve's recent median, or its peak; null where it is not a number.
-             */
-            value: number | null;
         };
         /**
          * Experiment
@@ -2702,12 +2782,41 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
-    download_bundle_api_checkpoints__checkpoint_id__bundle_get: {
+    list_arenas_api_arenas_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArenaSummary"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_fixed_arena_api_arenas_fixed__name__get: {
         parameters: {
             query?: never;
             header?: never;
             path: {
-                checkpoint_id: string;
+                name: "simple" | "complex";
             };
             cookie?: never;
         };
@@ -2719,7 +2828,141 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/zip": string;
+                    "application/json": components["schemas"]["ArenaView"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_generated_arena_api_arenas_generated__name__get: {
+        parameters: {
+            query?: {
+                difficulty?: number;
+                seed?: number;
+            };
+            header?: never;
+            path: {
+                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArenaView"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    upload_arena_api_arenas_imported_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ArenaUpload"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArenaView"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_imported_arena_api_arenas_imported__sha256__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sha256: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArenaView"];
                 };
             };
             /** @description No valid login */
@@ -2749,8 +2992,28 @@ export interface operations {
                     "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
-            /** @description Not exported: the reason is in the detail */
-            500: {
+        };
+    };
+    delete_arena_api_arenas_imported__sha256__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sha256: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2758,13 +3021,31 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Took too long */
-            503: {
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -3467,55 +3748,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Checkpoint"][];
-                };
-            };
-            /** @description No valid login */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description No such thing */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description Validation Error */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HTTPValidationError"];
-                };
-            };
-        };
-    };
-    get_diagnoses_api_runs__run_id__diagnoses_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                run_id: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Diagnoses"];
                 };
             };
             /** @description No valid login */
