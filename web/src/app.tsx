@@ -32,6 +32,10 @@ export const routes: RouteObject[] = [
             path: 'compare',
             lazy: async () => ({ Component: (await import('./pages/ComparePage')).ComparePage }),
           },
+          {
+            path: 'arenas',
+            lazy: async () => ({ Component: (await import('./pages/ArenasPage')).ArenasPage }),
+          },
           { path: '*', element: <NotFoundPage /> },
         ],
       },

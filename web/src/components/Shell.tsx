@@ -44,6 +44,7 @@ export function Shell() {
               New<span className={classes.wide}> training</span>
             </NavLink>
             <NavLink to="/compare">Compare</NavLink>
+            <NavLink to="/arenas">Arenas</NavLink>
           </nav>
         )}
         <Group gap={10} ml="auto" wrap="nowrap">

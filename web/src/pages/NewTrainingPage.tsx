@@ -13,7 +13,8 @@ import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
 import type { Json, Schema } from '../form/schema'
 import { useForm } from '../form/useForm'
-import { sameValue, valueAt } from '../form/values'
+import { sameValue, valueAt, withValue } from '../form/values'
+import { arenaFromSearch } from '../lib/arenas'
 import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import classes from './NewTrainingPage.module.css'
@@ -35,7 +36,8 @@ export function NewTrainingPage() {
     { enabled: from !== null },
   )
   const copied = useCopy(original.data)
-  const initial = from === null ? form.data?.defaults : copied
+  const chosen = search.get('arena')
+  const initial = from === null ? withArena(form.data?.defaults, chosen) : copied
   const error = form.isError ? form.error : from === null ? null : original.error
 
   return (
@@ -61,15 +63,23 @@ export function NewTrainingPage() {
         </Panel>
       ) : (
         <LaunchForm
-          key={from ?? ''}
+          key={from ?? chosen ?? ''}
           schema={form.data.schema as Schema}
           defaults={form.data.defaults as unknown as Json}
-          initial={initial as unknown as Json}
+          initial={initial}
           presets={form.data.presets}
         />
       )}
     </Page>
   )
+}
+
+/** The defaults, on the arena that was chosen in the gallery. */
+function withArena(defaults: unknown, chosen: string | null): Json | undefined {
+  if (defaults === undefined) return undefined
+  const values = defaults as Json
+  const arena = arenaFromSearch(chosen)
+  return arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
 }
 
 /** What a duplicate starts with; taken once, since its original may go on while the copy is being edited. */

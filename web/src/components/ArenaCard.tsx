@@ -1,0 +1,161 @@
+/** One arena of the gallery: its drawing, what it is, and the way to a training on it. */
+import { ActionIcon, Button, Group, Skeleton, Slider, Text, Tooltip } from '@mantine/core'
+import { useDebouncedValue } from '@mantine/hooks'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useState } from 'react'
+import { Link } from 'react-router'
+import { $api } from '../api/client'
+import { messageOf } from '../api/errors'
+import type { ArenaSummary, ArenaView } from '../api/types'
+import { arenaFacts, trainOn } from '../lib/arenas'
+import classes from './ArenaCard.module.css'
+import { ArenaDrawing } from './ArenaDrawing'
+import { IconRefresh, IconTrash } from './icons'
+
+export function ArenaCard({
+  arena,
+  onDelete,
+}: {
+  arena: ArenaSummary
+  onDelete: (arena: ArenaSummary) => void
+}) {
+  switch (arena.kind) {
+    case 'generated':
+      return <FamilyCard arena={arena} />
+    case 'imported':
+      return <ImportedCard arena={arena} onDelete={onDelete} />
+    case 'fixed':
+      return <FixedCard arena={arena} />
+  }
+}
+
+function FixedCard({ arena }: { arena: ArenaSummary }) {
+  const { data, error } = $api.useQuery(
+    'get',
+    '/api/arenas/fixed/{name}',
+    { params: { path: { name: arena.key as 'simple' | 'complex' } } },
+    { staleTime: Number.POSITIVE_INFINITY },
+  )
+  return <Card title={arena.title} view={data} error={error} config={arena.config} />
+}
+
+function ImportedCard({ arena, onDelete }: { arena: ArenaSummary; onDelete: (arena: ArenaSummary) => void }) {
+  const { data, error } = $api.useQuery(
+    'get',
+    '/api/arenas/imported/{sha256}',
+    { params: { path: { sha256: arena.key } } },
+    { staleTime: 60_000 },
+  )
+  return (
+    <Card
+      title={arena.title}
+      view={data}
+      error={error}
+      config={arena.config}
+      action={
+        <Tooltip label={`Delete ${arena.title}`}>
+          <ActionIcon
+            variant="subtle"
+            color="gray"
+            aria-label={`Delete ${arena.title}`}
+            onClick={() => onDelete(arena)}
+          >
+            <IconTrash size={16} stroke={1.6} />
+          </ActionIcon>
+        </Tooltip>
+      }
+    />
+  )
+}
+
+type Family = 'clutter' | 'corridors' | 'rooms' | 'warehouse' | 'maze' | 'passages'
+
+function FamilyCard({ arena }: { arena: ArenaSummary }) {
+  const [difficulty, setDifficulty] = useState(0.5)
+  const [seed, setSeed] = useState(0)
+  const [wanted] = useDebouncedValue(difficulty, 120)
+  const { data, error } = $api.useQuery(
+    'get',
+    '/api/arenas/generated/{name}',
+    { params: { path: { name: arena.key as Family }, query: { difficulty: wanted, seed } } },
+    { staleTime: Number.POSITIVE_INFINITY, placeholderData: keepPreviousData },
+  )
+  return (
+    <Card
+      title={arena.title}
+      view={data}
+      error={error}
+      config={{ ...arena.config, difficulty, seed } as ArenaSummary['config']}
+      action={
+        <Tooltip label="Another map">
+          <ActionIcon
+            variant="subtle"
+            color="gray"
+            aria-label={`Another map of ${arena.title}`}
+            onClick={() => setSeed(seed + 1)}
+          >
+            <IconRefresh size={16} stroke={1.6} />
+          </ActionIcon>
+        </Tooltip>
+      }
+    >
+      <div className={classes.difficulty}>
+        <Text size="xs" c="dimmed" component="span" aria-hidden>
+          Difficulty
+        </Text>
+        <Slider
+          className={classes.slider}
+          size="sm"
+          thumbLabel={`Difficulty of ${arena.title}`}
+          min={0}
+          max={1}
+          step={0.05}
+          label={null}
+          value={difficulty}
+          onChange={setDifficulty}
+        />
+        <Text size="xs" component="span" className={classes.value}>
+          {difficulty.toFixed(2)}
+        </Text>
+      </div>
+    </Card>
+  )
+}
+
+interface CardProps {
+  title: string
+  view: ArenaView | undefined
+  error: unknown
+  config: ArenaSummary['config']
+  action?: React.ReactNode
+  children?: React.ReactNode
+}
+
+function Card({ title, view, error, config, action, children }: CardProps) {
+  return (
+    <li className={classes.card} data-testid="arena">
+      <div className={classes.picture}>
+        {view ? (
+          <ArenaDrawing geometry={view.geometry} label={`${title} from above`} />
+        ) : error ? (
+          <Text size="xs" c="dimmed" role="alert">
+            {messageOf(error)}
+          </Text>
+        ) : (
+          <Skeleton width="100%" height="100%" />
+        )}
+      </div>
+      <Group justify="space-between" wrap="nowrap" gap={4} mt={8} mih={28}>
+        <h3 className={classes.title}>{title}</h3>
+        {action}
+      </Group>
+      <Text size="xs" c="dimmed" className={classes.facts}>
+        {view ? arenaFacts(view) : ' '}
+      </Text>
+      {children}
+      <Button component={Link} to={trainOn(config)} variant="default" size="xs" mt="auto" fullWidth>
+        Train on it
+      </Button>
+    </li>
+  )
+}

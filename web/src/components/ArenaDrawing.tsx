@@ -1,0 +1,64 @@
+/** An arena from above, drawn to scale: walls, obstacles, and its own start and target where it has them. */
+import type { ArenaGeometry } from '../api/types'
+import classes from './ArenaDrawing.module.css'
+
+interface ArenaDrawingProps {
+  geometry: ArenaGeometry
+  /** What a screen reader says instead of the drawing. */
+  label: string
+}
+
+/** How thick the outer wall is drawn, as a share of the longer side. */
+const WALL = 0.012
+/** Length of the arrow at the start, likewise. */
+const ARROW = 0.05
+
+export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
+  const { width, height, circles, boxes, start, target } = geometry
+  const unit = Math.max(width, height)
+  const wall = unit * WALL
+  const arrow = unit * ARROW
+  return (
+    <svg
+      className={classes.drawing}
+      viewBox={`${-width / 2 - wall} ${-height / 2 - wall} ${width + 2 * wall} ${height + 2 * wall}`}
+      role="img"
+      aria-label={label}
+    >
+      <rect
+        className={classes.floor}
+        x={-width / 2 - wall / 2}
+        y={-height / 2 - wall / 2}
+        width={width + wall}
+        height={height + wall}
+        strokeWidth={wall}
+      />
+      {/* Arenas count y upwards, drawings downwards. */}
+      <g transform="scale(1,-1)">
+        <g className={classes.obstacles}>
+          {circles.map(({ x, y, radius }) => (
+            <circle key={`${x} ${y} ${radius}`} cx={x} cy={y} r={radius} />
+          ))}
+          {boxes.map(({ x, y, length, width: across, angle }) => (
+            <rect
+              key={`${x} ${y} ${length} ${across} ${angle}`}
+              x={-length / 2}
+              y={-across / 2}
+              width={length}
+              height={across}
+              transform={`translate(${x} ${y}) rotate(${angle})`}
+            />
+          ))}
+        </g>
+        {start && (
+          <path
+            className={classes.start}
+            d={`M${arrow} 0L${-arrow / 2} ${arrow / 2}L${-arrow / 2} ${-arrow / 2}Z`}
+            transform={`translate(${start.x} ${start.y}) rotate(${start.heading})`}
+          />
+        )}
+        {target && <circle className={classes.target} cx={target.x} cy={target.y} r={arrow / 2} />}
+      </g>
+    </svg>
+  )
+}

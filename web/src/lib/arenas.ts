@@ -1,0 +1,30 @@
+/** What the gallery says about an arena, and how the launch form learns which one was chosen. */
+import type { ArenaConfig, ArenaView } from '../api/types'
+import type { Json } from '../form/schema'
+import { plural, significant } from './format'
+
+/** "10 × 10 m · 17 obstacles · 72 % free". */
+export function arenaFacts({ geometry, obstacles, free_share }: ArenaView): string {
+  const { width, height } = geometry
+  return [
+    `${significant(width)} × ${significant(height)} m`,
+    obstacles === 0 ? 'no obstacles' : plural(obstacles, 'obstacle'),
+    `${Math.round(100 * free_share)} % free`,
+  ].join(' · ')
+}
+
+/** The address of a launch form with this arena. */
+export const trainOn = (config: ArenaConfig): string =>
+  `/new?arena=${encodeURIComponent(JSON.stringify(config))}`
+
+/** The arena in a launch form's address, or null: whatever is wrong inside it the server will say. */
+export function arenaFromSearch(text: string | null): { [key: string]: Json } | null {
+  if (text === null) return null
+  try {
+    const value: unknown = JSON.parse(text)
+    const named = typeof value === 'object' && value !== null && !Array.isArray(value) && 'name' in value
+    return named ? (value as { [key: string]: Json }) : null
+  } catch {
+    return null
+  }
+}
