@@ -108,6 +108,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/checkpoints/{checkpoint_id}/bundle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Bundle
+         * @description All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch just now.
+         */
+        get: operations["download_bundle_api_checkpoints__checkpoint_id__bundle_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/checkpoints/{checkpoint_id}/download": {
         parameters: {
             query?: never;
@@ -354,6 +374,26 @@ export interface paths {
          * @description The run's checkpoints by step.
          */
         get: operations["list_checkpoints_api_runs__run_id__checkpoints_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/diagnoses": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Diagnoses
+         * @description Whether the run is learning, and if not, the evidence and what to try.
+         */
+        get: operations["get_diagnoses_api_runs__run_id__diagnoses_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1031,6 +1071,57 @@ export interface components {
             warmup_steps: number;
         };
         /**
+         * Diagnoses
+         * @description What a run's curves say about it.
+         */
+        Diagnoses: {
+            /**
+             * Diagnoses
+             * @description Causes before symptoms; empty for a healthy run.
+             */
+            diagnoses: components["schemas"]["Diagnosis"][];
+            /** Run Id */
+            run_id: string;
+            /**
+             * Step
+             * @description Environment step of the newest curve point; 0 before the first.
+             */
+            step: number;
+        };
+        /**
+         * Diagnosis
+         * @description Something that is wrong with a run.
+         */
+        Diagnosis: {
+            /**
+             * Advice
+             * @description What to try, the most promising first.
+             */
+            advice: string[];
+            /** Evidence */
+            evidence: components["schemas"]["Evidence"][];
+            /** Explanation */
+            explanation: string;
+            /**
+             * Id
+             * @enum {string}
+             */
+            id: "not_finite" | "constant_observations" | "kl_exploded" | "value_diverges" | "entropy_collapsed" | "actions_saturate" | "spins" | "reward_hacked" | "success_stuck";
+            /**
+             * Severity
+             * @description An error never mends itself.
+             * @enum {string}
+             */
+            severity: "warning" | "error";
+            /**
+             * Step
+             * @description Environment step of the newest number behind it.
+             */
+            step: number;
+            /** Title */
+            title: string;
+        };
+        /**
          * Difference
          * @description A setting in which the experiments differ.
          */
@@ -1177,6 +1268,27 @@ export interface components {
              * @default 50000
              */
             every_steps: number;
+        };
+        /**
+         * Evidence
+         * @description A number that a diagnosis rests on.
+         */
+        Evidence: {
+            /**
+             * Expected
+             * @description What a healthy run has.
+             */
+            expected: string;
+            /**
+             * Metric
+             * @description Name of the curve.
+             */
+            metric: string;
+            /**
+             * Value
+             * @description Median of the curve's recent part; null where it is not a number.
+             */
+            value: number | null;
         };
         /**
          * Experiment
@@ -3050,6 +3162,73 @@ export interface operations {
             };
         };
     };
+    download_bundle_api_checkpoints__checkpoint_id__bundle_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                checkpoint_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not exported: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
     download_checkpoint_api_checkpoints__checkpoint_id__download_get: {
         parameters: {
             query?: never;
@@ -3748,6 +3927,55 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Checkpoint"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_diagnoses_api_runs__run_id__diagnoses_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Diagnoses"];
                 };
             };
             /** @description No valid login */

@@ -9,7 +9,7 @@ export function arenaFacts({ geometry, obstacles, free_share }: ArenaView): stri
   return [
     `${significant(width)} × ${significant(height)} m`,
     obstacles === 0 ? 'no obstacles' : plural(obstacles, 'obstacle'),
-    `${Math.round(100 * free_share)} % free`,
+    `${Math.round(100 * free_share)}\u00a0%\u00a0free`,
   ].join(' · ')
 }
 

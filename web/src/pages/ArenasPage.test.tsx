@@ -1,0 +1,139 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import type { ArenaSummary, ArenaView } from '../api/types'
+import { arenaFacts, arenaFromSearch } from '../lib/arenas'
+import { form } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const HASH = 'a'.repeat(64)
+
+const GALLERY: ArenaSummary[] = [
+  { kind: 'fixed', key: 'simple', title: 'Simple', config: { name: 'simple' }, imported_at: null },
+  {
+    kind: 'generated',
+    key: 'maze',
+    title: 'Maze',
+    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0 },
+    imported_at: null,
+  },
+  {
+    kind: 'imported',
+    key: HASH,
+    title: 'Lab',
+    config: { name: 'imported', sha256: HASH, arena: null },
+    imported_at: 1,
+  },
+]
+
+const LAB: ArenaView = {
+  title: 'Lab',
+  config: { name: 'imported', sha256: HASH, arena: null },
+  geometry: {
+    format: 'mapless-arena/1',
+    name: 'Lab',
+    width: 8,
+    height: 6,
+    circles: [{ x: 1, y: 0.5, radius: 0.3 }],
+    boxes: [{ x: -2, y: 0, length: 2, width: 0.5, angle: 30 }],
+    start: null,
+    target: null,
+  },
+  obstacles: 2,
+  free_area: 39.4,
+  free_share: 0.82,
+  known: false,
+  trainings: 0,
+}
+
+function start(routes = {}) {
+  return startServer({
+    'GET /api/arenas': GALLERY,
+    'GET /api/arenas/fixed/simple': { ...LAB, title: 'Simple' },
+    'GET /api/arenas/generated/maze': { ...LAB, title: 'Maze' },
+    [`GET /api/arenas/imported/${HASH}`]: LAB,
+    'GET /api/training/form': form,
+    ...routes,
+  })
+}
+
+const card = async (name: string) => {
+  const heading = await screen.findByRole('heading', { name })
+  return within(heading.closest('li') as HTMLElement)
+}
+
+test('every arena is drawn, to scale, with what it is', async () => {
+  start()
+  open('/arenas')
+  const lab = await card('Lab')
+  const drawing = await lab.findByRole('img', { name: 'Lab from above' })
+  expect(drawing.querySelectorAll('circle')).toHaveLength(1)
+  expect(drawing.querySelector('circle')).toHaveAttribute('r', '0.3')
+  expect(drawing.querySelector('g rect')).toHaveAttribute('transform', 'translate(-2 0) rotate(30)')
+  expect(lab.getByText(/8 × 6 m · 2 obstacles · 82/)).toBeInTheDocument()
+  expect((await card('Maze')).getByRole('slider')).toHaveAttribute('aria-valuenow', '0.5')
+})
+
+test('the difficulty is what is drawn, and what the training starts with', async () => {
+  const server = start()
+  const { router, user } = open('/arenas')
+  const maze = await card('Maze')
+  maze.getByRole('slider').focus()
+  await user.keyboard('{ArrowRight}{ArrowRight}')
+  await waitFor(() => expect(server.asked).toContain('/api/arenas/generated/maze?difficulty=0.6&seed=0'))
+  await user.click(maze.getByRole('button', { name: 'Another map of Maze' }))
+  await user.click(maze.getByRole('link', { name: 'Train on it' }))
+  await waitFor(() => expect(router.state.location.pathname).toBe('/new'))
+  const chosen = new URLSearchParams(router.state.location.search).get('arena')
+  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1 })
+})
+
+test('the launch form takes the chosen arena, and ignores what is none', async () => {
+  const server = start({ 'POST /api/experiments': new Error('offline') })
+  const { user } = open(`/new?arena=${encodeURIComponent('{"name":"complex"}')}`)
+  await user.click(await screen.findByRole('button', { name: 'Launch' }))
+  expect(server.changes.at(-1)?.body).toMatchObject({ training: { task: { arena: { name: 'complex' } } } })
+  for (const text of [null, '', 'complex', '[1]', '{"size":3}']) expect(arenaFromSearch(text)).toBeNull()
+})
+
+test('an upload is shown before it is kept', async () => {
+  const server = start({ 'POST /api/arenas/imported': LAB })
+  const { user } = open('/arenas')
+  await card('Lab')
+  const input = document.querySelector('input[type=file]') as HTMLInputElement
+  await user.upload(input, new File(['name: Lab'], 'lab.yaml'))
+  const dialog = within(await screen.findByRole('dialog'))
+  expect(dialog.getByRole('img', { name: 'Lab from above' })).toBeInTheDocument()
+  const files = [{ name: 'lab.yaml', content: btoa('name: Lab') }]
+  expect(server.changes.map(({ body }) => body)).toEqual([{ files, keep: false }])
+  await user.click(dialog.getByRole('button', { name: 'Import' }))
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(server.changes.at(-1)?.body).toEqual({ files, keep: true })
+})
+
+test('a refused file says why', async () => {
+  start({ 'POST /api/arenas/imported': refusal(422, 'a.world: no obstacle in it') })
+  const { user } = open('/arenas')
+  await card('Lab')
+  const input = document.querySelector('input[type=file]') as HTMLInputElement
+  await user.upload(input, new File(['<sdf/>'], 'a.world'))
+  expect(await screen.findByText('a.world: no obstacle in it')).toBeInTheDocument()
+  expect(screen.queryByRole('button', { name: 'Import' })).not.toBeInTheDocument()
+})
+
+test('an arena is deleted after a question, and a refusal is told', async () => {
+  const server = start({
+    [`DELETE /api/arenas/imported/${HASH}`]: refusal(409, '1 training uses this arena'),
+  })
+  const { user } = open('/arenas')
+  await user.click((await card('Lab')).getByRole('button', { name: 'Delete Lab' }))
+  await user.click(await screen.findByRole('button', { name: 'Delete' }))
+  expect(await screen.findByText('1 training uses this arena')).toBeInTheDocument()
+  expect(server.changes.at(-1)?.route).toBe(`DELETE /api/arenas/imported/${HASH}`)
+})
+
+test('facts are short', () => {
+  expect(arenaFacts({ ...LAB, obstacles: 0 })).toBe('8 × 6 m · no obstacles · 82\u00a0%\u00a0free')
+})
