@@ -26,13 +26,13 @@ def list_arenas(service: ArenaServiceDep) -> list[ArenaSummary]:
     return service.gallery()
 
 
-@router.get("/fixed/{name}")
+@router.get("/fixed")
 def get_fixed_arena(name: ArenaName, service: ArenaServiceDep) -> ArenaView:
     """A built-in arena."""
     return service.fixed(ArenaConfig(name=name))
 
 
-@router.get("/generated/{name}")
+@router.get("/generated")
 def get_generated_arena(
     name: FamilyName,
     service: ArenaServiceDep,

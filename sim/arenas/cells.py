@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.arenas.geometry import Arena
+from sim.arenas.geometry import Arena, box_distance, circle_distance
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int32]
@@ -53,31 +53,38 @@ class Grid:
 def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:
     """(rows, columns) whether every point of a cell keeps `clearance` from walls and obstacles.
 
-    So a path through free cells, also from corner to corner, keeps the clearance all the way. Each obstacle costs only the
-    cells around it: about 15 microseconds at 10 x 10 m.
+    So a path through free cells, also from corner to corner, keeps the clearance all the way.
     """
     grid = Grid.over(arena, cell)
     reach = clearance + cell / np.sqrt(2.0)  # from a cell's centre to its corner
     xs, ys = grid.xs(), grid.ys()
     inside_x = arena.half_width - np.abs(xs) >= clearance + 0.5 * cell - 1e-9
     inside_y = arena.half_height - np.abs(ys) >= clearance + 0.5 * cell - 1e-9
-    free = inside_y[:, None] & inside_x[None, :]
-    for x, y, radius in arena.circles:
-        rows, columns = grid.window(x, y, radius + reach)
-        square = (xs[columns] - x)[None, :] ** 2 + (ys[rows] - y)[:, None] ** 2
-        free[rows, columns] &= square >= (radius + reach) ** 2
-    for x, y, half_length, half_width, angle in arena.boxes:
-        rows, columns = grid.window(x, y, float(np.hypot(half_length, half_width)) + reach)
-        dx, dy = (xs[columns] - x)[None, :], (ys[rows] - y)[:, None]
-        cos, sin = np.cos(angle), np.sin(angle)
-        along = np.maximum(np.abs(cos * dx + sin * dy) - half_length, 0.0)
-        across = np.maximum(np.abs(cos * dy - sin * dx) - half_width, 0.0)
-        free[rows, columns] &= along**2 + across**2 >= reach**2
-    return free
+    inside = inside_y[:, None] & inside_x[None, :]
+    return np.asarray(inside & (obstacle_distance(arena, grid, reach) >= reach))
 
 
-def components(free: Mask) -> tuple[Labels, NDArray[np.int64]]:
-    """Free cells that hang together, over edges or corners.
+def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float64]:
+    """(rows, columns) signed distances from the cells' centres to the nearest obstacle, but at most `cap` metres.
+
+    Each obstacle costs only the cells within `cap` of it, where `free_distance` costs all cells for all obstacles: seconds
+    become minutes in a hall of 100 x 100 m with 2,000 obstacles.
+    """
+    xs, ys = grid.xs()[None, :], grid.ys()[:, None]
+    distance = np.full((grid.rows, grid.columns), cap)
+    for circle in arena.circles:
+        rows, columns = grid.window(circle[0], circle[1], circle[2] + cap)
+        near = circle_distance(circle, xs[:, columns], ys[rows])
+        distance[rows, columns] = np.minimum(distance[rows, columns], near)
+    for box in arena.boxes:
+        rows, columns = grid.window(box[0], box[1], float(np.hypot(box[2], box[3])) + cap)
+        near = box_distance(box, xs[:, columns], ys[rows])
+        distance[rows, columns] = np.minimum(distance[rows, columns], near)
+    return distance
+
+
+def components(free: Mask, *, corners: bool = True) -> tuple[Labels, NDArray[np.int64]]:
+    """Free cells that hang together, over edges and, unless `corners` is false, over corners.
 
     Returns:
         (rows, columns) labels, -1 where blocked, 0 for the largest component, the others by size; and (K,) their sizes in
@@ -89,7 +96,7 @@ def components(free: Mask) -> tuple[Labels, NDArray[np.int64]]:
     steps = np.diff(padded, axis=1)
     run_rows, starts = np.nonzero(steps == 1)
     ends = np.nonzero(steps == -1)[1]
-    roots = _join_runs(run_rows.tolist(), starts.tolist(), ends.tolist())
+    roots = _join_runs(run_rows.tolist(), starts.tolist(), ends.tolist(), reach=1 if corners else 0)
     names, of_run = np.unique(roots, return_inverse=True)
     lengths = ends - starts
     sizes = np.bincount(of_run, weights=lengths, minlength=len(names)).astype(np.int64)
@@ -101,8 +108,11 @@ def components(free: Mask) -> tuple[Labels, NDArray[np.int64]]:
     return labels, sizes[order]
 
 
-def _join_runs(rows: list[int], starts: list[int], ends: list[int]) -> NDArray[np.int64]:
-    """The root of every horizontal run of free cells, after joining runs that touch; runs come in row-major order."""
+def _join_runs(rows: list[int], starts: list[int], ends: list[int], reach: int) -> NDArray[np.int64]:
+    """The root of every horizontal run of free cells, which come in row-major order.
+
+    Runs of neighbouring rows are joined where their columns overlap or, with a `reach` of 1, meet at a corner.
+    """
     parent = list(range(len(rows)))
 
     def find(run: int) -> int:
@@ -113,10 +123,10 @@ def _join_runs(rows: list[int], starts: list[int], ends: list[int]) -> NDArray[n
 
     above = 0
     for run, row in enumerate(rows):
-        while rows[above] < row - 1 or (rows[above] == row - 1 and ends[above] < starts[run]):
+        while rows[above] < row - 1 or (rows[above] == row - 1 and ends[above] + reach <= starts[run]):
             above += 1
         other = above
-        while other < run and rows[other] == row - 1 and starts[other] <= ends[run]:
+        while other < run and rows[other] == row - 1 and starts[other] < ends[run] + reach:
             parent[find(other)] = find(run)
             other += 1
     return np.array([find(run) for run in range(len(rows))], dtype=np.int64)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.arenas.geometry import Arena, free_distance
+from sim.arenas.cells import Grid, components, obstacle_distance
+from sim.arenas.geometry import Arena
 from sim.errors import ArenaError
 
 CELL = 0.1
@@ -35,8 +36,8 @@ class FreeSpace:
     clearance: float
 
 
-def grid_centres(arena: Arena) -> NDArray[np.float64]:
-    """Centres of the cells that cover an arena, (rows, columns, 2).
+def grid_over(arena: Arena) -> Grid:
+    """The cells that cover an arena.
 
     Raises:
         ArenaError: the arena needs more than `MAX_CELLS`.
@@ -45,34 +46,13 @@ def grid_centres(arena: Arena) -> NDArray[np.float64]:
     rows = max(1, round(2.0 * arena.half_height / CELL))
     if columns * rows > MAX_CELLS:
         raise ArenaError(f"arena {arena.name!r} is too large: at most {MAX_CELLS * CELL**2:,.0f} square metres")
-    x = (np.arange(columns) + 0.5) * CELL - 0.5 * columns * CELL
-    y = (np.arange(rows) + 0.5) * CELL - 0.5 * rows * CELL
-    return np.stack(np.meshgrid(x, y), axis=-1)
+    return Grid(rows, columns, CELL)
 
 
 def largest_region(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The largest 4-connected region of a (rows, columns) mask; all False when nothing is free."""
-    rows, columns = free.shape
-    padded = np.zeros((rows + 2, columns + 2), dtype=np.bool_)
-    padded[1:-1, 1:-1] = free
-    unseen = padded.ravel().copy()
-    stride = columns + 2
-    best: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-    while np.count_nonzero(unseen) > len(best):
-        seed = np.array([int(np.argmax(unseen))])
-        unseen[seed] = False
-        region = [seed]
-        frontier = seed
-        while len(frontier):
-            neighbours = (frontier[:, None] + np.array([-stride, -1, 1, stride])).ravel()
-            frontier = np.unique(neighbours[unseen[neighbours]])
-            unseen[frontier] = False
-            region.append(frontier)
-        if sum(map(len, region)) > len(best):
-            best = np.concatenate(region)
-    mask = np.zeros(padded.size, dtype=np.bool_)
-    mask[best] = True
-    return mask.reshape(padded.shape)[1:-1, 1:-1]
+    labels, _ = components(free, corners=False)
+    return np.asarray(labels == 0)
 
 
 def free_space(arena: Arena, *, passable: float, clearance: float) -> FreeSpace:
@@ -86,11 +66,12 @@ def free_space(arena: Arena, *, passable: float, clearance: float) -> FreeSpace:
     Raises:
         ArenaError: nothing is left to start from or to drive to.
     """
-    centres = grid_centres(arena)
-    distance = free_distance(arena, centres)
+    grid = grid_over(arena)
+    x, y = np.meshgrid(grid.xs(), grid.ys())
+    wall = np.minimum(arena.half_width - np.abs(x), arena.half_height - np.abs(y))
+    distance = np.minimum(wall, obstacle_distance(arena, grid, clearance))
     # A cell counts when any point of it may have the clearance: the exact check is made on the point drawn.
     candidates = largest_region(distance >= passable) & (distance >= clearance - _HALF_DIAGONAL)
-    wall = np.minimum(arena.half_width - np.abs(centres[..., 0]), arena.half_height - np.abs(centres[..., 1]))
     cells = []
     for what, inset in (("start", arena.start_inset), ("target", arena.target_inset)):
         chosen = candidates & (wall > inset)
@@ -99,5 +80,5 @@ def free_space(arena: Arena, *, passable: float, clearance: float) -> FreeSpace:
                 f"arena {arena.name!r} has no free space for a {what} with {clearance:.2f} m clearance; "
                 "use a smaller robot or a more open arena"
             )
-        cells.append((centres[chosen] - 0.5 * CELL).astype(np.float32))
+        cells.append((np.stack([x[chosen], y[chosen]], axis=-1) - 0.5 * CELL).astype(np.float32))
     return FreeSpace(starts=cells[0], targets=cells[1], clearance=clearance)

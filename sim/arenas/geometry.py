@@ -77,12 +77,23 @@ def free_distance(arena: Arena, points: ArrayLike) -> Float:
     p = np.asarray(points, dtype=np.float64)
     x, y = p[..., 0], p[..., 1]
     distance: Any = np.minimum(arena.half_width - np.abs(x), arena.half_height - np.abs(y))
-    for cx, cy, radius in arena.circles:
-        distance = np.minimum(distance, np.hypot(x - cx, y - cy) - radius)
-    for cx, cy, half_length, half_width, angle in arena.boxes:
-        cos, sin = np.cos(angle), np.sin(angle)
-        along = np.abs(cos * (x - cx) + sin * (y - cy)) - half_length
-        across = np.abs(cos * (y - cy) - sin * (x - cx)) - half_width
-        outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
-        distance = np.minimum(distance, outside + np.minimum(np.maximum(along, across), 0.0))
+    for circle in arena.circles:
+        distance = np.minimum(distance, circle_distance(circle, x, y))
+    for box in arena.boxes:
+        distance = np.minimum(distance, box_distance(box, x, y))
     return np.asarray(distance, dtype=np.float64)
+
+
+def circle_distance(circle: Float, x: Float, y: Float) -> Float:
+    """Signed distance from points to one circle, a row of `Arena.circles`; x and y broadcast."""
+    return np.asarray(np.hypot(x - circle[0], y - circle[1]) - circle[2], dtype=np.float64)
+
+
+def box_distance(box: Float, x: Float, y: Float) -> Float:
+    """Signed distance from points to one box, a row of `Arena.boxes`; x and y broadcast."""
+    cx, cy, half_length, half_width, angle = box
+    cos, sin = np.cos(angle), np.sin(angle)
+    along = np.abs(cos * (x - cx) + sin * (y - cy)) - half_length
+    across = np.abs(cos * (y - cy) - sin * (x - cx)) - half_width
+    outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+    return np.asarray(outside + np.minimum(np.maximum(along, across), 0.0), dtype=np.float64)

@@ -47,16 +47,16 @@ def test_the_gallery_shows_what_can_be_trained_on(client: TestClient) -> None:
 
 
 def test_fixed_and_generated_arenas_are_drawn_as_they_are_trained_on(client: TestClient) -> None:
-    view = client.get("/api/arenas/fixed/complex").json()
+    view = client.get("/api/arenas/fixed", params={"name": "complex"}).json()
     assert (view["obstacles"], view["geometry"]["width"]) == (17, 10.0)
     assert 0.6 < view["free_share"] < 0.8
-    view = client.get("/api/arenas/generated/maze", params={"difficulty": 0.8, "seed": 3}).json()
+    view = client.get("/api/arenas/generated", params={"name": "maze", "difficulty": 0.8, "seed": 3}).json()
     config = TrainingConfig.model_validate({"task": {"arena": view["config"]}}).task.arena
     (arena, *_) = build_arenas(config)
     assert len(view["geometry"]["boxes"]) == len(arena.boxes)
     assert view["geometry"]["boxes"][0]["x"] == pytest.approx(arena.boxes[0, 0], abs=1e-4)
-    assert client.get("/api/arenas/fixed/swamp").status_code == 422
-    assert client.get("/api/arenas/generated/maze", params={"difficulty": 2}).status_code == 422
+    assert client.get("/api/arenas/fixed", params={"name": "swamp"}).status_code == 422
+    assert client.get("/api/arenas/generated", params={"name": "maze", "difficulty": 2}).status_code == 422
 
 
 def test_an_upload_is_looked_at_first_and_kept_on_demand(client: TestClient) -> None:

@@ -42,6 +42,13 @@ def test_components_are_those_of_a_flood_fill(free: np.ndarray) -> None:
         assert flood_sizes(part) == [size]
 
 
+def test_cells_that_meet_at_a_corner_hang_together_or_not() -> None:
+    free = np.array([[1, 0, 0], [0, 1, 1]], dtype=bool)
+    assert components(free)[1].tolist() == [3]
+    assert components(free, corners=False)[1].tolist() == [2, 1]
+    assert components(free.T[::-1], corners=False)[1].tolist() == [2, 1]
+
+
 def test_the_largest_component_comes_first() -> None:
     free = np.array([[1, 0, 1, 1], [0, 0, 1, 1]], dtype=bool)
     labels, sizes = components(free)

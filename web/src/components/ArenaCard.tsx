@@ -32,8 +32,8 @@ export function ArenaCard({
 function FixedCard({ arena }: { arena: ArenaSummary }) {
   const { data, error } = $api.useQuery(
     'get',
-    '/api/arenas/fixed/{name}',
-    { params: { path: { name: arena.key as 'simple' | 'complex' } } },
+    '/api/arenas/fixed',
+    { params: { query: { name: arena.key as 'simple' | 'complex' } } },
     { staleTime: Number.POSITIVE_INFINITY },
   )
   return <Card title={arena.title} view={data} error={error} config={arena.config} />
@@ -76,8 +76,8 @@ function FamilyCard({ arena }: { arena: ArenaSummary }) {
   const [wanted] = useDebouncedValue(difficulty, 120)
   const { data, error } = $api.useQuery(
     'get',
-    '/api/arenas/generated/{name}',
-    { params: { path: { name: arena.key as Family }, query: { difficulty: wanted, seed } } },
+    '/api/arenas/generated',
+    { params: { query: { name: arena.key as Family, difficulty: wanted, seed } } },
     { staleTime: Number.POSITIVE_INFINITY, placeholderData: keepPreviousData },
   )
   return (

@@ -51,8 +51,8 @@ const LAB: ArenaView = {
 function start(routes = {}) {
   return startServer({
     'GET /api/arenas': GALLERY,
-    'GET /api/arenas/fixed/simple': { ...LAB, title: 'Simple' },
-    'GET /api/arenas/generated/maze': { ...LAB, title: 'Maze' },
+    'GET /api/arenas/fixed': { ...LAB, title: 'Simple' },
+    'GET /api/arenas/generated': { ...LAB, title: 'Maze' },
     [`GET /api/arenas/imported/${HASH}`]: LAB,
     'GET /api/training/form': form,
     ...routes,
@@ -82,7 +82,7 @@ test('the difficulty is what is drawn, and what the training starts with', async
   const maze = await card('Maze')
   maze.getByRole('slider').focus()
   await user.keyboard('{ArrowRight}{ArrowRight}')
-  await waitFor(() => expect(server.asked).toContain('/api/arenas/generated/maze?difficulty=0.6&seed=0'))
+  await waitFor(() => expect(server.asked).toContain('/api/arenas/generated?name=maze&difficulty=0.6&seed=0'))
   await user.click(maze.getByRole('button', { name: 'Another map of Maze' }))
   await user.click(maze.getByRole('link', { name: 'Train on it' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/new'))
