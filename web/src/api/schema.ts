@@ -24,7 +24,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/arenas/fixed/{name}": {
+    "/api/arenas/fixed": {
         parameters: {
             query?: never;
             header?: never;
@@ -35,7 +35,7 @@ export interface paths {
          * Get Fixed Arena
          * @description A built-in arena.
          */
-        get: operations["get_fixed_arena_api_arenas_fixed__name__get"];
+        get: operations["get_fixed_arena_api_arenas_fixed_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -44,7 +44,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/arenas/generated/{name}": {
+    "/api/arenas/generated": {
         parameters: {
             query?: never;
             header?: never;
@@ -55,7 +55,7 @@ export interface paths {
          * Get Generated Arena
          * @description The first of a family's maps.
          */
-        get: operations["get_generated_arena_api_arenas_generated__name__get"];
+        get: operations["get_generated_arena_api_arenas_generated_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1286,7 +1286,7 @@ export interface components {
             metric: string;
             /**
              * Value
-             * @description Median of the curve's recent part; null where it is not a number.
+             * @description The curve's recent median, or its peak; null where it is not a number.
              */
             value: number | null;
         };
@@ -2923,13 +2923,13 @@ export interface operations {
             };
         };
     };
-    get_fixed_arena_api_arenas_fixed__name__get: {
+    get_fixed_arena_api_arenas_fixed_get: {
         parameters: {
-            query?: never;
-            header?: never;
-            path: {
+            query: {
                 name: "simple" | "complex";
             };
+            header?: never;
+            path?: never;
             cookie?: never;
         };
         requestBody?: never;
@@ -2963,16 +2963,15 @@ export interface operations {
             };
         };
     };
-    get_generated_arena_api_arenas_generated__name__get: {
+    get_generated_arena_api_arenas_generated_get: {
         parameters: {
-            query?: {
+            query: {
                 difficulty?: number;
+                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages";
                 seed?: number;
             };
             header?: never;
-            path: {
-                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages";
-            };
+            path?: never;
             cookie?: never;
         };
         requestBody?: never;
