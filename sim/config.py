@@ -111,6 +111,22 @@ class RobotConfig(Frozen):
         description="Radians per second, both ways.",
         json_schema_extra=ADVANCED,
     )
+    max_linear_acceleration: float = Field(
+        0.0,
+        ge=0.0,
+        le=100.0,
+        title="Linear acceleration",
+        description="Metres per second squared, also when braking; 0 is unlimited.",
+        json_schema_extra=ADVANCED,
+    )
+    max_angular_acceleration: float = Field(
+        0.0,
+        ge=0.0,
+        le=100.0,
+        title="Angular acceleration",
+        description="Radians per second squared, both ways; 0 is unlimited.",
+        json_schema_extra=ADVANCED,
+    )
 
 
 class LidarConfig(Frozen):
@@ -134,6 +150,22 @@ class LidarConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     range: float = Field(3.5, gt=0.2, le=30.0, title="Range", description="Metres.", json_schema_extra=ADVANCED)
+    noise: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.5,
+        title="Noise",
+        description="Standard deviation of each range that hits something, metres.",
+        json_schema_extra=ADVANCED,
+    )
+    dropout: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.9,
+        title="Dropout",
+        description="Probability that a ray sees nothing and reads the full range.",
+        json_schema_extra=ADVANCED,
+    )
 
     @model_validator(mode="after")
     def _batches_divide_rays(self) -> "LidarConfig":

@@ -221,7 +221,7 @@ def run_controller(controller: Callable[[Situation], Floats], task: TaskConfig, 
     Raises:
         PlacementError: the task's robot does not fit at a start of the suite.
     """
-    world = World(task, suite.arenas, len(suite), seed=0)
+    world = World(task, suite.arenas, len(suite), seed=0, respawn=False)
     world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
     robots = world.robots
     outcomes = np.zeros(len(suite), dtype=np.uint8)

@@ -52,6 +52,11 @@ def spawn_space(task: TaskConfig, arena: Arena) -> FreeSpace:
     return free_space(arena, passable=passable, clearance=passable + SPAWN_MARGIN)
 
 
+def _largest_change(acceleration: float, limit: float, period: float) -> float:
+    """Change of a velocity in one period as a fraction of its limit; 2, the whole span, where it is unlimited."""
+    return min(2.0, acceleration * period / limit) if acceleration else 2.0
+
+
 def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
     """A task as the kernels read it: (1,) of `sim.kernels.records.PARAMETERS`."""
     angles = ray_angles(task.lidar)
@@ -63,8 +68,16 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "period": task.control_period,
         "max_linear": task.robot.max_linear_speed,
         "max_angular": task.robot.max_angular_speed,
+        "linear_change": _largest_change(
+            task.robot.max_linear_acceleration, task.robot.max_linear_speed, task.control_period
+        ),
+        "angular_change": _largest_change(
+            task.robot.max_angular_acceleration, task.robot.max_angular_speed, task.control_period
+        ),
         "radius": task.robot.radius,
         "range": task.lidar.range,
+        "noise": task.lidar.noise,
+        "dropout": task.lidar.dropout,
         "looks_ahead": task.lidar.field_of_view <= 180.0,
         "batches": task.lidar.batches,
         "rays_per_batch": task.lidar.rays // task.lidar.batches,
@@ -95,18 +108,31 @@ class World:
     A robot goes on after an arrival, with a new target; after a collision or a time-out it starts anew, in an arena drawn
     from the pool. Its fate depends on the seed and its own index, never on the number of robots.
 
+    Args:
+        task: robot, LiDAR, observation, reward and limits.
+        arenas: the pool.
+        robots: how many.
+        seed: of all that is random; None takes one from the operating system.
+        respawn: False saves looking for free space where every pose and target is given: robots then stay where they end.
+
+    Raises:
+        ArenaError: the robot does not fit into an arena.
+
     Attributes:
         task: what all of it follows.
         arenas: the pool.
         robots: the arrays of all robots, overwritten by every step.
     """
 
-    def __init__(self, task: TaskConfig, arenas: Sequence[Arena], robots: int, *, seed: int | None = None) -> None:
+    def __init__(
+        self, task: TaskConfig, arenas: Sequence[Arena], robots: int, *, seed: int | None = None, respawn: bool = True
+    ) -> None:
         self.task = task
         self.arenas = tuple(arenas)
         replicas = math.ceil(robots / (ROBOTS_PER_TILE * len(self.arenas)))
         origins = tile_origins(self.arenas, replicas)
-        spaces = [spawn_space(task, arena) for arena in self.arenas]
+        nowhere = np.empty((0, 2), dtype=np.float32)
+        spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
         bounds, circles, boxes = pack_shapes(self.arenas)
         angles = ray_angles(task.lidar)
         self.geometry = Geometry(

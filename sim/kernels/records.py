@@ -16,8 +16,12 @@ PARAMETERS = np.dtype(
         ("period", "f8"),  # s
         ("max_linear", "f8"),  # m/s
         ("max_angular", "f8"),  # rad/s
+        ("linear_change", "f4"),  # largest change of a velocity in one step, as a fraction of its limit
+        ("angular_change", "f4"),
         ("radius", "f4"),  # m, of the robot
         ("range", "f4"),  # m, of the LiDAR
+        ("noise", "f4"),  # m, standard deviation of a range
+        ("dropout", "f4"),  # probability that a ray sees nothing
         ("looks_ahead", "i4"),  # 1 when the field of view is within the front half plane
         ("batches", "i4"),
         ("rays_per_batch", "i4"),

@@ -67,6 +67,8 @@ def write_commands(actions, records, state, command, parameters):
             return i
         linear = min(max(linear, ZERO), ONE)
         angular = min(max(angular, -ONE), ONE)
+        linear = min(max(linear, records[i].linear - p.linear_change), records[i].linear + p.linear_change)
+        angular = min(max(angular, records[i].angular - p.angular_change), records[i].angular + p.angular_change)
         records[i].linear = linear
         records[i].angular = angular
         turn = p.max_angular * angular
@@ -137,6 +139,8 @@ def _draw_target(i, robots, geometry, p):
     index = records[i].map
     first = geometry.target_offsets[index]
     cells = geometry.target_offsets[index + 1] - first
+    if cells == 0:
+        return
     for _ in range(SPAWN_TRIES):
         cell = first + np.int64(uniform(records, i) * cells)
         x = geometry.targets[cell, 0] + CELL * np.float32(uniform(records, i))
@@ -154,6 +158,8 @@ def _draw_target(i, robots, geometry, p):
 def _draw_start(i, robots, geometry, p, state):
     """Put robot i, at rest, somewhere free in an arena of the pool."""
     records = robots.records
+    if geometry.starts.shape[0] == 0:
+        return
     arenas = geometry.bounds.shape[0]
     if arenas > 1:
         records[i].map = np.int32(uniform(records, i) * arenas)
@@ -234,6 +240,7 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
         _forget_attempt(robots.records[i])
         _nothing_happened(i, robots)
         _sense(i, robots, geometry, p, dx, dy)
+        _disturb(i, robots, p)
         _observe(i, robots, geometry, p)
 
 
@@ -245,6 +252,23 @@ def _sense(i, robots, geometry, p, dx, dy):
         geometry.bounds, geometry.circles, geometry.boxes, geometry.ray_cos, geometry.ray_sin,
         p.range, p.looks_ahead, robots.ranges, i, dx, dy,
     )  # fmt: skip
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _disturb(i, robots, p):
+    """Add the LiDAR's noise and dropouts to robot i's scan."""
+    if p.noise == ZERO and p.dropout == ZERO:
+        return
+    for k in range(robots.ranges.shape[1]):
+        if robots.ranges[i, k] >= p.range:
+            continue
+        if p.noise > ZERO:
+            # Box and Muller (1958); 1 - u keeps the logarithm finite.
+            size = math.sqrt(-2.0 * math.log(1.0 - uniform(robots.records, i)))
+            disturbance = np.float32(size * math.cos(2.0 * math.pi * uniform(robots.records, i)))
+            robots.ranges[i, k] = min(max(robots.ranges[i, k] + p.noise * disturbance, ZERO), p.range)
+        if p.dropout > ZERO and uniform(robots.records, i) < p.dropout:
+            robots.ranges[i, k] = p.range
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
@@ -344,6 +368,8 @@ def step_robots(state, robots, geometry, parameters):
         robots.truncations[i] = outcome == TIMEOUT
         _reward(i, outcome, before, robots, p)
 
+        # Outcomes and rewards are of the world as it is; the robot gets to see less.
+        _disturb(i, robots, p)
         if outcome == ARRIVAL:
             _draw_target(i, robots, geometry, p)
         _observe(i, robots, geometry, p)
@@ -353,4 +379,5 @@ def step_robots(state, robots, geometry, parameters):
             _draw_start(i, robots, geometry, p, state)
             _draw_target(i, robots, geometry, p)
             _sense(i, robots, geometry, p, dx, dy)
+            _disturb(i, robots, p)
             _observe(i, robots, geometry, p)

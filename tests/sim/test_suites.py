@@ -10,9 +10,10 @@ from sim.arenas import Arena, build_arenas, free_distance
 from sim.arenas.document import to_document
 from sim.baselines import bearings, go_to_goal, random_policy
 from sim.config import ArenaConfig, GeneratedArenaConfig, ImportedArenaConfig, ObservationName, TaskConfig
+from sim.dwa import dynamic_window
 from sim.errors import SuiteError
 from sim.suite_builder import build_suite
-from sim.suites import Suite, content_hash, load_suite, run_suite, suite_for, suite_names
+from sim.suites import Situation, Suite, content_hash, load_suite, run_controller, run_suite, suite_for, suite_names
 from sim.vector_env import NavigationVectorEnv
 
 SIMPLE = TaskConfig()
@@ -77,6 +78,29 @@ def test_the_baselines_are_far_from_solving_complex() -> None:
     suite = load_suite("complex-200")
     assert 0.2 < (run_suite(go_to_goal(COMPLEX), COMPLEX, suite).outcomes == 1).mean() < 0.5
     assert (run_suite(random_policy(), COMPLEX, suite).outcomes == 1).mean() < 0.1
+
+
+def test_the_dynamic_window_touches_nothing_and_beats_the_blind() -> None:
+    suite = load_suite("complex-200")
+    table = run_controller(dynamic_window(COMPLEX), COMPLEX, suite)
+    assert not (table.outcomes == 2).any()
+    assert (table.outcomes == 1).mean() > 0.95
+    assert table.min_clearances.min() > 0.0
+
+
+def test_the_dynamic_window_turns_where_it_cannot_go() -> None:
+    # A wall 0.22 m ahead, closer than it keeps, and open to the left: turn left on the spot.
+    ranges = np.full((1, 30), 3.5, dtype=np.float32)
+    ranges[0, :20] = 0.22
+    situation = Situation(
+        observations=np.zeros((1, 16), dtype=np.float32),
+        ranges=ranges,
+        poses=np.zeros((1, 3), dtype=np.float32),
+        targets=np.array([[2.0, 0.0]], dtype=np.float32),
+    )
+    linear, angular = dynamic_window(SIMPLE)(situation)[0]
+    assert linear == 0.0
+    assert angular > 0.0
 
 
 def test_a_suite_run_side_by_side_is_each_scenario_on_its_own() -> None:

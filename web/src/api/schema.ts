@@ -1518,11 +1518,23 @@ export interface components {
              */
             batches: number;
             /**
+             * Dropout
+             * @description Probability that a ray sees nothing and reads the full range.
+             * @default 0
+             */
+            dropout: number;
+            /**
              * Field of view
              * @description Degrees, symmetric about the heading.
              * @default 180
              */
             field_of_view: number;
+            /**
+             * Noise
+             * @description Standard deviation of each range that hits something, metres.
+             * @default 0
+             */
+            noise: number;
             /**
              * Range
              * @description Metres.
@@ -1548,11 +1560,23 @@ export interface components {
              */
             batches: number;
             /**
+             * Dropout
+             * @description Probability that a ray sees nothing and reads the full range.
+             * @default 0
+             */
+            dropout: number;
+            /**
              * Field of view
              * @description Degrees, symmetric about the heading.
              * @default 180
              */
             field_of_view: number;
+            /**
+             * Noise
+             * @description Standard deviation of each range that hits something, metres.
+             * @default 0
+             */
+            noise: number;
             /**
              * Range
              * @description Metres.
@@ -2026,11 +2050,23 @@ export interface components {
          */
         "RobotConfig-Input": {
             /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
              * Top turning rate
              * @description Radians per second, both ways.
              * @default 1
              */
             max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
             /**
              * Top speed
              * @description Metres per second; the robot does not reverse.
@@ -2050,11 +2086,23 @@ export interface components {
          */
         "RobotConfig-Output": {
             /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
              * Top turning rate
              * @description Radians per second, both ways.
              * @default 1
              */
             max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
             /**
              * Top speed
              * @description Metres per second; the robot does not reverse.
