@@ -23,7 +23,7 @@ HORIZON = 2.4
 MARGIN = 0.04
 """Metres that an arc keeps from obstacles on top of the collision distance."""
 
-# Weights of the objective, the best of ten tried on random clutter that is in no suite (docs/suites.md).
+# Weights of the objective, the best of eight tried on random clutter that is in no suite (docs/suites.md).
 HEADING, CLEARANCE, SPEED, PROGRESS = 0.1, 0.3, 0.1, 1.0
 
 
