@@ -20,8 +20,9 @@ _CLOSE_SECONDS = 2.0
 class CeleryDoorbell:
     """Rings through a Celery broker. A broker that is away costs a log line: the sweeper rings again."""
 
-    def __init__(self, broker_url: str) -> None:
+    def __init__(self, broker_url: str, queue_prefix: str) -> None:
         self._app = create_app(broker_url)
+        self._prefix = queue_prefix
         self._rings: queue.SimpleQueue[tuple[str, int, Queue] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._publish, name="doorbell", daemon=True)
         self._thread.start()
@@ -40,12 +41,12 @@ class CeleryDoorbell:
         while (ring := self._rings.get()) is not None:
             run_id, attempt, to = ring
             try:
-                self._app.send_task(TRAIN_TASK, (run_id, attempt), queue=to, retry=False, ignore_result=True)
+                self._app.send_task(TRAIN_TASK, (run_id, attempt), queue=self._prefix + to, retry=False, ignore_result=True)
             except Exception as error:  # whatever a broker's driver raises: nobody's request may fail of it
                 logger.warning("the broker does not take the message for run %s: %s", run_id, error)
 
 
-def prepare_broker(broker_url: str) -> None:
+def prepare_broker(broker_url: str, queue_prefix: str) -> None:
     """Make the embedded broker's file ready: its tables must exist before workers race to create them.
 
     Other brokers need nothing.
@@ -55,7 +56,7 @@ def prepare_broker(broker_url: str) -> None:
     with create_app(broker_url).connection_for_write() as connection:
         for name in ("cpu", "gpu"):
             # A queue's size is asked for; finding out creates the tables and the queue.
-            connection.default_channel._size(name)  # noqa: SLF001 (kombu's virtual channels have no public way)
+            connection.default_channel._size(queue_prefix + name)  # noqa: SLF001 (kombu's virtual channels have no public way)
     path = make_url(broker_url.removeprefix("sqla+")).database
     assert path is not None
     with closing(sqlite3.connect(path)) as database, database:

@@ -42,6 +42,9 @@ class Settings(BaseSettings):
     )
     database_url: str | None = Field(None, description="SQLAlchemy URL; SQLite in the data directory if not given.")
     broker_url: str | None = Field(None, description="Celery broker URL; a SQLite file in the data directory if not given.")
+    queue_prefix: str = Field(
+        "mapless.", description="Of the queues' names: installations that share a broker need different ones."
+    )
     files_url: str | None = Field(
         None, description="Directory or fsspec URL of the checkpoints; in the data directory if not given."
     )

@@ -83,9 +83,9 @@ class Sweeper:
 @asynccontextmanager
 async def dispatch(services: Services) -> AsyncIterator[None]:
     """Reach workers for as long as the block lasts: doorbell, links and sweeper."""
-    broker_url = services.settings.resolved_broker_url
-    await run_in_threadpool(prepare_broker, broker_url)
-    doorbell = CeleryDoorbell(broker_url)
+    broker_url, prefix = services.settings.resolved_broker_url, services.settings.queue_prefix
+    await run_in_threadpool(prepare_broker, broker_url, prefix)
+    doorbell = CeleryDoorbell(broker_url, prefix)
     services.doorbell = doorbell
     services.links = OpenLinks(asyncio.get_running_loop())
     task = asyncio.create_task(_sweep_regularly(Sweeper(services)))

@@ -24,7 +24,8 @@ def create_app(broker_url: str) -> Celery:
         result_backend=None,
         task_ignore_result=True,
         task_acks_late=False,
-        task_default_queue="cpu",
+        # Nobody steers workers over the broker: what they should do stands in the database.
+        worker_enable_remote_control=False,
         worker_prefetch_multiplier=1,
         # On Redis a message waiting in a busy worker would be delivered to another one after the visibility time-out.
         worker_disable_prefetch=broker_url.startswith(("redis", "rediss", "unix")),

@@ -17,6 +17,7 @@ class WorkerSettings(BaseSettings):
 
     server_url: str = Field("http://127.0.0.1:8400", description="The server.")
     broker_url: str = Field(description="The Celery broker that rings for work.")
+    queue_prefix: str = Field("mapless.", description="Of the queues' names, as the server has it.")
     worker_token: SecretStr = Field(description="The workers' token, as the server has it.")
     worker_queue: Queue = Field("cpu", description="The queue to listen to.")
     worker_name: str = Field("worker", description="Tells workers of one machine apart.")

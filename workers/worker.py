@@ -60,7 +60,7 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     app.worker_main(
         [
             "worker",
-            f"--queues={settings.worker_queue}",
+            f"--queues={settings.queue_prefix}{settings.worker_queue}",
             f"--concurrency={concurrency}",
             f"--hostname={settings.worker_name}@%h",
             "--pool=prefork",
@@ -82,6 +82,7 @@ def _environment(settings: WorkerSettings) -> dict[str, str]:
     values = {
         "SERVER_URL": settings.server_url.rstrip("/"),
         "BROKER_URL": settings.broker_url,
+        "QUEUE_PREFIX": settings.queue_prefix,
         "WORKER_TOKEN": settings.worker_token.get_secret_value(),
         "WORKER_QUEUE": settings.worker_queue,
         "WORKER_NAME": settings.worker_name,
