@@ -40,8 +40,9 @@ class BehaviorMetrics:
     | `observation/constant` | share of the observation's numbers that hardly vary over robots and samples     |
     """
 
-    def __init__(self) -> None:
-        self._steps = 0
+    def __init__(self, steps: int = 0) -> None:
+        """Starts after so many steps of each robot, so that a resumed training samples the same ones."""
+        self._steps = steps
         self._clear()
 
     def _clear(self) -> None:

@@ -249,6 +249,7 @@ class Training:
         counters = checkpoint.counters
         self.step, self.updates, self.evaluations = counters.step, counters.updates, counters.evaluations
         self.reported = self.saved = counters.step
+        self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots)
         self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
 
     def _arrays(self) -> dict[str, NDArray[np.generic]]:

@@ -21,9 +21,10 @@ _OUTCOME_RATES = ("train/success_rate", "train/collision_rate", "train/timeout_r
 class TrainingMetrics:
     """A window of a training: filled by the loop, emptied by each report."""
 
-    def __init__(self, robots: int) -> None:
+    def __init__(self, robots: int, steps: int = 0) -> None:
+        """Starts after so many steps of each robot."""
         self._robots = robots
-        self._behavior = BehaviorMetrics()
+        self._behavior = BehaviorMetrics(steps)
         self._clear()
 
     def _clear(self) -> None:
