@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from sim.config import Frozen, TaskConfig
-from workers.config import PpoConfig, ResBlockNetwork, TrainingConfig
+from sim.config import ArenaConfig, Frozen, TaskConfig
+from workers.config import EvaluationConfig, PpoConfig, ResBlockNetwork, TrainingConfig
 
 
 class Preset(Frozen):
@@ -37,7 +37,19 @@ PAPER = Preset(
     ),
 )
 
-PRESETS: tuple[Preset, ...] = (DEFAULT, PAPER)
+COMPLEX = Preset(
+    id="complex",
+    title="Complex arena",
+    description="PPO for 17 obstacles: more robots, larger minibatches and a longer horizon (docs/recipes.md).",
+    training=TrainingConfig(
+        task=TaskConfig(arena=ArenaConfig(name="complex")),
+        algorithm=PpoConfig(robots=256, minibatch_size=1024, gamma=0.995),
+        steps=1_500_000,
+        evaluation=EvaluationConfig(every_steps=100_000),
+    ),
+)
+
+PRESETS: tuple[Preset, ...] = (DEFAULT, PAPER, COMPLEX)
 
 
 def preset(identifier: str) -> Preset:

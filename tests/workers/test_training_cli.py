@@ -81,7 +81,7 @@ def test_export_writes_onnx(tmp_path: Path, checkpoint: Path) -> None:
     [
         (["train", "--steps", "5"], "steps"),
         (["train", "--algorithm", "dqn"], "algorithm"),
-        (["train", "--preset", "nothing"], "choose one of default, paper"),
+        (["train", "--preset", "nothing"], "choose one of default, paper, complex"),
         (["train", "--arena", "moon"], "arena"),
         (["evaluate", __file__], "not a readable archive"),
     ],
