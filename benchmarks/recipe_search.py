@@ -17,9 +17,9 @@ from benchmarks.report import finish, parser
 from benchmarks.time_to_success import TASK, success_rate
 from benchmarks.training_throughput import NEVER, Silent
 from workers.config import TrainingConfig
+from workers.live.viewing import Unwatched
 from workers.policy import torch_policy
 from workers.trainer import REPORT_INTERVAL, Training
-from workers.viewing import Unwatched
 
 EVALUATIONS = 6
 

@@ -16,8 +16,8 @@ from torch import Tensor, nn
 
 from sim.vector_env import NavigationVectorEnv
 from workers.config import DdpgConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
+from workers.live.viewing import PolicyFunction
 from workers.networks import ResBlock
-from workers.viewing import PolicyFunction
 
 Floats = NDArray[np.float32]
 

@@ -27,9 +27,9 @@ from benchmarks.training_throughput import NEVER, Silent
 from sim.config import ArenaConfig, TaskConfig
 from sim.vector_env import NavigationVectorEnv
 from workers.config import EvaluationConfig, TrainingConfig
+from workers.live.viewing import PolicyFunction, Unwatched
 from workers.policy import torch_policy
 from workers.trainer import REPORT_INTERVAL, Training
-from workers.viewing import PolicyFunction, Unwatched
 
 TASK = TaskConfig(arena=ArenaConfig(name="complex"))
 STEPS = {"ppo": 1_000_000, "ddpg": 300_000, "td3": 300_000, "sac": 200_000}

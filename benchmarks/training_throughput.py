@@ -22,9 +22,9 @@ from benchmarks.report import finish, parser
 from benchmarks.stable_baselines import build
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, ResBlockNetwork, TrainingConfig
 from workers.frames import Frame
+from workers.live.viewing import Unwatched
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.trainer import REPORT_INTERVAL, Training
-from workers.viewing import Unwatched
 
 CASES: dict[str, PpoConfig | DdpgConfig] = {
     "ppo_mlp_64": PpoConfig(network=MlpNetwork(hidden_sizes=(64, 64))),

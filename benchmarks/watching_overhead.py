@@ -19,10 +19,10 @@ from benchmarks.report import finish, parser
 from sim.config import TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.frames import Frame
+from workers.live.viewer import LiveViewer
+from workers.live.viewing import PolicyFunction
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.trainer import train
-from workers.viewer import LiveViewer
-from workers.viewing import PolicyFunction
 
 TURN_SECONDS = 2.0
 # The first moments of a turn still belong to the one before: threads start and end.

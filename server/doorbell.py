@@ -8,8 +8,8 @@ from contextlib import closing
 
 from sqlalchemy import make_url
 
-from workers.app import TRAIN_TASK, create_app
 from workers.protocol import Queue
+from workers.runtime.app import TRAIN_TASK, create_app
 
 logger = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ import uvicorn
 
 from server.listening import listen, login_url
 from server.settings import Settings
-from workers.supervised import end_with_supervisor
+from workers.runtime.supervised import end_with_supervisor
 
 # Streams end by themselves when the bus closes; this is for a client that takes its time to read the last bytes.
 _GRACE_SECONDS = 3

@@ -19,8 +19,8 @@ from workers.export.command import export
 from workers.frames import Frame
 from workers.presets import PRESETS, preset
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.runtime.worker import worker
 from workers.statistics import wilson_interval
-from workers.worker import worker
 
 app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)
 app.command()(export)

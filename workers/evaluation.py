@@ -2,8 +2,8 @@
 
 from sim.config import TaskConfig
 from sim.suites import Suite, run_suite
+from workers.live.viewing import PolicyFunction
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
-from workers.viewing import PolicyFunction
 
 # As `NavigationVectorEnv.outcomes` counts them, from 1.
 _OUTCOMES: tuple[Outcome, ...] = ("arrival", "collision", "timeout")

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from workers.config import Network, ResBlockNetwork
 from workers.layout import ACTION_SIZE, LEAKY_SLOPE, layout
-from workers.viewing import PolicyFunction
+from workers.live.viewing import PolicyFunction
 
 
 class Policy:

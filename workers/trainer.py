@@ -22,11 +22,11 @@ from workers.config import TrainingConfig
 from workers.errors import ArchiveMismatchError, NonFiniteError
 from workers.evaluation import evaluate, evaluation_metrics
 from workers.layout import layout
+from workers.live.viewing import PolicyFunction, TrainingViewer, Unwatched
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.policy import Policy, torch_policy
 from workers.reporting import EvaluationResult, Reporter
 from workers.training_metrics import TrainingMetrics
-from workers.viewing import PolicyFunction, TrainingViewer, Unwatched
 
 TrainingOutcome = Literal["completed", "stopped"]
 

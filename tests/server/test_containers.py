@@ -11,7 +11,7 @@ from typer.main import get_command
 from server.cli import app as server_commands
 from server.settings import Settings
 from workers.cli import app as worker_commands
-from workers.settings import WorkerSettings
+from workers.runtime.settings import WorkerSettings
 
 ROOT = Path(__file__).parents[2]
 COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()

@@ -163,7 +163,7 @@ def tree(pid: int) -> list[psutil.Process]:
 def trainers(pid: int) -> list[psutil.Process]:
     """The trainer processes under a worker."""
     members = [process for process in tree(pid) if process.status() != psutil.STATUS_ZOMBIE]
-    return [process for process in members if "workers.trainer_process" in process.cmdline()]
+    return [process for process in members if "workers.runtime.trainer_process" in process.cmdline()]
 
 
 def assert_one_unbroken_curve(service: Service, run_id: str) -> None:

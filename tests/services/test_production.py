@@ -9,7 +9,7 @@ import redis
 
 from tests.conftest import require_service
 from tests.services.stack import ROLLOUT, Service, assert_one_unbroken_curve, until
-from workers.app import create_app
+from workers.runtime.app import create_app
 
 # Databases of a Redis on its standard port that tests may have; the first one that is empty is taken.
 REDIS_DATABASES = range(15, 8, -1)

@@ -9,10 +9,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import Server, ServerConnection, serve
 
-from workers.link import Link
 from workers.protocol import CLOSE_FENCED, Batch, Final, Orders
 from workers.reporting import WatchRequest
-from workers.spool import Spool
+from workers.runtime.link import Link
+from workers.runtime.spool import Spool
 
 LEASE = 0.6
 

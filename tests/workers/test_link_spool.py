@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers.protocol import EventItem, MetricItem
-from workers.spool import Spool
+from workers.runtime.spool import Spool
 
 
 def numbers(spool: Spool, limit: int = 100) -> list[int]:

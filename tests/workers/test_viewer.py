@@ -15,11 +15,11 @@ from sim.arenas import build_arena, build_arenas
 from sim.config import ArenaConfig, GeneratedArenaConfig, TaskConfig
 from sim.scan import scan
 from sim.vector_env import NavigationVectorEnv
-from workers.clips import CLIP_STEPS, ClipRecorder
 from workers.frames import Frame
+from workers.live.clips import CLIP_STEPS, ClipRecorder
+from workers.live.showcase import Showcase, along_arc
+from workers.live.viewer import LiveViewer
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.showcase import Showcase, along_arc
-from workers.viewer import LiveViewer
 
 TASK = TaskConfig(arena=ArenaConfig(name="complex"))
 

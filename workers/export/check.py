@@ -11,8 +11,8 @@ from workers.errors import ExportError
 from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, RANGES, TARGET, VELOCITY
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
+from workers.live.viewing import PolicyFunction
 from workers.manifest import Manifest
-from workers.viewing import PolicyFunction
 
 TOLERANCE = 1e-5
 _ROWS = 1000

@@ -14,10 +14,10 @@ from sim.vector_env import NavigationVectorEnv
 from workers.checkpoints import read_policy
 from workers.errors import ArchiveError
 from workers.frames import Frame
+from workers.live.viewing import PolicyFunction
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.rows import EPISODES_STEPS, ROWS, Row, TableRow
 from workers.trainer import train
-from workers.viewing import PolicyFunction
 
 RESULT = "result.json"
 

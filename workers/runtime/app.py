@@ -17,7 +17,7 @@ _POLLING_SECONDS = 0.1
 def create_app(broker_url: str) -> Celery:
     """The application on a broker; servers publish with it, workers run it."""
     SqlAlchemyTransport.polling_interval = _POLLING_SECONDS
-    app = Celery("mapless", broker=broker_url, include=["workers.tasks"], set_as_current=False)
+    app = Celery("mapless", broker=broker_url, include=["workers.runtime.tasks"], set_as_current=False)
     app.conf.update(
         accept_content=["json"],
         task_serializer="json",

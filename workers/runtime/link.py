@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from workers.protocol import CLOSE_FENCED, MAX_MESSAGE_BYTES, Batch, Final, Orders
-from workers.spool import Spool
+from workers.runtime.spool import Spool
 
 logger = logging.getLogger(__name__)
 

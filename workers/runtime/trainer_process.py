@@ -1,4 +1,4 @@
-"""`python -m workers.trainer_process FD PARENT`: trains one run and reports to the Celery task that started it.
+"""`python -m workers.runtime.trainer_process FD PARENT`: trains one run and reports to the Celery task that started it.
 
 It imports everything slow first and then waits for its job on standard input, so that a worker can keep one ready. It
 reports on the inherited file descriptor FD; whatever libraries print goes to standard error, whose last lines explain a
@@ -19,7 +19,8 @@ from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import WorkerError
 from workers.frames import Frame
-from workers.pipe import (
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.runtime.pipe import (
     CheckpointReport,
     Control,
     Ended,
@@ -33,7 +34,6 @@ from workers.pipe import (
     Sender,
     orders,
 )
-from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
 # Frames that wait for the pipe, at most: two thirds of a second at 30 a second. Older ones are worth nothing.
 _FRAME_BACKLOG = 20
@@ -140,8 +140,8 @@ def main(descriptor: int, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
+    from workers.live.viewer import LiveViewer
     from workers.trainer import train, warm_up
-    from workers.viewer import LiveViewer
 
     warm_up()
 

@@ -7,7 +7,7 @@ from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.scan import scan
 from sim.vector_env import NavigationVectorEnv
 from workers.frames import Frame
-from workers.viewing import PolicyFunction
+from workers.live.viewing import PolicyFunction
 
 
 def along_arc(

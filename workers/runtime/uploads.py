@@ -6,10 +6,10 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-from workers.client import ServerClient
 from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
 from workers.reporting import EvaluationResult
-from workers.spool import Spool
+from workers.runtime.client import ServerClient
+from workers.runtime.spool import Spool
 
 logger = logging.getLogger(__name__)
 

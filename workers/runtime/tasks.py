@@ -9,12 +9,12 @@ import billiard
 from celery import shared_task
 from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_shutting_down
 
-from workers.app import TRAIN_TASK
-from workers.attempt import Attempt
 from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
 from workers.protocol import Claim
-from workers.settings import WorkerSettings
-from workers.slot import Slot, remove_leftovers
+from workers.runtime.app import TRAIN_TASK
+from workers.runtime.attempt import Attempt
+from workers.runtime.settings import WorkerSettings
+from workers.runtime.slot import Slot, remove_leftovers
 
 logger = logging.getLogger(__name__)
 

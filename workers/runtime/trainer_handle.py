@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from workers.pipe import Control, Job, Order, Report, Sender, reports
+from workers.runtime.pipe import Control, Job, Order, Report, Sender, reports
 
-_ROOT = Path(__file__).resolve().parent.parent
+_ROOT = Path(__file__).resolve().parents[2]
 # What a crash is explained with.
 _STDERR_LINES = 15
 # One thread a process: seeds train side by side, one a core, and small networks gain nothing from more.
@@ -30,7 +30,7 @@ class TrainerHandle:
         path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "workers.trainer_process", str(write_end), str(os.getpid())],
+                [sys.executable, "-m", "workers.runtime.trainer_process", str(write_end), str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

@@ -9,8 +9,8 @@ import typer
 from pydantic import ValidationError
 
 from workers.protocol import Queue
-from workers.settings import WorkerSettings
-from workers.supervised import end_with_supervisor
+from workers.runtime.settings import WorkerSettings
+from workers.runtime.supervised import end_with_supervisor
 
 
 def worker(
@@ -53,8 +53,8 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     end_with_supervisor()
 
     # Late, so that `mapless worker --help` does not wait for Celery.
-    import workers.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
-    from workers.app import create_app
+    import workers.runtime.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
+    from workers.runtime.app import create_app
 
     app = create_app(settings.broker_url)
     app.worker_main(

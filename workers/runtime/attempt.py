@@ -7,16 +7,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workers.client import ServerClient
 from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
-from workers.link import Link
-from workers.pipe import CheckpointReport, Control, Ended, EventReport, FrameReport, Job, MetricsReport, Report
 from workers.protocol import Claim, Final, FinalOutcome, Orders
 from workers.reporting import EvaluationResult
-from workers.settings import WorkerSettings
-from workers.spool import Spool
-from workers.trainer_handle import TrainerHandle
-from workers.uploads import Uploads
+from workers.runtime.client import ServerClient
+from workers.runtime.link import Link
+from workers.runtime.pipe import CheckpointReport, Control, Ended, EventReport, FrameReport, Job, MetricsReport, Report
+from workers.runtime.settings import WorkerSettings
+from workers.runtime.spool import Spool
+from workers.runtime.trainer_handle import TrainerHandle
+from workers.runtime.uploads import Uploads
 
 logger = logging.getLogger(__name__)
 

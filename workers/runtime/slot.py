@@ -7,11 +7,11 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from workers.client import ServerClient
 from workers.errors import ServerError
 from workers.protocol import HEARTBEAT_SECONDS
-from workers.settings import WorkerSettings
-from workers.trainer_handle import TrainerHandle
+from workers.runtime.client import ServerClient
+from workers.runtime.settings import WorkerSettings
+from workers.runtime.trainer_handle import TrainerHandle
 
 logger = logging.getLogger(__name__)
 

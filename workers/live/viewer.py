@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from sim.config import TaskConfig
-from workers.clips import ClipRecorder
+from workers.live.clips import ClipRecorder
+from workers.live.showcase import Showcase
+from workers.live.viewing import PolicyFunction
 from workers.reporting import Reporter, WatchRequest
-from workers.showcase import Showcase
-from workers.viewing import PolicyFunction
 
 if TYPE_CHECKING:
     from sim.vector_env import NavigationVectorEnv
@@ -28,7 +28,7 @@ _TOO_LATE = 0.25
 
 
 class LiveViewer:
-    """A `workers.viewing.TrainingViewer` that watches what its reporter asks for.
+    """A `workers.live.viewing.TrainingViewer` that watches what its reporter asks for.
 
     Args:
         task: environment of the training.

@@ -16,8 +16,8 @@ PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 class TrainingViewer(Protocol):
     """Called from the training loop; each call must cost next to nothing while nobody watches.
 
-    `workers.viewer.LiveViewer(task, reporter)` is the one that makes frames; `Unwatched` is for trainings that nobody can
-    watch.
+    `workers.live.viewer.LiveViewer(task, reporter)` is the one that makes frames; `Unwatched` is for trainings that nobody
+    can watch.
     """
 
     def on_step(self, env: "NavigationVectorEnv", step: int) -> None:
