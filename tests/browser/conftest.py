@@ -47,9 +47,9 @@ def read_url(process: "subprocess.Popen[str]", seconds: float) -> str:
     raise AssertionError(f"mapless up printed no address:\n{seen}")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address, with its login token, of a service with two workers that runs until the session ends."""
+    """The address, with its login token, of a service with two workers that runs until the last of these tests has ended."""
     data = tmp_path_factory.mktemp("data")
     command = [sys.executable, "-m", "server", "up", "--port", "0", "--workers", "2", "--data-dir", str(data)]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -57,10 +57,10 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield read_url(process, 60.0)
     finally:
         process.send_signal(signal.SIGINT)
-        assert process.wait(15) == 0, "Ctrl-C must end the service cleanly within 10 s"
+        assert process.wait(10) == 0, "Ctrl-C must end the service cleanly within 10 s"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Debian's Chromium, or any that is on the path."""
     executable = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -46,7 +46,7 @@ def test_from_the_form_to_the_policy_and_a_comparison(context: BrowserContext, t
     # Launch ResBlock PPO on the simple arena from the form.
     page = open_form(context, "ResBlock in simple")
     choose(page, "ResBlock")
-    set_steps(page, 300_000)
+    set_steps(page, 600_000)
     launch(page)
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "running", timeout=SOON)
     expect(page.get_by_test_id("vitals")).to_contain_text("Time left", timeout=SOON)
@@ -62,17 +62,29 @@ def test_from_the_form_to_the_policy_and_a_comparison(context: BrowserContext, t
 
     # The robots move: two pictures of the 3D canvas differ.
     expect(page.get_by_test_id("live-view")).to_have_attribute("data-receiving", "true", timeout=SOON)
-    canvas = page.frame_locator("[data-testid=live-frame]").locator("canvas").first
+    frame = page.frame_locator("[data-testid=live-frame]")
+    canvas = frame.locator("canvas").first
     expect(canvas).to_be_visible(timeout=SOON)
+    # What lies over the canvas counts steps, and would differ by itself.
+    frame.locator("#display").evaluate("display => { display.style.visibility = 'hidden' }")
     page.wait_for_timeout(1_500)
     first = canvas.screenshot()
     page.wait_for_timeout(1_500)
     assert canvas.screenshot() != first
 
+    # What is shown can be chosen: here the training robots, a moment later the policy again.
+    choose(page, "Training")
+    expect(frame.locator("#display")).to_contain_text("Training", timeout=SOON)
+    page.get_by_role("textbox", name="Robots").fill("3")
+    choose(page, "Policy")
+    choose(page, "10×")
+    expect(frame.locator("#display")).to_contain_text("10× real time", timeout=SOON)
+
     # A checkpoint can be taken away while the training goes on, and the finished one is good.
     download_button = page.get_by_test_id("checkpoint").first.get_by_role("link", name=re.compile("Download"))
     with page.expect_download(timeout=TRAINED) as early:
         download_button.click(timeout=TRAINED)
+    expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "running")
     manifest, _ = read_policy(early.value.path())
     assert manifest.network.name == "resblock"
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "completed", timeout=TRAINED)

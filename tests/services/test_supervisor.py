@@ -84,7 +84,7 @@ def test_it_prints_one_address_restarts_what_dies_and_stops_cleanly(up: Up) -> N
 
     server = up.server()
     up.process.send_signal(signal.SIGINT)
-    assert up.process.wait(15) == 0
+    assert up.process.wait(10) == 0
     assert not server.is_running()
 
 
