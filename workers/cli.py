@@ -138,21 +138,25 @@ def train(
 
 @app.command()
 def evaluate(
-    checkpoint: Annotated[Path, typer.Argument(help="A checkpoint archive.", exists=True, dir_okay=False)],
-    suite: Annotated[str | None, typer.Option(help="A suite by name; that of the checkpoint's own task without it.")] = None,
+    checkpoints: Annotated[list[Path], typer.Argument(help="Checkpoint archives.", exists=True, dir_okay=False)],
+    suite: Annotated[
+        str | None, typer.Option(help="A suite by name; that of each checkpoint's own task without it.")
+    ] = None,
 ) -> None:
-    """Drive a checkpoint's policy through a frozen suite and print how it did, with a 95 % Wilson interval."""
+    """Drive each checkpoint's policy through a frozen suite and print how it did, with a 95 % Wilson interval."""
     try:
         from sim.suites import load_suite, suite_for
         from workers.checkpoints import read_policy
         from workers.evaluation import evaluate as run
 
-        manifest, policy = read_policy(checkpoint)
-        task = manifest.training.task
-        result = run(policy, task, suite_for(task) if suite is None else load_suite(suite))
+        for checkpoint in checkpoints:
+            manifest, policy = read_policy(checkpoint)
+            task = manifest.training.task
+            result = run(policy, task, suite_for(task) if suite is None else load_suite(suite))
+            name = f"{checkpoint}: " if len(checkpoints) > 1 else ""
+            _console.print(name + describe(result), highlight=False, markup=False, soft_wrap=True)
     except (WorkerError, SimError, KeyError) as error:
         _fail(str(error.args[0]))
-    _console.print(describe(result), highlight=False)
 
 
 @app.command()

@@ -70,6 +70,17 @@ def test_evaluate_prints_success_with_its_interval(checkpoint: Path) -> None:
     assert re.search(r"% success \[\d+\.\d%, \d+\.\d%\] of 200 on complex-200", result.output.replace("\n", " "))
 
 
+def test_evaluate_names_each_of_several_checkpoints(tmp_path: Path, checkpoint: Path) -> None:
+    other = tmp_path / "other.zip"
+    other.write_bytes(checkpoint.read_bytes())
+    result = CliRunner().invoke(app, ["evaluate", str(checkpoint), str(other)])
+    assert result.exit_code == 0, result.output
+    first, second = result.output.splitlines()
+    assert first.startswith(f"{checkpoint}: ")
+    assert second.startswith(f"{other}: ")
+    assert first.removeprefix(f"{checkpoint}") == second.removeprefix(f"{other}")  # the same policy, the same scenarios
+
+
 def test_export_writes_onnx(tmp_path: Path, checkpoint: Path) -> None:
     result = CliRunner().invoke(app, ["export", str(checkpoint), "--format", "onnx", "--out", str(tmp_path / "policy.onnx")])
     assert result.exit_code == 0, result.output
