@@ -103,7 +103,7 @@ def train(context: typer.Context) -> None:
 
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
 def evaluate(context: typer.Context) -> None:
-    """Measure a checkpoint on a suite."""
+    """Measure checkpoints on a suite."""
     _workers_command("evaluate", context)
 
 
@@ -111,6 +111,12 @@ def evaluate(context: typer.Context) -> None:
 def export(context: typer.Context) -> None:
     """Export a checkpoint's policy: ONNX, or a bundle with a ROS 2 node."""
     _workers_command("export", context)
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
+def reproduce(context: typer.Context) -> None:
+    """Train every row of the paper's tables, and say which of its claims hold."""
+    _workers_command("reproduce", context)
 
 
 @app.command(context_settings=_PASSED_ON, add_help_option=False)

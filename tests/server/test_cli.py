@@ -33,10 +33,20 @@ def test_help_names_every_command() -> None:
     status, output = run("--help")
 
     assert status == 0
-    assert set(re.findall(r"^\W*(\w+)  ", output, re.MULTILINE)) >= {"up", "serve", "worker", "train", "evaluate", "version"}
+    passed_on = {"train", "evaluate", "export", "reproduce", "worker"}
+    assert set(re.findall(r"^\W*(\w+)  ", output, re.MULTILINE)) >= {"up", "serve", "arena", "version"} | passed_on
 
 
-@pytest.mark.parametrize(("command", "option"), [("train", "--seed"), ("evaluate", "--suite"), ("worker", "--concurrency")])
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("train", "--seed"),
+        ("evaluate", "--suite"),
+        ("export", "--format"),
+        ("reproduce", "--seeds"),
+        ("worker", "--concurrency"),
+    ],
+)
 def test_the_workers_commands_explain_themselves(command: str, option: str) -> None:
     status, output = run(command, "--help")
 
