@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+import workers.statistics
+
 FloatArray = NDArray[np.float64]
 
-# The standard normal's 97.5 % quantile.
-_Z = 1.959963984540054
 _QUANTILES = (0.025, 0.975)
 _RESAMPLES = 2_000
 # Intervals must not flicker between two looks at the same data.
@@ -35,18 +35,13 @@ class Interval:
 
 
 def wilson_interval(successes: float, trials: float) -> Interval:
-    """Rate of `successes` among `trials` independent attempts, with Wilson's score interval (right at 0 and 1 too).
+    """Rate of `successes` among `trials` independent attempts, with Wilson's score interval.
 
     Raises:
         ValueError: no trials, or more successes than trials.
     """
-    if not 0 <= successes <= trials or trials <= 0:
-        raise ValueError(f"{successes} successes of {trials} trials are no rate")
-    rate = successes / trials
-    centre = (rate + _Z**2 / (2 * trials)) / (1 + _Z**2 / trials)
-    half = _Z / (1 + _Z**2 / trials) * np.sqrt(rate * (1 - rate) / trials + _Z**2 / (4 * trials**2))
-    # At 0 and 1 rounding could leave the rate a hair outside its own interval.
-    return Interval(rate, max(0.0, min(float(centre - half), rate)), min(1.0, max(float(centre + half), rate)))
+    low, high = workers.statistics.wilson_interval(successes, trials)
+    return Interval(successes / trials, low, high)
 
 
 def success_rate(arrivals: Sequence[int], episodes: Sequence[int]) -> Interval:

@@ -17,30 +17,6 @@ def test_wilson_interval_of_8_in_10() -> None:
     assert interval.high == pytest.approx(0.94332, abs=1e-5)
 
 
-def test_wilson_interval_of_a_perfect_score_ends_at_one_but_does_not_shrink_to_it() -> None:
-    # 1 / (1 + z^2 / n) with n = 90: the paper's 90 of 90.
-    interval = wilson_interval(90, 90)
-
-    assert (interval.value, interval.high) == (1.0, 1.0)
-    assert interval.low == pytest.approx(90 / (90 + 3.8415), abs=1e-5)
-
-
-@given(trials=st.integers(1, 100_000), share=st.floats(0, 1))
-def test_wilson_interval_holds_its_rate_and_mirrors(trials: int, share: float) -> None:
-    successes = round(share * trials)
-    interval = wilson_interval(successes, trials)
-    mirrored = wilson_interval(trials - successes, trials)
-
-    assert 0 <= interval.low <= interval.value <= interval.high <= 1
-    assert interval.low == pytest.approx(1 - mirrored.high, abs=1e-9)
-
-
-@pytest.mark.parametrize(("successes", "trials"), [(0, 0), (5, 4), (-1, 4)])
-def test_a_rate_needs_trials_and_no_more_successes_than_those(successes: int, trials: int) -> None:
-    with pytest.raises(ValueError, match="no rate"):
-        wilson_interval(successes, trials)
-
-
 def test_seeds_that_agree_are_pooled() -> None:
     assert success_rate([90, 90, 90], [100, 100, 100]) == wilson_interval(270, 300)
 

@@ -1,6 +1,8 @@
 """Wilson's interval against figures from the literature."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from workers.statistics import wilson_interval
 
@@ -19,7 +21,16 @@ def test_interval(successes: int, trials: int, low: float, high: float) -> None:
     assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=5e-5)
 
 
-@pytest.mark.parametrize(("successes", "trials"), [(0, 0), (2, 1), (-1, 5)])
+@given(trials=st.floats(1e-3, 1e6), share=st.floats(0, 1))
+def test_interval_holds_its_rate_and_mirrors(trials: float, share: float) -> None:
+    successes = share * trials
+    low, high = wilson_interval(successes, trials)
+    _, mirrored_high = wilson_interval(trials - successes, trials)
+    assert 0 <= low <= successes / trials <= high <= 1
+    assert low == pytest.approx(1 - mirrored_high, abs=1e-9)
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 0), (5, 4), (2, 1), (-1, 5)])
 def test_impossible_counts_are_refused(successes: int, trials: int) -> None:
     with pytest.raises(ValueError, match="no interval"):
         wilson_interval(successes, trials)
