@@ -118,9 +118,3 @@ class Showcase:
         # A reward that belongs to an attempt that has just ended is history.
         self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()
-
-
-def _in_one_arena(task: TaskConfig) -> TaskConfig:
-    if isinstance(task.arena, GeneratedArenaConfig):
-        return task.model_copy(update={"arena": task.arena.model_copy(update={"maps": 1})})
-    return task
