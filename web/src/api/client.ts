@@ -22,7 +22,7 @@ api.use({
 
 export const $api = createQueryHooks(api)
 
-export const statusKey = ['get', '/api/status'] as const
+const statusKey = ['get', '/api/status'] as const
 
 /** A client for one page load. Whatever is refused with 401 makes the status query ask again, and with it the login. */
 export function createQueryClient(): QueryClient {

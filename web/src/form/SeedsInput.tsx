@@ -9,10 +9,10 @@ import type { Form } from './useForm'
 import { sameValue, valueAt } from './values'
 
 /** With fewer seeds than this a difference between two configurations may be luck. */
-export const SEEDS_FOR_COMPARISON = 5
+const SEEDS_FOR_COMPARISON = 5
 
 /** The seeds 0, 1, 2, ... that a mere number of seeds stands for. */
-export const firstSeeds = (n: number): number[] => Array.from({ length: n }, (_, seed) => seed)
+const firstSeeds = (n: number): number[] => Array.from({ length: n }, (_, seed) => seed)
 
 const ORDER: ('label' | 'input' | 'error' | 'description')[] = ['label', 'input', 'error', 'description']
 

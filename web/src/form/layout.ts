@@ -4,12 +4,12 @@ import { branches, type Json, resolve, type Schema, withoutNull } from './schema
 import { type Path, pathKey, valueAt } from './values'
 
 /** What a field offers to choose from. */
-export interface Option {
+interface Option {
   value: string
   label: string
 }
 
-export type FieldKind =
+type FieldKind =
   | { kind: 'text' }
   | { kind: 'number'; integer: boolean }
   | { kind: 'numbers' }

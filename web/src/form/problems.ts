@@ -16,7 +16,7 @@ export type Problems = Readonly<Record<string, string>>
  * The path of a field from pydantic's `loc`. It starts with "body" and names the tag of each union on the way
  * (["body", "training", "algorithm", "ppo", "network"]); a tag is no key of the values, but the value of one.
  */
-export function locToPath(loc: readonly (string | number)[], values: Json): (string | number)[] {
+function locToPath(loc: readonly (string | number)[], values: Json): (string | number)[] {
   const path: (string | number)[] = []
   for (const part of loc[0] === 'body' ? loc.slice(1) : loc) {
     const here = valueAt(values, path)

@@ -53,7 +53,7 @@ export function withoutNull(schema: Schema): { schema: Schema; nullable: boolean
 }
 
 /** A branch of a discriminated union. */
-export interface Branch {
+interface Branch {
   tag: string
   label: string
   schema: Schema
