@@ -81,6 +81,14 @@ def test_everything_is_checked_for_health_and_only_the_server_is_reachable_from_
     )
 
 
+def test_the_image_is_built_with_the_arguments_that_it_takes() -> None:
+    for service in OURS:
+        build = COMPOSE["services"][service]["build"]
+        assert build["context"] == "."
+        assert set(build["args"]) <= set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE))
+        assert {substituted(value) for value in build["args"].values()} == {""}
+
+
 def test_the_image_runs_without_rights_on_files_that_exist() -> None:
     last_stage = DOCKERFILE.split("\nFROM ")[-1]
     assert re.findall(r"^USER (\w+)$", last_stage, re.MULTILINE) == ["mapless"]
