@@ -180,10 +180,11 @@ def test_nan_ends_the_training_with_advice(tmp_path: Path) -> None:
     assert recorder.rows[-1][1]["policy/finite"] == 0.0
 
 
-def test_default_training_reaches_the_target_every_time(tmp_path: Path) -> None:
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_default_training_reaches_the_target_every_time(tmp_path: Path, seed: int) -> None:
     """The defaults of the form, on the simple arena."""
     recorder = Recorder()
-    train(TrainingConfig(), 0, recorder, tmp_path)
+    train(TrainingConfig(), seed, recorder, tmp_path)
     _, archive, evaluation = recorder.checkpoints[-1]
     assert evaluation is not None
     assert evaluation.success_rate >= 0.99
