@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import FrameType
 from typing import IO
@@ -162,7 +162,7 @@ class Supervisor:
                 # Bound for a moment, to know that it can be, and which port it is where the settings say 0.
                 settings = self._settings.model_copy(update={"port": listener.getsockname()[1]})
             secrets = load_secrets(settings)
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in _stop_signals():
                 stack.callback(signal.signal, number, signal.signal(number, self._on_signal))
             count = usable_cores() if settings.workers is None else settings.workers
             server = _server(settings)
@@ -198,7 +198,8 @@ class Supervisor:
     def _stop(self, server: Child, worker: Child | None) -> None:
         """Workers first: they hand their runs back to a server that still listens."""
         if self._signals:
-            self._say("Stopping; running trainings write a checkpoint ...")
+            with suppress(OSError):  # the terminal may be gone
+                self._say("Stopping; running trainings write a checkpoint ...")
         for child, seconds in ((worker, _WORKER_STOP_SECONDS), (server, _SERVER_STOP_SECONDS)):
             if child is None:
                 continue
@@ -220,6 +221,13 @@ def _answers(url: str) -> bool:
         return False
     finally:
         connection.close()
+
+
+def _stop_signals() -> tuple[signal.Signals, ...]:
+    """Ctrl-C, a service manager's stop, and a terminal that is closed, unless `nohup` means it to go on."""
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        return signal.SIGINT, signal.SIGTERM
+    return signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 def _locked(data_dir: Path) -> IO[bytes]:

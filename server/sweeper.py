@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.concurrency import run_in_threadpool
 
 from server.doorbell import CeleryDoorbell, prepare_broker
@@ -102,6 +101,7 @@ async def _sweep_regularly(sweeper: Sweeper) -> None:
     while True:
         try:
             await run_in_threadpool(sweeper.sweep, time.time())
-        except SQLAlchemyError:
-            logger.exception("the database does not answer: the next sweep tries again")
+        except Exception:
+            # Leases must expire for all runs, whatever is wrong with one of them, or with the database for a while.
+            logger.exception("a sweep failed: the next one tries again")
         await asyncio.sleep(sweeper.interval)

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from server import models
 from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
-from server.errors import NotFoundError
+from server.errors import ConflictError, NotFoundError
 from server.events.bus import Change, ChangeKind
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
@@ -27,6 +27,7 @@ from workers.protocol import (
     Claim,
     ClaimRequest,
     EventItem,
+    Final,
     Heartbeat,
     MetricItem,
     Orders,
@@ -53,15 +54,22 @@ class WorkerService:
 
         Raises:
             NotFoundError: there is no such run.
-            ConflictError: it is not to be had at this attempt.
+            ConflictError: it is not to be had at this attempt, or can't be trained any more.
         """
+        missing: str | None = None
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
             checkpoint = attempts.begin(session, run, request.worker, request.published_attempt, self._lease_seconds)
+            training = TrainingConfig.model_validate(run.experiment.training)
+            try:
+                training = with_geometry(training, self._services.arenas)
+            except NotFoundError as error:
+                missing = f"The arena is gone: {error.message}"
+                attempts.end(session, run, Final(outcome="failed", error=missing))
             claim = Claim(
                 attempt=run.attempt,
                 seed=run.seed,
-                training=with_geometry(TrainingConfig.model_validate(run.experiment.training), self._services.arenas),
+                training=training,
                 last_seq=run.last_seq,
                 checkpoint=CheckpointReference(id=checkpoint.id, step=checkpoint.step, sha256=checkpoint.sha256)
                 if checkpoint
@@ -69,6 +77,8 @@ class WorkerService:
                 lease_seconds=self._lease_seconds,
             )
         self._publish(run, "run")
+        if missing is not None:
+            raise ConflictError(missing)
         return claim
 
     def receive(self, run_id: str, attempt: int, batch: Batch) -> Orders:

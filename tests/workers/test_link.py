@@ -199,3 +199,23 @@ def test_closing_ends_the_thread_whether_or_not_there_is_a_server(tmp_path: Path
     assert worker.link.done
     worker.spool.close()
     peer.start()
+
+
+def test_frames_that_come_without_end_do_not_keep_metrics_waiting(peer: Peer, worker: Worker) -> None:
+    until(lambda: len(worker.orders) > 0)
+    stop = threading.Event()
+
+    def watch() -> None:
+        while not stop.is_set():
+            worker.link.frame(bytes(200_000))
+
+    # More than any link can carry: there is always a next frame.
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        worker.report(20)
+        until(lambda: worker.spool.acked == 20)
+        assert peer.frames
+    finally:
+        stop.set()
+        watcher.join()

@@ -69,3 +69,17 @@ def test_whatever_the_order_of_events_nothing_is_lost_doubled_or_swapped(
             spool.acknowledge(received)
     assert numbers(spool, 100) == list(range(received + 1, put + 1))
     spool.close()
+
+
+def test_what_is_acknowledged_is_cut_off_and_numbers_go_on(tmp_path: Path) -> None:
+    path = tmp_path / "spool"
+    spool = Spool(path, last_seq=0)
+    while path.stat().st_size <= 2**20:
+        spool.event(0, "info", "x" * 10_000)
+    last = spool.last_seq
+    spool.acknowledge(last)
+    assert path.stat().st_size == 0
+    assert numbers(spool) == []
+    assert spool.metrics(1, 0.0, {"a": 1.0}) == last + 1
+    assert numbers(spool) == [last + 1]
+    assert [item.seq for item in Spool(path, last_seq=last).pending()] == [last + 1]

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerUnavailableError
 from workers.protocol import Claim, Final, FinalOutcome, Orders
 from workers.reporting import EvaluationResult
 from workers.runtime.client import ServerClient
@@ -22,6 +22,10 @@ logger = logging.getLogger(__name__)
 
 _POLL_SECONDS = 0.1
 _RETRY_SECONDS = 1.0
+# What arrives damaged as often as this is damaged where it is kept.
+_DAMAGED_DOWNLOADS = 3
+# The last of an explanation is what tells most; the server takes 10,000 characters.
+_EXPLANATION_CHARACTERS = 9_000
 # A trainer that has said its last word has nothing left to do.
 _EXIT_SECONDS = 5.0
 
@@ -81,7 +85,7 @@ class Attempt:
         The trainer has ended when this returns, in every case.
         """
         try:
-            final = self._train(trainer)
+            final = self._train_or_explain(trainer)
             if final is None:
                 return None
             self._link.finish(final)
@@ -95,12 +99,20 @@ class Attempt:
 
     # -- the trainer ------------------------------------------------------------------------------------------------------
 
+    def _train_or_explain(self, trainer: TrainerHandle) -> Final | None:
+        """`_train`; what goes wrong here, a full disk say, reaches the event log too."""
+        try:
+            return self._train(trainer)
+        except Exception as error:
+            logger.exception("run %s: attempt %d broke", self._run_id, self._claim.attempt)
+            return Final(outcome="lost", error=f"{type(error).__name__}: {error}"[-_EXPLANATION_CHARACTERS:])
+
     def _train(self, trainer: TrainerHandle) -> Final | None:
         try:
             resume = self._fetch_checkpoint()
         except ServerUnavailableError:
-            return Final(outcome="released")
-        except (RunRefusedError, RequestRefusedError) as error:
+            return Final(outcome="stopped" if self._orders.stop else "released")
+        except (RunRefusedError, RequestRefusedError, ArchiveIntegrityError) as error:
             return Final(outcome="failed", error=f"The checkpoint to go on from cannot be fetched: {error}")
         if self._link.fenced():
             return None
@@ -134,12 +146,14 @@ class Attempt:
         if checkpoint is None:
             return None
         path = self._directory / "resume.zip"
+        damaged = 0
         while not self._link.fenced():
             try:
                 self._client.download(checkpoint, path)
-            except ServerUnavailableError as error:
+            except (ServerUnavailableError, ArchiveIntegrityError) as error:
                 logger.warning("checkpoint %s waits: %s", checkpoint.id, error)
-                if self._shutting_down():
+                damaged += isinstance(error, ArchiveIntegrityError)
+                if self._stop_wanted() or damaged == _DAMAGED_DOWNLOADS:
                     raise
                 time.sleep(_RETRY_SECONDS)
             else:
@@ -175,14 +189,14 @@ class Attempt:
         if ended is not None and ended.outcome == "completed":
             return Final(outcome="completed")
         if ended is not None and ended.outcome == "failed":
-            return Final(outcome="failed", error=ended.error)
+            return Final(outcome="failed", error=(ended.error or "")[-_EXPLANATION_CHARACTERS:])
         if killed:
             self._spool.event(
                 self._step, "warning", "The trainer did not end in time and was killed: it goes on from its last checkpoint."
             )
         if killed or ended is not None:
             return Final(outcome="stopped" if self._orders.stop else "released")
-        return Final(outcome="lost", error=trainer.cause_of_death()[-9_000:])
+        return Final(outcome="lost", error=trainer.cause_of_death()[-_EXPLANATION_CHARACTERS:])
 
     # -- what comes in, on other threads ----------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from typing import Self
 
 import httpx
 
-from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerUnavailableError
 from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, Queue
 from workers.reporting import EvaluationResult
 
@@ -54,7 +54,13 @@ class ServerClient:
         return Claim.model_validate_json(response.content)
 
     def download(self, checkpoint: CheckpointReference, path: Path) -> None:
-        """Fetch an archive to `path`; bytes that are not what the server registered count as an unavailable server."""
+        """Fetch an archive to `path`; refuses what is not what the server registered.
+
+        Raises:
+            ArchiveIntegrityError: the bytes are others than those that were registered.
+            ServerUnavailableError: not now; ask again later.
+            RequestRefusedError, RunRefusedError: never.
+        """
         digest = hashlib.sha256()
         try:
             with self._http.stream("GET", f"/api/worker/checkpoints/{checkpoint.id}") as response, path.open("wb") as file:
@@ -67,7 +73,7 @@ class ServerClient:
         except httpx.TransportError as error:
             raise _unavailable(error) from error
         if digest.hexdigest() != checkpoint.sha256:
-            raise ServerUnavailableError(f"checkpoint {checkpoint.id} arrived damaged")
+            raise ArchiveIntegrityError(f"the checkpoint of step {checkpoint.step:,} is not what was stored there")
 
     def upload(
         self, run_id: str, attempt: int, step: int, archive: Path, after_seq: int, evaluation: EvaluationResult | None

@@ -181,14 +181,14 @@ class Link:
             self._fenced = True
 
     async def _write(self, connection: ClientConnection, acked: asyncio.Event) -> None:
-        """One batch under way at a time; frames overtake them."""
+        """One batch under way at a time; a frame may overtake it, and never keeps it or the lease's renewal waiting."""
         await asyncio.wait_for(acked.wait(), _ACK_TIMEOUT_SECONDS)
         loop = asyncio.get_running_loop()
         sent = loop.time()
         in_flight = False
         while not self._closed:
             self._wake.clear()
-            while self._frames:
+            if self._frames:
                 await connection.send(self._frames.popleft())
             now = loop.time()
             if in_flight and acked.is_set():
@@ -203,7 +203,10 @@ class Link:
                     sent, in_flight = now, True
             elif now - sent > _ACK_TIMEOUT_SECONDS:
                 raise TimeoutError("the server does not acknowledge")
-            await self._wait(acked if in_flight else None)
+            if self._frames:
+                await asyncio.sleep(0)  # the reader's turn, before the next frame
+            else:
+                await self._wait(acked if in_flight else None)
 
     async def _wait(self, acked: asyncio.Event | None) -> None:
         """Until there is something to send, the acknowledgement has come, or the lease wants renewing."""

@@ -87,11 +87,21 @@ class Slot:
             with self._condition:
                 died = self._bury_spare()
                 if self._spare is None and (self._wanted or not (self._busy or died or self.shutting_down())):
-                    self._spare = TrainerHandle()
-                    self._condition.notify_all()
+                    died = not self._start_spare()
                 if os.getppid() != self._parent and not self._busy:
                     self._leave()
                 self._condition.wait(self._patience if died else _TICK_SECONDS)
+
+    def _start_spare(self) -> bool:
+        """Whether a trainer could be started: a machine may be out of processes, memory or files for a while."""
+        try:
+            self._spare = TrainerHandle()
+        except OSError:
+            logger.exception("no trainer can be started")
+            self._be_patient()
+            return False
+        self._condition.notify_all()
+        return True
 
     def _bury_spare(self) -> bool:
         """Whether the waiting trainer has died; another one is tried after a while that doubles each time."""
@@ -100,8 +110,11 @@ class Slot:
         self._spare.close()
         logger.error("no trainer is ready. %s", self._spare.cause_of_death())
         self._spare = None
-        self._patience = min(2 * self._patience, _LAST_RETRY_SECONDS)
+        self._be_patient()
         return True
+
+    def _be_patient(self) -> None:
+        self._patience = min(2 * self._patience, _LAST_RETRY_SECONDS)
 
     def _leave(self) -> None:
         """The worker was killed and left this idle process behind."""
@@ -119,7 +132,7 @@ class Slot:
             self.client.heartbeat(self.name, self.settings.worker_queue)
             # For who watches over this worker without asking the server, as a container's health check does.
             (self.settings.work_dir / "heartbeat").touch()
-        except ServerError as error:
+        except (ServerError, OSError) as error:
             logger.warning("heartbeat: %s", error)
             return False
         return True

@@ -12,6 +12,9 @@ from pathlib import Path
 from workers.protocol import ITEM, MAX_BATCH_ITEMS, EventItem, MetricItem
 from workers.reporting import EventLevel
 
+# What is acknowledged is cut off once there is this much of it: a training may last for days.
+_SHORTEN_BYTES = 2**20
+
 
 class Spool:
     """Numbered items of one attempt, oldest first. Thread-safe.
@@ -77,6 +80,9 @@ class Spool:
         """The server has everything up to `seq`."""
         with self._lock:
             self._acked = max(self._acked, seq)
+            if self._acked >= self._seq and self._end > _SHORTEN_BYTES:
+                self._file.truncate(0)
+                self._end = self._acked_offset = 0
 
     def close(self) -> None:
         """Close the file; it stays where it is."""

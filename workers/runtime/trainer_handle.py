@@ -132,6 +132,6 @@ class TrainerHandle:
 
     def _read_output(self, stream: IO[bytes]) -> None:
         for line in stream:
-            text = line.decode(errors="replace").rstrip()
+            text = line.decode(errors="replace").replace("\0", "").rstrip()
             self._output.append(text)
             sys.stderr.write(f"trainer {self._process.pid}: {text}\n")
