@@ -27,6 +27,7 @@ class Peer:
         self.paths: list[str] = []
         self.connection: ServerConnection | None = None
         self.deaf = threading.Event()
+        self.seconds_per_frame = 0.0
         self.fence = threading.Event()
         self._server: Server | None = None
         self.port = 0
@@ -58,6 +59,7 @@ class Peer:
             for message in connection:
                 if isinstance(message, bytes):
                     self.frames.append(message)
+                    time.sleep(self.seconds_per_frame)
                     continue
                 batch = Batch.model_validate_json(message)
                 self.batches.append(batch)
@@ -201,21 +203,22 @@ def test_closing_ends_the_thread_whether_or_not_there_is_a_server(tmp_path: Path
     peer.start()
 
 
-def test_frames_that_come_without_end_do_not_keep_metrics_waiting(peer: Peer, worker: Worker) -> None:
+def test_frames_on_a_slow_line_do_not_keep_metrics_waiting(peer: Peer, worker: Worker) -> None:
     until(lambda: len(worker.orders) > 0)
+    peer.seconds_per_frame = 0.02
     stop = threading.Event()
 
     def watch() -> None:
-        while not stop.is_set():
-            worker.link.frame(bytes(200_000))
+        while not stop.wait(0.005):
+            worker.link.frame(bytes(500_000))
 
-    # More than any link can carry: there is always a next frame.
+    # They come faster than the line carries them, so that there is always a next one.
     watcher = threading.Thread(target=watch)
     watcher.start()
     try:
+        until(lambda: len(peer.frames) > 20)
         worker.report(20)
-        until(lambda: worker.spool.acked == 20)
-        assert peer.frames
+        until(lambda: worker.spool.acked == 20, seconds=5)
     finally:
         stop.set()
         watcher.join()
