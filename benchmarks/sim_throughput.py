@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
-from sim.arenas import Arena
+from sim.arenas import Arena, Mover
 from sim.config import TaskConfig
-from sim.kernels.step import step_robots, write_commands
+from sim.kernels.commands import write_commands
+from sim.kernels.step import step_robots
 from sim.reference import ReferenceWorld
 from sim.world import World
 
@@ -35,11 +36,14 @@ ROUNDS = 7
 SECONDS = 0.15  # of CPU time, of one contender in one round
 ACTIONS = 64  # precomputed batches of actions that are used in turn
 
+# Pedestrians of a map, and with how many robots on all maps they are measured: with 1,024 a map has 16.
+MOVERS, AMONG_MOVERS = 4, (256, 1024)
+
 PLAIN, IRSIM, KERNEL = "plain_pymunk", "ir_sim", "kernel_without_physics_256"
 
 
-def arena(seed: int) -> Arena:
-    """Six circles and six boxes anywhere in 10 x 10 m."""
+def arena(seed: int, movers: int = 0) -> Arena:
+    """Six circles and six boxes anywhere in 10 x 10 m, and pedestrians."""
     rng = np.random.default_rng(seed)
     return Arena(
         f"clutter-{seed}",
@@ -47,6 +51,7 @@ def arena(seed: int) -> Arena:
         boxes=np.column_stack(
             [rng.uniform(-4.0, 4.0, (6, 2)), rng.uniform(0.15, 0.6, (6, 2)), rng.uniform(0.0, math.pi, 6)]
         ),
+        movers=(Mover("pedestrian", 0.25, 1.0),) * movers,
     )
 
 
@@ -55,9 +60,9 @@ def random_actions(robots: int) -> NDArray[np.float32]:
     return np.random.default_rng(0).uniform([0.0, -1.0], 1.0, (ACTIONS, robots, 2)).astype(np.float32)
 
 
-def ours(robots: int) -> tuple[Callable[[], None], World]:
-    """A call that steps all robots once."""
-    world = World(TASK, [arena(seed) for seed in range(min(MAPS, robots))], robots, seed=0)
+def ours(robots: int, movers: int = 0) -> tuple[Callable[[], None], World]:
+    """A call that steps all robots once, with so many movers in every map."""
+    world = World(TASK, [arena(seed, movers) for seed in range(min(MAPS, robots))], robots, seed=0)
     world.reset()
     actions = random_actions(robots)
     count = 0
@@ -79,7 +84,7 @@ def kernel_only(robots: int) -> Callable[[], None]:
 
     def step() -> None:
         nonlocal count
-        write_commands(actions[count % ACTIONS], world.robots.records, space.state, space.command, parameters)
+        write_commands(actions[count % ACTIONS], world.robots, space.state, space.command, parameters)
         space.state[:robots] = space.command[:robots, :3] + TASK.control_period * space.command[:robots, 3:]
         step_robots(space.state, world.robots, world.geometry, parameters)
         count += 1
@@ -123,7 +128,7 @@ def ir_sim() -> Callable[[], None] | None:
 world: {{height: 10, width: 10, step_time: {TASK.control_period}, offset: [-5, -5], collision_mode: stop}}
 robot:
   - kinematics: {{name: diff}}
-    shape: {{name: circle, radius: {TASK.robot.radius}}}
+    shape: {{name: circle, radius: {TASK.robot.circumscribed_radius}}}
     state: [0, 0, 0]
     goal: [4, 4, 0]
     sensors:
@@ -164,15 +169,18 @@ def resident_bytes() -> int:
 
 
 def memory() -> dict[str, float]:
-    """Bytes that a robot and that an obstacle cost, each told from the growth of the process."""
+    """Bytes that a robot, an obstacle and a mover cost, each told from the growth of the process."""
     before = resident_bytes()
     crowd = ours(4096)
     robots = (resident_bytes() - before) / 4096
     before = resident_bytes()
     places = World(TASK, [arena(seed) for seed in range(512)], 1, seed=0)
     obstacles = (resident_bytes() - before) / (512 * 12)
-    del crowd, places
-    return {"bytes_per_robot": round(robots), "bytes_per_obstacle": round(obstacles)}
+    before = resident_bytes()
+    walks = World(TASK, [Arena("walks", movers=(Mover("pedestrian", 0.1, 1.0),) * 16)] * 512, 1, seed=0)
+    movers = (resident_bytes() - before) / (512 * 16)
+    del crowd, places, walks
+    return {"bytes_per_robot": round(robots), "bytes_per_obstacle": round(obstacles), "bytes_per_mover": round(movers)}
 
 
 def main() -> None:
@@ -180,6 +188,7 @@ def main() -> None:
     options = parser(__doc__).parse_args()
     figures: dict[str, object] = dict(memory())
     cases = {f"robots_{n}": (ours(n)[0], n) for n in ROBOTS}
+    cases |= {f"robots_{n}_among_movers": (ours(n, MOVERS)[0], n) for n in AMONG_MOVERS}
     cases |= {PLAIN: (plain(), 1), KERNEL: (kernel_only(256), 256)}
     if (other := ir_sim()) is not None:
         cases[IRSIM] = (other, 1)
@@ -194,7 +203,10 @@ def main() -> None:
         "to_kernel_at_256": round(many / rates[KERNEL], 2),
         "kept_at_4096": round(rates["robots_4096"] / many, 2),
     }
+    for n in AMONG_MOVERS:
+        figures[f"kept_among_movers_at_{n}"] = round(rates[f"robots_{n}_among_movers"] / rates[f"robots_{n}"], 2)
     targets = {"to_plain_at_256": 100.0, "to_plain_at_1": 8.0, "to_kernel_at_256": 0.5, "kept_at_4096": 0.67}
+    targets["kept_among_movers_at_1024"] = 0.8
     if IRSIM in rates:
         figures["to_ir_sim_at_256"] = round(many / rates[IRSIM], 1)
         targets["to_ir_sim_at_256"] = 500.0

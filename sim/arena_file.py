@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
+from sim.mover_config import MAX_MOVERS, MoverRadius, MoverSpeed
 from sim.schema import Frozen
 
 MAX_OBSTACLES = 2000
@@ -15,6 +16,9 @@ MAX_OBSTACLES = 2000
 
 MAX_SIDE = 100.0
 """Longest side of an imported arena, metres."""
+
+MAX_WAYPOINTS = 32
+"""Waypoints of one patrol."""
 
 MIN_SIDE = 0.5
 """Shortest side of an imported arena, metres."""
@@ -62,6 +66,51 @@ class Target(_Part):
     y: Coordinate
 
 
+class _MoverPart(_Part):
+    radius: MoverRadius = Field(0.25, description="Metres.")
+    speed: MoverSpeed = Field(1.0, description="Top speed, metres per second.")
+
+
+class Waypoint(_Part):
+    """A corner of a patrol's way."""
+
+    x: Coordinate
+    y: Coordinate
+
+
+class Patrol(_MoverPart):
+    """Goes round its waypoints in straight lines, from the last one back to the first; it starts anywhere on its way."""
+
+    kind: Literal["patrol"]
+    waypoints: tuple[Waypoint, ...] = Field(
+        (),
+        max_length=MAX_WAYPOINTS,
+        strict=False,
+        description="Two or more; without any it goes to and fro on a line that is drawn when it starts.",
+    )
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if len(self.waypoints) == 1:
+            raise ValueError("a patrol needs two waypoints or more, or none")
+        return self
+
+
+class Walker(_MoverPart):
+    """Goes straight on until something is in the way, then in another direction."""
+
+    kind: Literal["walker"]
+
+
+class Pedestrian(_MoverPart):
+    """Walks from place to place and avoids the others."""
+
+    kind: Literal["pedestrian"]
+
+
+AnyMover = Annotated[Patrol | Walker | Pedestrian, Field(discriminator="kind")]
+
+
 class ArenaFile(_Part):
     """A walled rectangle with obstacles. Metres; the origin is the middle, x to the right, y up."""
 
@@ -73,6 +122,7 @@ class ArenaFile(_Part):
     height: float = Field(ge=MIN_SIDE, le=MAX_SIDE, allow_inf_nan=False, description="Between the walls along y, metres.")
     circles: tuple[Circle, ...] = Field((), max_length=MAX_OBSTACLES, strict=False)
     boxes: tuple[Box, ...] = Field((), max_length=MAX_OBSTACLES, strict=False)
+    movers: tuple[AnyMover, ...] = Field((), max_length=MAX_MOVERS, strict=False, description="What moves in it.")
     start: Start | None = Field(None, description="Where a scenario starts, if the arena comes with one.")
     target: Target | None = Field(None, description="Where that scenario leads.")
 
@@ -89,4 +139,6 @@ class ArenaFile(_Part):
     @property
     def sha256(self) -> str:
         """Hash of everything but the name, 64 hexadecimal digits: two files with the same hash are the same place."""
-        return hashlib.sha256(self.model_dump_json(exclude={"name"}).encode()).hexdigest()
+        # An arena in which nothing moves keeps the hash that it had before anything could.
+        left_out = {"name"} if self.movers else {"name", "movers"}
+        return hashlib.sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()

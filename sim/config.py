@@ -5,14 +5,26 @@ derives from these models is the launch form: `title` and `description` are what
 field under *Advanced*.
 """
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from sim.arena_file import ArenaFile
+from sim.mover_config import MoversConfig as MoversConfig
+from sim.robot_config import AnyRobotConfig as AnyRobotConfig
+from sim.robot_config import BurgerConfig as BurgerConfig
+from sim.robot_config import JackalConfig as JackalConfig
+from sim.robot_config import RectangularConfig as RectangularConfig
+from sim.robot_config import RoundConfig as RoundConfig
+from sim.robot_config import WaffleConfig as WaffleConfig
 from sim.schema import ADVANCED as ADVANCED
 from sim.schema import HIDDEN
 from sim.schema import Frozen as Frozen
+from sim.sensing_config import MAX_DELAY as MAX_DELAY
+from sim.sensing_config import LidarConfig as LidarConfig
+from sim.sensing_config import OdometryConfig as OdometryConfig
+from sim.sensing_config import RandomisationConfig as RandomisationConfig
 
 ArenaName = Literal["simple", "complex"]
 FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages"]
@@ -27,6 +39,7 @@ class ArenaConfig(Frozen):
         title="Arena",
         description="Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles.",
     )
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
 
 
 MAX_MAPS = 4096
@@ -65,6 +78,7 @@ class GeneratedArenaConfig(Frozen):
         description="Which maps; the suites' maps are never among them.",
         json_schema_extra=ADVANCED,
     )
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
 
 
 class ImportedArenaConfig(Frozen):
@@ -75,6 +89,7 @@ class ImportedArenaConfig(Frozen):
         "", pattern="^([0-9a-f]{64})?$", title="Imported arena", description="The hash that the gallery shows."
     )
     arena: ArenaFile | None = Field(None, title="Geometry", json_schema_extra=HIDDEN)
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
 
     @model_validator(mode="after")
     def _geometry_is_the_hashed_one(self) -> Self:
@@ -89,89 +104,6 @@ class ImportedArenaConfig(Frozen):
 
 
 AnyArenaConfig = Annotated[ArenaConfig | GeneratedArenaConfig | ImportedArenaConfig, Field(discriminator="name")]
-
-
-class RobotConfig(Frozen):
-    """A differential-drive robot with a disc as its footprint; the default is the TurtleBot3 Burger."""
-
-    radius: float = Field(0.105, gt=0.02, le=0.4, title="Radius", description="Metres.", json_schema_extra=ADVANCED)
-    max_linear_speed: float = Field(
-        0.25,
-        gt=0.0,
-        le=3.0,
-        title="Top speed",
-        description="Metres per second; the robot does not reverse.",
-        json_schema_extra=ADVANCED,
-    )
-    max_angular_speed: float = Field(
-        1.0,
-        gt=0.0,
-        le=6.0,
-        title="Top turning rate",
-        description="Radians per second, both ways.",
-        json_schema_extra=ADVANCED,
-    )
-    max_linear_acceleration: float = Field(
-        0.0,
-        ge=0.0,
-        le=100.0,
-        title="Linear acceleration",
-        description="Metres per second squared, also when braking; 0 is unlimited.",
-        json_schema_extra=ADVANCED,
-    )
-    max_angular_acceleration: float = Field(
-        0.0,
-        ge=0.0,
-        le=100.0,
-        title="Angular acceleration",
-        description="Radians per second squared, both ways; 0 is unlimited.",
-        json_schema_extra=ADVANCED,
-    )
-
-
-class LidarConfig(Frozen):
-    """A planar scanner that looks ahead; the observation holds the minimum of each batch of neighbouring rays."""
-
-    rays: int = Field(30, ge=3, le=360, title="Rays", description="Rays per scan.", json_schema_extra=ADVANCED)
-    batches: int = Field(
-        10,
-        ge=1,
-        le=120,
-        title="Batches",
-        description="Numbers of the scan that the policy sees; must divide the rays.",
-        json_schema_extra=ADVANCED,
-    )
-    field_of_view: float = Field(
-        180.0,
-        gt=0.0,
-        le=360.0,
-        title="Field of view",
-        description="Degrees, symmetric about the heading.",
-        json_schema_extra=ADVANCED,
-    )
-    range: float = Field(3.5, gt=0.2, le=30.0, title="Range", description="Metres.", json_schema_extra=ADVANCED)
-    noise: float = Field(
-        0.0,
-        ge=0.0,
-        le=0.5,
-        title="Noise",
-        description="Standard deviation of each range that hits something, metres.",
-        json_schema_extra=ADVANCED,
-    )
-    dropout: float = Field(
-        0.0,
-        ge=0.0,
-        le=0.9,
-        title="Dropout",
-        description="Probability that a ray sees nothing and reads the full range.",
-        json_schema_extra=ADVANCED,
-    )
-
-    @model_validator(mode="after")
-    def _batches_divide_rays(self) -> "LidarConfig":
-        if self.rays % self.batches:
-            raise ValueError(f"batches must divide rays, and {self.batches} does not divide {self.rays}")
-        return self
 
 
 class RewardConfig(Frozen):
@@ -208,12 +140,25 @@ class TaskConfig(Frozen):
     """Everything that defines the environment: arena, robot, LiDAR, observation, reward, limits."""
 
     arena: AnyArenaConfig = Field(default_factory=ArenaConfig, title="Arena")
-    robot: RobotConfig = Field(default_factory=RobotConfig, title="Robot")
+    robot: AnyRobotConfig = Field(
+        default_factory=BurgerConfig,
+        title="Robot",
+        description="Its body and its limits; under Advanced each can be changed.",
+    )
     lidar: LidarConfig = Field(default_factory=LidarConfig, title="LiDAR")
+    odometry: OdometryConfig = Field(default_factory=OdometryConfig, title="Odometry")
     observation: ObservationName = Field(
         "improved",
         title="Observation",
         description="Improved: inverse ranges and a signed bearing. Paper: ranges and angles as published.",
+    )
+    frames: int = Field(
+        1,
+        ge=1,
+        le=8,
+        title="Stacked frames",
+        description="Observations that the policy sees at once: the newest and those of the steps before it.",
+        json_schema_extra=ADVANCED,
     )
     reward: RewardConfig = Field(default_factory=RewardConfig, title="Reward")
     control_period: float = Field(
@@ -248,3 +193,30 @@ class TaskConfig(Frozen):
         description="Steps per target before the attempt times out.",
         json_schema_extra=ADVANCED,
     )
+
+    command_delay: int = Field(
+        0,
+        ge=0,
+        le=MAX_DELAY,
+        title="Command delay",
+        description="Control steps between an action and the robot following it.",
+        json_schema_extra=ADVANCED,
+    )
+    randomisation: RandomisationConfig = Field(default_factory=RandomisationConfig, title="Domain randomisation")
+
+    @model_validator(mode="after")
+    def _drawn_ranges_are_within_the_lidars(self) -> Self:
+        if self.randomisation.range and self.randomisation.range[1] > self.lidar.range:
+            raise ValueError(f"randomisation.range goes beyond the LiDAR's range of {self.lidar.range:g} m")
+        return self
+
+    @field_validator("robot", mode="before")
+    @classmethod
+    def _first_robots_had_no_name(cls, robot: Any) -> Any:
+        """Files written when there was no other robot than the Burger do not name it."""
+        return {"name": "burger", **robot} if isinstance(robot, Mapping) else robot
+
+    @property
+    def passable_clearance(self) -> float:
+        """Distance from obstacles that the robot's centre needs on its way, metres."""
+        return max(self.robot.circumscribed_radius, self.collision_distance)

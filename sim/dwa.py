@@ -37,7 +37,7 @@ def dynamic_window(
         weights: of heading, clearance, speed and progress in the objective.
     """
     angles = ray_angles(task.lidar)
-    keep = max(task.collision_distance, task.robot.radius) + MARGIN
+    keep = task.passable_clearance + MARGIN
     steps = max(1, round(HORIZON / task.control_period))
 
     def act(situation: Situation) -> Floats:

@@ -7,9 +7,10 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.arenas import build_arenas
+from sim.arenas import build_task_arenas
 from sim.render import render_robot
-from sim.vector_env import Floats, Task, read_task, single_spaces
+from sim.vector_env import Floats, Task, known_mode, read_task, single_spaces
+from sim.window import Window
 from sim.world import World
 
 OUTCOMES = ("none", "arrival", "collision", "timeout")
@@ -20,20 +21,23 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
 
     Args:
         task: arena, robot, LiDAR, observation, reward, limits.
-        render_mode: None, or "rgb_array" for pictures.
+        render_mode: None, "rgb_array" for pictures, or "human" for a window that follows every step in real time.
 
     Raises:
         pydantic.ValidationError: a value of the task is wrong.
         ArenaError: the robot does not fit into the arena.
+        DisplayError: "human" where there is no display, or no pygame.
+        ValueError: there is no such render mode.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 5}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 5}  # type: ignore[misc]
 
     def __init__(self, task: Task = None, *, render_mode: str | None = None) -> None:
         self.task = read_task(task)
-        self.render_mode = render_mode
+        self.render_mode = known_mode(render_mode, self.metadata)
+        self._window = Window("Mapless", self.task.control_period) if render_mode == "human" else None
         self.observation_space, self.action_space = single_spaces(self.task)
-        self._world = World(self.task, build_arenas(self.task.arena), 1)
+        self._world = World(self.task, build_task_arenas(self.task), 1)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode.
@@ -53,6 +57,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
             self._world.seed(seed)
         names = {"pose": "poses", "target": "targets"}
         self._world.reset_with({names.get(name, name): value for name, value in (options or {}).items()})
+        self._show()
         return self._world.robots.observations[0].copy(), self._info()
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -71,6 +76,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         self._world.step(np.asarray(action, dtype=np.float32).reshape(1, 2))
         robots = self._world.robots
         terminated, truncated = bool(robots.terminations[0]), bool(robots.truncations[0])
+        self._show()
         info = self._info()
         if robots.outcomes[0]:
             record = robots.records[0]
@@ -90,8 +96,17 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         return {"pose": robots.poses[0].copy(), "target": robots.targets[0].copy()}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture from above, (height, width, 3); None without a render mode."""
-        return None if self.render_mode is None else render_robot(self._world, 0)
+        """A picture from above, (height, width, 3); None without a render mode, and for "human", whose window shows it."""
+        return render_robot(self._world, 0) if self.render_mode == "rgb_array" else None
+
+    def _show(self) -> None:
+        if self._window is not None:
+            self._window.show(render_robot(self._world, 0))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Everything that the future depends on, as plain arrays."""

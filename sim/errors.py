@@ -6,6 +6,7 @@ SimError
 │       ├── ArenaFormatError     it is not what it should be, or holds what cannot be represented
 │       ├── ArenaLimitError      it is larger than we accept
 │       └── NoFreeSpaceError     a robot has no room in it
+├── DisplayError     there is no window to show pictures in
 ├── PlacementError   a requested pose or target is not in the arena's free space
 └── SuiteError       a suite is unknown, or its content is not what its hash says
 """
@@ -33,6 +34,10 @@ class ArenaLimitError(ArenaFileError):
 
 class NoFreeSpaceError(ArenaFileError):
     """There is no room for a robot in an arena."""
+
+
+class DisplayError(SimError):
+    """There is no window to show pictures in."""
 
 
 class PlacementError(SimError):

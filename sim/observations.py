@@ -1,10 +1,11 @@
 """The observations that a policy may see: named, versioned and explained number by number.
 
 Both have `batches + 6` numbers, 16 with the default scanner. A name's meaning never changes: a different layout gets another
-version, and a checkpoint says which one it was trained on.
+version, and a checkpoint says which one it was trained on. Where frames are stacked, the same numbers follow as they were a
+step before, two steps before and so on; an episode begins with its first frame repeated.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from sim.config import ObservationName, TaskConfig
@@ -45,16 +46,31 @@ class ObservationLayout:
 
 def observation_size(task: TaskConfig) -> int:
     """Numbers in one observation of this task."""
+    return task.frames * frame_size(task)
+
+
+def frame_size(task: TaskConfig) -> int:
+    """Numbers of one observation that belong to one moment."""
     return task.lidar.batches + EXTRA
 
 
 def near_distance(task: TaskConfig) -> float:
     """Distance at which the improved observation's inverse range reaches 1, metres: the collision distance or the body."""
-    return max(task.collision_distance, task.robot.radius)
+    return max(task.collision_distance, task.robot.inscribed_radius)
 
 
 def observation_layout(task: TaskConfig) -> ObservationLayout:
-    """Every number of a task's observation, in order."""
+    """Every number of a task's observation, in order: the newest frame first."""
+    newest = _frame_layout(task)
+    earlier = (
+        replace(number, name=f"{number.name}, {age} before", formula=f"{number.name} {age} step{'s'[: age > 1]} before")
+        for age in range(1, task.frames)
+        for number in newest.numbers
+    )
+    return replace(newest, numbers=(*newest.numbers, *earlier))
+
+
+def _frame_layout(task: TaskConfig) -> ObservationLayout:
     rays = task.lidar.rays // task.lidar.batches
     batches = range(task.lidar.batches)
     velocities = (

@@ -6,14 +6,16 @@
 import numpy as np
 
 from sim.arenas import build_arenas
-from sim.config import TaskConfig
+from sim.config import ArenaConfig, TaskConfig
+from sim.mover_config import MoversConfig
 from sim.scan import clearances, scan
 from sim.vector_env import NavigationVectorEnv
 
 
 def main() -> None:
     """Call everything that is compiled once."""
-    task = TaskConfig()
+    # One mover: what moves is compiled too.
+    task = TaskConfig(arena=ArenaConfig(movers=MoversConfig(count=1)))
     arena = build_arenas(task.arena)[0]
     scan(arena, np.zeros((1, 3)))
     clearances(arena, np.zeros((1, 2)))

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from sim.arenas import Arena
 from sim.config import TaskConfig
+from sim.footprint import rectangle_clearance
 from sim.lidar import ray_angles
 from sim.observations import near_distance
-from sim.physics import add_arena
+from sim.physics import add_arena, robot_body
 
 Outcome = Literal["none", "arrival", "collision", "timeout"]
 
@@ -68,10 +69,9 @@ class ReferenceWorld:
         self.space.collision_slop = 0.0
         self.space.collision_bias = 1.0
         self.obstacles = add_arena(self.space, arena, 0.0, 0.0)
-        self.body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0.0, task.robot.radius))
-        self.disc = pymunk.Circle(self.body, task.robot.radius)
-        self.disc.filter = pymunk.ShapeFilter(group=1)
-        self.space.add(self.body, self.disc)
+        self.body, self.shape = robot_body(task.robot)
+        self.shape.filter = pymunk.ShapeFilter(group=1)
+        self.space.add(self.body, self.shape)
         self.body.position = pose[:2]
         self.body.angle = pose[2]
         self.target = target
@@ -88,16 +88,18 @@ class ReferenceWorld:
         for k, angle in enumerate(self._angles):
             direction = self.body.angle + angle
             end = (here.x + limit * math.cos(direction), here.y + limit * math.sin(direction))
-            hit = self.space.segment_query_first(here, end, 0.0, self.disc.filter)
+            hit = self.space.segment_query_first(here, end, 0.0, self.shape.filter)
             if hit is not None:
                 ranges[k] = hit.alpha * limit
         return ranges
 
     def clearance(self) -> float:
-        """Distance from the body to the nearest shape by Chipmunk's point query, metres; negative in contact."""
+        """Distance from the body to the nearest shape, metres, negative in contact: of a disc by Chipmunk's point query."""
+        if extents := self.task.robot.half_extents:
+            return rectangle_clearance(self.arena, (*self.body.position, self.body.angle), *extents)
         reach = self.arena.diagonal
-        hit = self.space.point_query_nearest(self.body.position, reach, self.disc.filter)
-        return (hit.distance if hit is not None else reach) - self.task.robot.radius
+        hit = self.space.point_query_nearest(self.body.position, reach, self.shape.filter)
+        return (hit.distance if hit is not None else reach) - self.task.robot.inscribed_radius
 
     def bearing(self) -> float:
         """Direction of the target against the heading, radians, left positive."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arenas import Arena, free_distance
+from sim.arenas.geometry import box_distance
 from sim.lidar import ray_angles
 from sim.world import World
 
@@ -15,6 +16,7 @@ LONG_SIDE = 480
 _MARGIN = 0.25  # m of wall around the arena
 _FLOOR = np.array([250, 250, 247], dtype=np.float32)
 _OBSTACLE = np.array([76, 84, 96], dtype=np.float32)
+_MOVER = np.array([133, 79, 170], dtype=np.float32)
 _RAY = np.array([228, 87, 61], dtype=np.float32)
 _TARGET = np.array([32, 150, 92], dtype=np.float32)
 _BODY = np.array([41, 98, 205], dtype=np.float32)
@@ -48,7 +50,7 @@ def _paint(image: Image, distance: NDArray[np.float64], colour: NDArray[np.float
 
 
 def render_robot(world: World, index: int) -> NDArray[np.uint8]:
-    """One robot with its target and its rays in its arena, (height, width, 3) RGB."""
+    """One robot with its target, its rays and what moves in its arena, (height, width, 3) RGB."""
     robots = world.robots
     arena = world.arenas[robots.records["map"][index]]
     pixels, scale = _pixels(arena)
@@ -65,12 +67,19 @@ def render_robot(world: World, index: int) -> NDArray[np.uint8]:
     columns = np.clip(((px - pixels[0, 0, 0]) * scale + 0.5).astype(int), 0, image.shape[1] - 1)
     image[rows, columns] = 0.65 * image[rows, columns] + 0.35 * _RAY
 
+    for mx, my, mover_radius in world.movers.of(int(world.tiles()[index])).tolist():
+        _paint(image, (np.hypot(*np.moveaxis(pixels - (mx, my), -1, 0)) - mover_radius) * scale, _MOVER)
     target = robots.targets[index].astype(np.float64)
     to_target = np.hypot(*np.moveaxis(pixels - target, -1, 0))
     _paint(image, (to_target - world.task.arrival_distance) * scale, _TARGET, 0.35)
     _paint(image, (to_target - 0.06) * scale, _TARGET)
-    radius = world.task.robot.radius
-    _paint(image, (np.hypot(*np.moveaxis(pixels - (x, y), -1, 0)) - radius) * scale, _BODY)
+    robot = world.task.robot
+    radius = robot.inscribed_radius
+    if robot.half_extents:
+        body = box_distance(np.array([x, y, *robot.half_extents, heading]), pixels[..., 0], pixels[..., 1])
+    else:
+        body = np.hypot(*np.moveaxis(pixels - (x, y), -1, 0)) - radius
+    _paint(image, body * scale, _BODY)
     nose = np.array([x + 0.55 * radius * np.cos(heading), y + 0.55 * radius * np.sin(heading)])
     _paint(image, (np.hypot(*np.moveaxis(pixels - nose, -1, 0)) - 0.35 * radius) * scale, _FLOOR)
     return image.round().astype(np.uint8)

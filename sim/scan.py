@@ -1,34 +1,40 @@
 """Scans and clearances at any poses of an arena: for pictures and checks, by the same kernel as the training."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas import Arena
-from sim.config import LidarConfig
+from sim.config import AnyRobotConfig, LidarConfig
+from sim.kernels.footprint import rectangle_clearances
 from sim.kernels.sensing import clearance_points, scan_poses
 from sim.lidar import ray_angles
 from sim.shapes import pack_shapes
 
 
-def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None) -> NDArray[np.float32]:
+def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None, *, movers: ArrayLike = ()) -> NDArray[np.float32]:
     """Ranges from poses.
 
     Args:
         arena: the place.
         poses: (N, 3) x, y in metres, heading in radians.
         lidar: the scanner, by default the default one.
+        movers: (K, 3) x, y, radius of what moves in it at that moment.
 
     Returns:
         (N, rays) metres, at most the LiDAR's range; 0 from inside an obstacle.
     """
     lidar = lidar or LidarConfig()
+    discs = np.asarray(movers, dtype=np.float64).reshape(-1, 3)
+    scene = replace(arena, circles=np.vstack([arena.circles, discs])) if len(discs) else arena
     where = np.ascontiguousarray(poses, dtype=np.float32).reshape(-1, 3)
     angles = ray_angles(lidar)
     ranges = np.empty((len(where), lidar.rays), dtype=np.float32)
     scan_poses(
         where,
         np.zeros(len(where), dtype=np.int32),
-        *pack_shapes((arena,)),
+        *pack_shapes((scene,)),
         np.cos(angles).astype(np.float32),
         np.sin(angles).astype(np.float32),
         np.float32(lidar.range),
@@ -36,6 +42,18 @@ def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None) -> ND
         ranges,
     )
     return ranges
+
+
+def body_clearances(arena: Arena, poses: ArrayLike, robot: AnyRobotConfig) -> NDArray[np.float32]:
+    """Signed distances (N,) from a robot's body at poses (N, 3) to the nearest surface, metres."""
+    where = np.ascontiguousarray(poses, dtype=np.float32).reshape(-1, 3)
+    if robot.half_extents is None:
+        return clearances(arena, where[:, :2]) - np.float32(robot.inscribed_radius)
+    half_length, half_width = (np.float32(extent) for extent in robot.half_extents)
+    result = np.empty(len(where), dtype=np.float32)
+    maps = np.zeros(len(where), dtype=np.int32)
+    rectangle_clearances(where, maps, *pack_shapes((arena,)), half_length, half_width, result)
+    return result
 
 
 def clearances(arena: Arena, points: ArrayLike) -> NDArray[np.float32]:

@@ -7,25 +7,32 @@ differs in anything is another suite, and a file that does not match its hash is
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
-from sim.arenas import Arena, build_arenas
-from sim.arenas.families import SUITE_SEEDS, generate_arena
-from sim.config import AnyArenaConfig, ArenaConfig, FamilyName, Frozen, GeneratedArenaConfig, TaskConfig
-from sim.errors import SuiteError
-from sim.scenarios import draw_scenarios
+from sim.arena_file import ArenaFile
+from sim.arenas import Arena, arena_clearance, build_arenas
+from sim.arenas.build import with_movers
+from sim.arenas.document import to_arena
+from sim.arenas.families import CLEARANCE, SUITE_SEEDS, generate_arena
+from sim.config import AnyArenaConfig, ArenaConfig, FamilyName, Frozen, GeneratedArenaConfig, ImportedArenaConfig, TaskConfig
+from sim.errors import PlacementError, SuiteError
+from sim.mover_config import MoversConfig
+from sim.scenarios import draw_scenarios, own_scenarios, scenario_world
 from sim.world import World
 
 Floats = NDArray[np.float32]
 PolicyFunction = Callable[[Floats], Floats]
 """Observations (n, numbers) to actions (n, 2)."""
+Observer = Callable[[NDArray[np.int64], World], None]
+"""Told before the first step, and after each one, the scenarios that were under way, and the world as it is now."""
 
 # Maps and scenarios of a suite that is drawn for a task.
 _DRAWN_MAPS = 20
@@ -106,23 +113,32 @@ class GeneratedPlace(Frozen):
     family: FamilyName
     difficulty: float
     seed: int
+    movers: MoversConfig = Field(default_factory=MoversConfig)
 
 
-Place = ArenaConfig | GeneratedPlace
+Place = ArenaConfig | GeneratedPlace | ArenaFile
 _PLACES: TypeAdapter[tuple[Place, ...]] = TypeAdapter(tuple[Place, ...])
 
 
-def suite_places(family: FamilyName, difficulty: float, maps: int) -> tuple[GeneratedPlace, ...]:
+def suite_places(
+    family: FamilyName, difficulty: float, maps: int, movers: MoversConfig | None = None
+) -> tuple[GeneratedPlace, ...]:
     """The maps of a family at a difficulty on which suites are driven."""
-    return tuple(GeneratedPlace(family=family, difficulty=difficulty, seed=seed) for seed in SUITE_SEEDS[:maps])
+    movers = movers or MoversConfig()
+    return tuple(
+        GeneratedPlace(family=family, difficulty=difficulty, seed=seed, movers=movers) for seed in SUITE_SEEDS[:maps]
+    )
 
 
-def build_places(places: Iterable[Place]) -> tuple[Arena, ...]:
-    """The arenas of a suite."""
+def build_places(places: Iterable[Place], *, clearance: float = CLEARANCE) -> tuple[Arena, ...]:
+    """The arenas of a suite; `clearance` is what the robot needs around its centre in generated ones, metres."""
     arenas: list[Arena] = []
     for place in places:
         if isinstance(place, GeneratedPlace):
-            arenas.append(generate_arena(place.family, place.difficulty, place.seed))
+            arena = generate_arena(place.family, place.difficulty, place.seed, clearance=clearance)
+            arenas.append(with_movers(arena, place.movers))
+        elif isinstance(place, ArenaFile):
+            arenas.append(to_arena(place))
         else:
             arenas += build_arenas(place)
     return tuple(arenas)
@@ -135,6 +151,8 @@ def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str
             [round(arena.half_width, _DECIMALS), round(arena.half_height, _DECIMALS)],
             np.round(arena.circles, _DECIMALS).tolist(),
             np.round(arena.boxes, _DECIMALS).tolist(),
+            # Arenas in which nothing moves keep the hash that they had before anything could.
+            *([[mover.kind, mover.radius, mover.speed, mover.waypoints] for mover in arena.movers]),
         ]
         for arena in arenas
     ]
@@ -179,61 +197,114 @@ def _suite(name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[l
     )
 
 
+def suite_of(name: str, documents: Sequence[ArenaFile], task: TaskConfig | None = None) -> Suite:
+    """A suite of one scenario for each arena file: its own start and target.
+
+    Args:
+        name: of the suite.
+        documents: arenas with a start and a target, see `sim.arenas.files.load_arena`.
+        task: whose robot must fit there; the default one's if not given.
+
+    Raises:
+        PlacementError: an arena has no start or target, the robot does not fit there, or there is no way between them.
+    """
+    arenas, scenarios = build_places(documents), own_scenarios(documents, task)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+
+
 def suite_for(task: TaskConfig) -> Suite:
     """The suite on which policies trained for a task are measured: a frozen one, or one drawn for its arena.
 
     A drawn suite depends on the arena alone, so all policies that were trained for it meet the same scenarios: 20 generated
-    maps of the same family and difficulty, none of which is in any training, or the imported arena itself.
+    maps of the same family and difficulty, none of which is in any training, or the imported arena itself, whose own
+    start and target are the first scenario if it has them; with the movers of the training's arena. A robot that needs more
+    room than the default one gets a suite with that room, and its clearance in the suite's name.
 
     Raises:
-        ArenaError: the default robot has no room in the arena.
+        ArenaError: the robot has no room in the arena.
     """
-    if isinstance(task.arena, ArenaConfig):
+    usual = TaskConfig()
+    fits = task.passable_clearance <= usual.passable_clearance
+    if fits and isinstance(task.arena, ArenaConfig) and not task.arena.movers.count:
         return load_suite(f"{task.arena.name}-{_DRAWN_SCENARIOS}")
-    return _draw_suite(task.arena)
+    large = TaskConfig(robot=task.robot, collision_distance=task.collision_distance)
+    return _draw_suite(task.arena, usual if fits else large)
+
+
+def suite_named(name: str, task: TaskConfig) -> Suite:
+    """The task's own suite where it goes by that name, else the frozen one.
+
+    Raises:
+        SuiteError: there is none.
+    """
+    own = suite_for(task)
+    return own if own.name == name else load_suite(name)
 
 
 @lru_cache(maxsize=8)
-def _draw_suite(arena: AnyArenaConfig) -> Suite:
+def _draw_suite(arena: AnyArenaConfig, task: TaskConfig) -> Suite:
+    """Scenarios for the robot and collision distance of `task`."""
+    usual = task.passable_clearance <= TaskConfig().passable_clearance
+    ending = f"{_DRAWN_SCENARIOS}" if usual else f"{task.passable_clearance:.2f}m-{_DRAWN_SCENARIOS}"
     if isinstance(arena, GeneratedArenaConfig):
-        name = f"{arena.name}-{arena.difficulty:g}-{_DRAWN_SCENARIOS}"
-        arenas = build_places(suite_places(arena.name, arena.difficulty, _DRAWN_MAPS))
+        name = f"{arena.name}-{arena.difficulty:g}"
+        places = suite_places(arena.name, arena.difficulty, _DRAWN_MAPS, arena.movers)
+        arenas = build_places(places, clearance=arena_clearance(task))
     else:
         arenas = build_arenas(arena)
-        name = f"{arenas[0].name[:_NAME]}-{_DRAWN_SCENARIOS}"
-    scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS)
+        name = arenas[0].name[:_NAME]
+    if arena.movers.count:
+        name += f"-{arena.movers.count}-{arena.movers.kind}"
+    name += f"-{ending}"
+    scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS, task)
+    if isinstance(arena, ImportedArenaConfig) and arena.arena and arena.arena.start and arena.arena.target:
+        with suppress(PlacementError):  # a start or target that this robot does not fit at
+            scenarios[:1] = own_scenarios([arena.arena], task)
     return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
 
 
-def run_suite(policy: PolicyFunction, task: TaskConfig, suite: Suite) -> EpisodeTable:
+def run_suite(policy: PolicyFunction, task: TaskConfig, suite: Suite, observer: Observer | None = None) -> EpisodeTable:
     """Drive every scenario once with a policy that sees observations; see `run_controller`."""
-    return run_controller(lambda situation: policy(situation.observations), task, suite)
+    return run_controller(lambda situation: policy(situation.observations), task, suite, observer)
 
 
-def run_controller(controller: Callable[[Situation], Floats], task: TaskConfig, suite: Suite) -> EpisodeTable:
+def run_controller(
+    controller: Callable[[Situation], Floats], task: TaskConfig, suite: Suite, observer: Observer | None = None
+) -> EpisodeTable:
     """Drive every scenario once, all side by side.
 
     Args:
         controller: situations of the robots under way to their actions (n, 2); called with fewer robots as they finish.
         task: robot, LiDAR, observation, reward and limits; the arenas are the suite's.
         suite: the scenarios.
+        observer: looks on.
 
     Raises:
-        PlacementError: the task's robot does not fit at a start of the suite.
+        SuiteError: the task's robot does not fit at a start of the suite.
     """
-    world = World(task, suite.arenas, len(suite), seed=0, respawn=False)
-    world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
+    world = scenario_world(task, suite.arenas, len(suite))
+    try:
+        world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
+    except PlacementError as error:
+        raise SuiteError(
+            f"suite {suite.name!r} has no room for this robot ({error}): use a smaller one, or the suite that "
+            "sim.suites.suite_for draws for it"
+        ) from error
     robots = world.robots
     outcomes = np.zeros(len(suite), dtype=np.uint8)
     actions = np.zeros((len(suite), 2), dtype=np.float32)
     ended = {name: robots.records[name].copy() for name in ("steps", "attempt_reward", "path_length", "min_clearance")}
     active = np.arange(len(suite))
+    if observer is not None:
+        observer(active, world)
     while len(active):
         situation = Situation(
             robots.observations[active], robots.ranges[active], robots.poses[active], robots.targets[active]
         )
         actions[active] = controller(situation)
         world.step(actions)
+        if observer is not None:
+            observer(active, world)
         done = active[robots.outcomes[active] > 0]
         if len(done):
             outcomes[done] = robots.outcomes[done]

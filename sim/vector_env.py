@@ -9,9 +9,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.arenas import Arena, build_arenas
+from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
 from sim.kernels.bundles import REWARD_TERMS
+from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.observations import observation_layout
 from sim.render import render_robot
 from sim.world import World
@@ -37,6 +38,13 @@ def single_spaces(task: TaskConfig) -> tuple[Space[Floats], Space[Floats]]:
     return observation, action
 
 
+def known_mode(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
+    """The render mode; raises ValueError where `metadata` has none of this name."""
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        raise ValueError(f"render_mode must be None or one of {metadata['render_modes']}, not {render_mode!r}")
+    return render_mode
+
+
 class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     """Robots that drive to targets by their LiDAR, each alone in its arena.
 
@@ -56,6 +64,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     Raises:
         pydantic.ValidationError: a value of the task is wrong.
         ArenaError: the robot does not fit into the arena.
+        ValueError: there is no such render mode, or not one robot.
 
     >>> envs = NavigationVectorEnv(num_envs=4, seed=1)
     >>> observations, infos = envs.reset()
@@ -82,12 +91,12 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             raise ValueError(f"num_envs must be at least 1, not {num_envs}")
         self.task = read_task(task)
         self.num_envs = num_envs
-        self.render_mode = render_mode
+        self.render_mode = known_mode(render_mode, self.metadata)
         self.single_observation_space, self.single_action_space = single_spaces(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._copy = copy
-        self._world = World(self.task, build_arenas(self.task.arena), num_envs, seed=seed)
+        self._world = World(self.task, build_task_arenas(self.task), num_envs, seed=seed)
         robots = self._world.robots
         self.poses = robots.poses
         """(N, 3) x, y in metres, heading in radians: in the robot's arena, after the step and its resets."""
@@ -114,10 +123,24 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.arena_indices: NDArray[np.int32] = records["map"]
         """(N,) which of `arenas` each robot is in."""
 
+        self.discs = self._world.movers.discs
+        """(tiles, K, 5) movers of every copy of an arena: x, y, radius, and how far each came in the last step in x and y,
+        metres; a radius below zero is none. `tiles` says which row a robot meets."""
+
+    def tiles(self) -> NDArray[np.int32]:
+        """(N,) which copy of an arena each robot is in; modulo the number of arenas it is the arena."""
+        return self._world.tiles()
+
     @property
     def arenas(self) -> tuple[Arena, ...]:
         """The arenas that robots start in."""
         return self._world.arenas
+
+    def velocities(self) -> Floats:
+        """(N, 2) velocities of the last step, m/s and rad/s; zero for robots that have started anew in it."""
+        robots = self._world.robots
+        fractions = np.stack([robots.records["linear"], robots.records["angular"]], axis=1)
+        return np.asarray(fractions * robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]], dtype=np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode for every robot.

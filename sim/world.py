@@ -8,21 +8,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import FreeSpace, free_space
-from sim.config import TaskConfig
+from sim.config import RandomisationConfig, TaskConfig
+from sim.disturbances import longest_delay, quantity_spans
 from sim.errors import PlacementError
+from sim.footprint import rectangle_clearance
 from sim.kernels.bundles import REWARD_TERMS, Geometry, Robots
+from sim.kernels.commands import write_commands
 from sim.kernels.random import seed_streams
 from sim.kernels.records import (
     ALIGNMENT,
     BASIC,
     CLEARANCE,
+    DISTANCE_NOISE,
+    DROPOUT,
+    HEADING_NOISE,
     IMPROVED,
+    MAX_ANGULAR,
+    MAX_LINEAR,
+    NOISE,
     PAPER,
     PARAMETERS,
+    RANGE,
+    RATE,
     ROBOT,
 )
-from sim.kernels.step import reset_robots, step_robots, write_commands
+from sim.kernels.step import reset_robots, step_robots
 from sim.lidar import ray_angles
+from sim.movers import Movers
 from sim.observations import near_distance, observation_size
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.shapes import pack_shapes
@@ -37,24 +49,26 @@ _OBSERVATIONS = {"paper": PAPER, "improved": IMPROVED}
 _REWARDS = {"basic": BASIC, "clearance": CLEARANCE, "alignment": ALIGNMENT}
 
 
-def passable_clearance(task: TaskConfig) -> float:
-    """Distance from obstacles that a robot's centre needs on its way, metres."""
-    return max(task.robot.radius, task.collision_distance)
-
-
 def spawn_space(task: TaskConfig, arena: Arena) -> FreeSpace:
     """Where this task's robots start and their targets stand in an arena.
 
     Raises:
         ArenaError: there is no such place.
     """
-    passable = passable_clearance(task)
+    passable = task.passable_clearance
     return free_space(arena, passable=passable, clearance=passable + SPAWN_MARGIN)
 
 
-def _largest_change(acceleration: float, limit: float, period: float) -> float:
-    """Change of a velocity in one period as a fraction of its limit; 2, the whole span, where it is unlimited."""
-    return min(2.0, acceleration * period / limit) if acceleration else 2.0
+def _path_samples(task: TaskConfig) -> int:
+    """Times that the body is checked in one step: at least once in every radius that a part of it moves.
+
+    A fast robot could jump through a wall otherwise, and a corner of a rectangular one sweep over a pole.
+    """
+    robot = task.robot
+    _, (fastest, turning) = quantity_spans(task)[[MAX_LINEAR, MAX_ANGULAR]].T
+    if robot.half_extents:
+        fastest += turning * robot.circumscribed_radius
+    return math.ceil(float(fastest) * task.control_period / robot.inscribed_radius)
 
 
 def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
@@ -64,24 +78,24 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
     if not len(ahead):  # a scanner so coarse that no ray points ahead: the middle ones
         ahead = np.flatnonzero(np.abs(angles) <= np.abs(angles).min() + 1e-9)
     parameters = np.zeros(1, dtype=PARAMETERS)
+    spans = quantity_spans(task)
+    half_length, half_width = task.robot.half_extents or (0.0, 0.0)
     values = {
         "period": task.control_period,
-        "max_linear": task.robot.max_linear_speed,
-        "max_angular": task.robot.max_angular_speed,
-        "linear_change": _largest_change(
-            task.robot.max_linear_acceleration, task.robot.max_linear_speed, task.control_period
-        ),
-        "angular_change": _largest_change(
-            task.robot.max_angular_acceleration, task.robot.max_angular_speed, task.control_period
-        ),
-        "radius": task.robot.radius,
+        "spans": spans,
+        "perceives": bool(spans[[NOISE, DROPOUT, RATE]].any() or spans[RANGE, 0] < task.lidar.range),
+        "drifts": bool(spans[[DISTANCE_NOISE, HEADING_NOISE]].any()),
+        "max_linear_acceleration": task.robot.max_linear_acceleration,
+        "max_angular_acceleration": task.robot.max_angular_acceleration,
+        "radius": task.robot.inscribed_radius,
+        "half_length": half_length,
+        "half_width": half_width,
         "range": task.lidar.range,
-        "noise": task.lidar.noise,
-        "dropout": task.lidar.dropout,
         "looks_ahead": task.lidar.field_of_view <= 180.0,
         "batches": task.lidar.batches,
         "rays_per_batch": task.lidar.rays // task.lidar.batches,
         "observation": _OBSERVATIONS[task.observation],
+        "frames": task.frames,
         "near": near_distance(task),
         "reward": _REWARDS[task.reward.name],
         "arrival_reward": task.reward.arrival,
@@ -93,9 +107,8 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "arrival_distance": task.arrival_distance,
         "collision_distance": task.collision_distance,
         "step_limit": task.step_limit,
-        "spawn_clearance": passable_clearance(task) + SPAWN_MARGIN,
-        # The body is checked at least once in every radius of the way, so that a fast one cannot jump through a wall.
-        "path_samples": math.ceil(task.robot.max_linear_speed * task.control_period / task.robot.radius),
+        "spawn_clearance": task.passable_clearance + SPAWN_MARGIN,
+        "path_samples": _path_samples(task),
     }
     for name, value in values.items():
         parameters[name] = value
@@ -106,14 +119,16 @@ class World:
     """Robots in a pool of arenas: LiDAR, physics, outcomes, rewards, observations and resets.
 
     A robot goes on after an arrival, with a new target; after a collision or a time-out it starts anew, in an arena drawn
-    from the pool. Its fate depends on the seed and its own index, never on the number of robots.
+    from the pool. Its fate depends on the seed and its own index, never on the number of robots. Robots do not see one
+    another; they see movers, which take no notice of them.
 
     Args:
         task: robot, LiDAR, observation, reward and limits.
         arenas: the pool.
         robots: how many.
         seed: of all that is random; None takes one from the operating system.
-        respawn: False saves looking for free space where every pose and target is given: robots then stay where they end.
+        respawn: False saves looking for free space where every pose and target is given: robots then stay where they end,
+            and all copies of an arena have the same movers.
 
     Raises:
         ArenaError: the robot does not fit into an arena.
@@ -122,6 +137,7 @@ class World:
         task: what all of it follows.
         arenas: the pool.
         robots: the arrays of all robots, overwritten by every step.
+        movers: what moves beside them.
     """
 
     def __init__(
@@ -133,6 +149,7 @@ class World:
         origins = tile_origins(self.arenas, replicas)
         nowhere = np.empty((0, 2), dtype=np.float32)
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
+        self.movers = Movers(self.arenas, origins, task.control_period, alike=not respawn)
         bounds, circles, boxes = pack_shapes(self.arenas)
         angles = ray_angles(task.lidar)
         self.geometry = Geometry(
@@ -146,8 +163,13 @@ class World:
             origins=origins,
             ray_cos=np.cos(angles).astype(np.float32),
             ray_sin=np.sin(angles).astype(np.float32),
+            ray_x=np.empty(task.lidar.rays, dtype=np.float32),
+            ray_y=np.empty(task.lidar.rays, dtype=np.float32),
+            discs=self.movers.discs,
         )
         numbers = observation_size(task)
+        spans = quantity_spans(task)
+        drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
             poses=np.zeros((robots, 3), dtype=np.float32),
@@ -160,24 +182,33 @@ class World:
             terminations=np.zeros(robots, dtype=np.bool_),
             truncations=np.zeros(robots, dtype=np.bool_),
             outcomes=np.zeros(robots, dtype=np.uint8),
+            drawn=np.tile(spans[:, 0], (robots, 1)),
+            drift=np.zeros((robots if drifts else 0, 3)),
+            pending=np.zeros((robots, longest_delay(task), 2), dtype=np.float32),
+            held_ranges=np.zeros((robots if holds else 0, task.lidar.rays), dtype=np.float32),
+            scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
         self._parameters = pack_parameters(task)
         self._parameters["replica_stride"] = len(self.arenas)
+        self._parameters["closing"] = (task.robot.max_linear_speed + self.movers.fastest) * task.control_period
         self.robots.records["replica"] = np.arange(robots) // (ROBOTS_PER_TILE * len(self.arenas))
-        self._space = TiledSpace(self.arenas, origins, robots, task.robot.radius)
+        self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self.seed(seed)
 
     def __len__(self) -> int:
         return len(self.robots.records)
 
     def seed(self, seed: int | None) -> None:
-        """Start every robot's generator anew; None takes a seed from the operating system."""
+        """Start every robot's and mover's generator anew; None takes a seed from the operating system."""
         self.robots.records["random"] = seed_streams(seed, len(self))
+        self.movers.seed(seed)
 
     def reset(
         self, *, poses: ArrayLike | None = None, targets: ArrayLike | None = None, arenas: ArrayLike | None = None
     ) -> None:
-        """Begin a new episode for every robot; what is not given is drawn.
+        """Begin a new episode for every robot, and place all movers anew; what is not given is drawn.
+
+        A pose that is drawn is clear of movers; one that is given may be where a mover starts.
 
         Args:
             poses: (N, 3) x, y, heading, or one pose for all.
@@ -193,10 +224,11 @@ class World:
             raise PlacementError(f"arenas must be between 0 and {len(self.arenas) - 1}")
         if targets is not None and poses is None and len(self.arenas) > 1:
             raise PlacementError("targets without poses make sense in a single arena only: give poses too")
-        placed = self._placements("poses", poses, 3, maps, self.task.robot.radius)
-        aimed = self._placements("targets", targets, 2, maps, 0.0)
+        placed = self._placements("poses", poses, 3, maps)
+        aimed = self._placements("targets", targets, 2, maps)
         self.robots.records["map"] = maps
         self.robots.records["parked"] = 0
+        self.movers.place()
         reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, self._space.state)
 
     def reset_with(self, options: Mapping[str, ArrayLike] | None) -> None:
@@ -210,9 +242,7 @@ class World:
             raise PlacementError(f"unknown reset options {sorted(unknown)}; known are poses, targets and arenas")
         self.reset(poses=options.get("poses"), targets=options.get("targets"), arenas=options.get("arenas"))
 
-    def _placements(
-        self, name: str, values: ArrayLike | None, columns: int, maps: NDArray[np.int32], clearance: float
-    ) -> NDArray[np.float32]:
+    def _placements(self, name: str, values: ArrayLike | None, columns: int, maps: NDArray[np.int32]) -> NDArray[np.float32]:
         """Requested poses or targets, (N, columns), checked; NaN where none is requested."""
         if values is None:
             return np.full((len(self), columns), np.nan, dtype=np.float32)
@@ -224,7 +254,7 @@ class World:
             raise PlacementError(f"{name} must be finite")
         for index in np.unique(maps):
             here = np.flatnonzero(maps == index)
-            bad = here[free_distance(self.arenas[index], array[here, :2]) <= clearance]
+            bad = here[~self._fits(self.arenas[index], array[here])]
             if len(bad):
                 raise PlacementError(
                     f"{name}[{bad[0]}] = {array[bad[0]].tolist()} touches an obstacle or a wall "
@@ -234,6 +264,15 @@ class World:
             beyond = np.abs(array[:, 2]) > np.pi
             array[beyond, 2] = np.arctan2(np.sin(array[beyond, 2]), np.cos(array[beyond, 2]))
         return array
+
+    def _fits(self, arena: Arena, places: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether poses (n, 3) have room for the body, or targets (n, 2) are free."""
+        robot = self.task.robot
+        if places.shape[1] == 2:
+            return free_distance(arena, places) > 0.0
+        if robot.half_extents is None:
+            return free_distance(arena, places[:, :2]) > robot.inscribed_radius
+        return np.array([rectangle_clearance(arena, pose, *robot.half_extents) > 0.0 for pose in places])
 
     def step(self, actions: NDArray[np.float32]) -> None:
         """Drive every robot for one control period.
@@ -245,22 +284,36 @@ class World:
             ValueError: an action is not finite.
         """
         space = self._space
-        invalid = write_commands(actions, self.robots.records, space.state, space.command, self._parameters)
+        invalid = write_commands(actions, self.robots, space.state, space.command, self._parameters)
         if invalid >= 0:
             raise ValueError(f"the action of robot {invalid} is not finite: {actions[invalid].tolist()}")
+        if len(self.movers):
+            self.movers.step(space.command, len(self))
         space.step(self.task.control_period)
         step_robots(space.state, self.robots, self.geometry, self._parameters)
+
+    def tiles(self) -> NDArray[np.int32]:
+        """(N,) which copy of an arena each robot is in: a row of the movers' discs; modulo the arenas it is the arena."""
+        records = self.robots.records
+        tiles: NDArray[np.int32] = records["replica"] * np.int32(len(self.arenas)) + records["map"]
+        return tiles
 
     def park(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> None:
         """Leave robots standing, at next to no cost, until the next `reset`; their outcomes stay 0."""
         self.robots.records["parked"][which] = 1
 
+    def _state(self) -> dict[str, NDArray[np.generic]]:
+        """The arrays that the future depends on; those that have nothing to say in this task are left out."""
+        state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in ROBOT.names or ()}
+        constant = {"records"} if self.task.randomisation != RandomisationConfig() else {"records", "drawn"}
+        arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
+        state |= {name: array for name, array in arrays.items() if array.size and name not in constant}
+        state["bodies"] = self._space.state
+        return state | self.movers.state()
+
     def get_state(self) -> dict[str, NDArray[np.generic]]:
         """Everything that the future depends on, as plain arrays."""
-        state = {name: self.robots.records[name].copy() for name in ROBOT.names or ()}
-        state |= {name: array.copy() for name, array in self.robots._asdict().items() if name != "records"}
-        state["bodies"] = self._space.state.copy()
-        return state
+        return {name: array.copy() for name, array in self._state().items()}
 
     def set_state(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Go on from what `get_state` gave, bit for bit.
@@ -268,9 +321,7 @@ class World:
         Raises:
             ValueError: the state is of another task or number of robots.
         """
-        targets: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in ROBOT.names or ()}
-        targets |= {name: array for name, array in self.robots._asdict().items() if name != "records"}
-        targets["bodies"] = self._space.state
+        targets = self._state()
         if state.keys() != targets.keys():
             raise ValueError(f"not a state of this environment: {sorted(state.keys() ^ targets.keys())} do not match")
         for name, target in targets.items():

@@ -1,6 +1,7 @@
 """Places to drive in: geometry in NumPy, without physics, so that the server and the live view can draw them."""
 
-from sim.arenas.build import build_arena, build_arenas
+from sim.arenas.build import arena_clearance, build_arena, build_arenas, build_task_arenas
 from sim.arenas.geometry import Arena, free_distance
+from sim.arenas.mover import Mover
 
-__all__ = ["Arena", "build_arena", "build_arenas", "free_distance"]
+__all__ = ["Arena", "Mover", "arena_clearance", "build_arena", "build_arenas", "build_task_arenas", "free_distance"]

@@ -1,11 +1,17 @@
 """From a configuration to the arenas that it names."""
 
+from dataclasses import replace
+
 from sim.arenas.builtin import BUILTIN
 from sim.arenas.document import to_arena
 from sim.arenas.families import CLEARANCE, generate_arena, pool_seeds
 from sim.arenas.geometry import Arena
-from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig
+from sim.arenas.mover import Mover
+from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig, TaskConfig
 from sim.errors import ArenaError
+from sim.mover_config import MoversConfig
+
+_ROOM = 0.05  # m between what a robot keeps from obstacles and the way that is left for it: what the default one has
 
 
 def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tuple[Arena, ...]:
@@ -16,10 +22,11 @@ def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tup
         clearance: what the robot needs around its centre in a generated arena, metres.
 
     Raises:
-        ArenaError: an imported arena comes without its geometry, or the robot is too large for a family.
+        ArenaError: an imported arena comes without its geometry or gets too many movers, or the robot is too large for a
+            family.
     """
     if isinstance(config, ArenaConfig):
-        return (BUILTIN[config.name](),)
+        return (with_movers(BUILTIN[config.name](), config.movers),)
     if isinstance(config, GeneratedArenaConfig):
         return tuple(build_arena(config, index, clearance=clearance) for index in range(config.maps))
     if config.arena is None:
@@ -27,7 +34,21 @@ def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tup
             f"the imported arena {config.sha256[:12] or '(none)'} is here by its hash only: read its file with "
             "sim.arenas.files.load_arena and pass ImportedArenaConfig.of(...)"
         )
-    return (to_arena(config.arena),)
+    return (with_movers(to_arena(config.arena), config.movers),)
+
+
+def arena_clearance(task: TaskConfig) -> float:
+    """What a task's robot needs around its centre in a generated arena, metres: at least what the default one needs."""
+    return max(CLEARANCE, task.passable_clearance + _ROOM)
+
+
+def build_task_arenas(task: TaskConfig) -> tuple[Arena, ...]:
+    """The arenas in which a task's robots drive: `build_arenas` with the room that the robot needs.
+
+    Raises:
+        ArenaError: as there.
+    """
+    return build_arenas(task.arena, clearance=arena_clearance(task))
 
 
 def build_arena(config: AnyArenaConfig, index: int, *, clearance: float = CLEARANCE) -> Arena:
@@ -39,5 +60,17 @@ def build_arena(config: AnyArenaConfig, index: int, *, clearance: float = CLEARA
     """
     if isinstance(config, GeneratedArenaConfig):
         seed = pool_seeds(config.seed, config.maps)[index]
-        return generate_arena(config.name, config.difficulty, seed, clearance=clearance)
+        return with_movers(generate_arena(config.name, config.difficulty, seed, clearance=clearance), config.movers)
     return build_arenas(config, clearance=clearance)[index]
+
+
+def with_movers(arena: Arena, config: MoversConfig) -> Arena:
+    """An arena with the movers of a configuration in it, besides those that it has.
+
+    Raises:
+        ArenaError: they are too many.
+    """
+    if not config.count:
+        return arena
+    added = (Mover(config.kind, config.radius, config.speed),) * config.count
+    return replace(arena, movers=arena.movers + added)

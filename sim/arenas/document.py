@@ -1,19 +1,24 @@
 """Between our own format and the geometry that the simulator drives in; and whether a robot can drive there at all."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
-from sim.arena_file import ArenaFile, Box, Circle
+from sim.arena_file import AnyMover, ArenaFile, Box, Circle, Patrol, Pedestrian, Walker, Waypoint
 from sim.arenas.cells import CELL, components, free_mask
-from sim.arenas.geometry import Arena
-from sim.errors import NoFreeSpaceError
+from sim.arenas.geometry import Arena, free_distance
+from sim.arenas.mover import Mover
+from sim.errors import ArenaFormatError, NoFreeSpaceError
 
 MIN_FREE_AREA = 1.0
 """Square metres that must hang together for a robot to drive in."""
 
 IMPORT_CLEARANCE = 0.2
 """What a robot needs around its centre for that, metres: the Burger's collision distance."""
+
+# Metres between the points of a patrol's way that are looked at.
+_PATROL_STEP = 0.02
 
 # Cells along the longer side of a large hall: through larger ones the check stays well below a second.
 _MAX_CELLS = 1000
@@ -29,6 +34,10 @@ def to_arena(document: ArenaFile) -> Arena:
         boxes=np.array(
             [(b.x, b.y, 0.5 * b.length, 0.5 * b.width, math.radians(b.angle)) for b in document.boxes], dtype=np.float64
         ).reshape(-1, 5),
+        movers=tuple(
+            Mover(m.kind, m.radius, m.speed, tuple((w.x, w.y) for w in m.waypoints) if isinstance(m, Patrol) else ())
+            for m in document.movers
+        ),
     )
 
 
@@ -51,7 +60,17 @@ def to_document(arena: Arena) -> ArenaFile:
             )
             for x, y, half_length, half_width, angle in arena.boxes.tolist()
         ),
+        movers=tuple(_to_entry(mover) for mover in arena.movers),
     )
+
+
+def _to_entry(mover: Mover) -> AnyMover:
+    if mover.kind == "patrol":
+        waypoints = tuple(Waypoint(x=round(x, 4), y=round(y, 4)) for x, y in mover.waypoints)
+        return Patrol(kind="patrol", radius=mover.radius, speed=mover.speed, waypoints=waypoints)
+    if mover.kind == "walker":
+        return Walker(kind="walker", radius=mover.radius, speed=mover.speed)
+    return Pedestrian(kind="pedestrian", radius=mover.radius, speed=mover.speed)
 
 
 def free_area(arena: Arena, clearance: float = IMPORT_CLEARANCE) -> float:
@@ -74,3 +93,23 @@ def check_free_space(document: ArenaFile) -> float:
             f"piece, and needs {MIN_FREE_AREA:g}. Check the scale and, of a map, its thresholds and `negate`."
         )
     return area
+
+
+def check_patrols(document: ArenaFile) -> None:
+    """Whether every patrol of an imported arena gets round.
+
+    Raises:
+        ArenaFormatError: a patrol's way runs through an obstacle or a wall.
+    """
+    arena = to_arena(document)
+    for number, mover in enumerate(arena.movers):
+        corners = np.array([*mover.waypoints, *mover.waypoints[:1]]).reshape(-1, 2)
+        for start, end in pairwise(corners):
+            points = np.linspace(start, end, 2 + int(np.hypot(*(end - start)) / _PATROL_STEP))
+            blocked = points[free_distance(arena, points) < mover.radius]
+            if len(blocked):
+                x, y = blocked[0].tolist()
+                raise ArenaFormatError(
+                    f"{document.name}: movers.{number} does not get past ({x:.2f}, {y:.2f}) with its radius of "
+                    f"{mover.radius:g} m: move its waypoints"
+                )

@@ -1,4 +1,4 @@
-"""An arena is walls all round, circles and oriented boxes; and how far a point is from all of them."""
+"""An arena is walls all round, circles, oriented boxes and movers; and how far a point is from what stands in it."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.arenas.mover import Mover
 from sim.errors import ArenaError
+from sim.mover_config import MAX_MOVERS
 
 Float = NDArray[np.float64]
 
@@ -30,9 +32,10 @@ class Arena:
         boxes: (B, 5) x, y, half length, half width, angle of the length against the x axis.
         start_inset, target_inset: start poses and targets keep this far from the outer walls, on top of the clearance
             that they keep from everything.
+        movers: what moves in it, at most `MAX_MOVERS`.
 
     Raises:
-        ArenaError: a shape is not finite, has no size, or an array has the wrong shape.
+        ArenaError: a shape is not finite, has no size, or an array has the wrong shape; or there are too many movers.
     """
 
     name: str
@@ -42,6 +45,7 @@ class Arena:
     boxes: Float = field(default_factory=_no_boxes)
     start_inset: float = 0.0
     target_inset: float = 0.0
+    movers: tuple[Mover, ...] = ()
 
     def __post_init__(self) -> None:
         if not (0.0 < self.half_width < np.inf and 0.0 < self.half_height < np.inf):
@@ -56,6 +60,8 @@ class Arena:
                 raise ArenaError(f"arena {self.name!r}: {name} must have positive sizes")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        if len(self.movers) > MAX_MOVERS:
+            raise ArenaError(f"arena {self.name!r}: {len(self.movers)} movers are too many: at most {MAX_MOVERS}")
 
     @property
     def diagonal(self) -> float:
@@ -64,7 +70,7 @@ class Arena:
 
 
 def free_distance(arena: Arena, points: ArrayLike) -> Float:
-    """Signed distance from points to the nearest surface.
+    """Signed distance from points to the nearest surface of what stands.
 
     Args:
         arena: the place.

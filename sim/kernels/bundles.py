@@ -1,4 +1,4 @@
-"""The arrays that the kernels work on, in two bundles that Numba takes as arguments."""
+"""The arrays that the kernels work on, in bundles that Numba takes as arguments."""
 
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ class Geometry(NamedTuple):
         start_offsets, target_offsets: (M + 1,) where each arena's cells begin.
         origins: (tiles, 2) float64, centre of each tile in the Space.
         ray_cos, ray_sin: (rays,) directions of the rays against the heading.
+        ray_x, ray_y: (rays,) scratch for those of one robot's rays in its arena.
+        discs: (tiles, K, 5) movers as they are now, see `DISC_COLUMNS`.
     """
 
     bounds: Floats
@@ -33,6 +35,30 @@ class Geometry(NamedTuple):
     origins: Doubles
     ray_cos: Floats
     ray_sin: Floats
+    ray_x: Floats
+    ray_y: Floats
+    discs: Floats
+
+
+class Crowd(NamedTuple):
+    """All movers, and what they walk among.
+
+    Attributes:
+        records: (tiles * K,) of `sim.kernels.records.MOVER`, K for each tile; a radius below zero is an empty slot.
+        discs: (tiles, K, 5) what the robots meet, see `DISC_COLUMNS`.
+        waypoints: (W, 2) float64 of all patrols, metres.
+        maps: (tiles,) the arena of each tile.
+        bounds, circles, boxes, origins: see `Geometry`.
+    """
+
+    records: NDArray[np.void]
+    discs: Floats
+    waypoints: Doubles
+    maps: Integers
+    bounds: Floats
+    circles: Floats
+    boxes: Floats
+    origins: Doubles
 
 
 class Robots(NamedTuple):
@@ -43,12 +69,17 @@ class Robots(NamedTuple):
         poses: (N, 3) x, y, heading in the arena's frame; heading in [-pi, pi].
         targets: (N, 2).
         ranges: (N, rays) metres.
-        observations: (N, numbers), after the step and after a reset that it caused.
+        observations: (N, numbers), after the step and after a reset that it caused; stacked frames newest first.
         final_observations: (N, numbers), the last ones of the episodes that ended in this step.
         rewards: (N,) of this step.
         terms: (N, 4) the reward's terms, in the order of `REWARD_TERMS`.
         terminations, truncations: (N,) bool.
         outcomes: (N,) how the attempt that ended in this step ended; 0 where none did.
+        drawn: (N, 9) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
+        drift: (N, 3) how far the believed pose is from the true one; (0, 3) where it never is.
+        pending: (N, delay, 2) actions that wait to be followed, the next one first; none where nothing is delayed.
+        held_ranges: (N, rays) the last scan; (0, rays) where every step has a new one.
+        scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
 
     records: NDArray[np.void]
@@ -62,6 +93,11 @@ class Robots(NamedTuple):
     terminations: NDArray[np.bool_]
     truncations: NDArray[np.bool_]
     outcomes: NDArray[np.uint8]
+    drawn: Doubles
+    drift: Doubles
+    pending: Floats
+    held_ranges: Floats
+    scan_ages: Integers
 
 
 REWARD_TERMS = ("arrival", "collision", "progress", "penalty")

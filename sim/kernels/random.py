@@ -1,7 +1,9 @@
-"""A generator of its own for every robot, so that a robot's fate does not depend on how many drive beside it.
+"""A generator of its own for every robot and mover, so that a robot's fate does not depend on how many drive beside it.
 
 SplitMix64 (Steele, Lea and Flood 2014): 64 bits of state, passes BigCrush, and any two seeds give unrelated streams.
 """
+
+import math
 
 import numba as nb
 import numpy as np
@@ -22,20 +24,28 @@ def mixed(z):
 
 
 @nb.njit(cache=True, nogil=True)
-def uniform(robots, i):
-    """The next number of robot i's generator, float64 in [0, 1)."""
-    robots[i].random += GOLDEN
-    return np.float64(mixed(robots[i].random) >> np.uint64(11)) * _TO_UNIT
+def uniform(records, i):
+    """The next number of the generator of robot or mover i, float64 in [0, 1)."""
+    records[i].random += GOLDEN
+    return np.float64(mixed(records[i].random) >> np.uint64(11)) * _TO_UNIT
 
 
-def seed_streams(seed: int | None, count: int) -> NDArray[np.uint64]:
-    """Generator states for robots 0 to count - 1; robot i's depends on the seed and i alone.
+@nb.njit(cache=True, nogil=True)
+def normal(records, i):
+    """A number of the standard normal distribution (Box and Muller 1958), from two of generator i."""
+    size = math.sqrt(-2.0 * math.log(1.0 - uniform(records, i)))  # 1 - u keeps the logarithm finite
+    return size * math.cos(2.0 * math.pi * uniform(records, i))
+
+
+def seed_streams(seed: int | None, count: int, *, key: tuple[int, ...] = ()) -> NDArray[np.uint64]:
+    """Generator states for robots (or movers) 0 to count - 1; number i's depends on the seed, the key and i alone.
 
     Args:
         seed: any non-negative integer, or None for one from the operating system.
-        count: how many robots.
+        count: how many.
+        key: gives other streams for the same seed.
     """
-    root = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
+    root = np.random.SeedSequence(seed, spawn_key=key).generate_state(1, np.uint64)[0]
     z = root + (np.arange(1, count + 1, dtype=np.uint64) << np.uint64(32))
     # The same mixing as above, on the whole array.
     z = (z ^ (z >> np.uint64(30))) * _FIRST

@@ -11,21 +11,38 @@ PAPER, IMPROVED = 0, 1
 BASIC, CLEARANCE, ALIGNMENT = 0, 1, 2
 """Rewards, see `sim.config.RewardConfig`."""
 
+QUANTITIES = (
+    "range",
+    "noise",
+    "dropout",
+    "rate",
+    "distance_noise",
+    "heading_noise",
+    "command_delay",
+    "max_linear_speed",
+    "max_angular_speed",
+)
+"""Columns of `Robots.drawn`: what may differ from robot to robot, see `sim.config.RandomisationConfig`."""
+
+RANGE, NOISE, DROPOUT, RATE, DISTANCE_NOISE, HEADING_NOISE, DELAY, MAX_LINEAR, MAX_ANGULAR = range(9)
+
 PARAMETERS = np.dtype(
     [
         ("period", "f8"),  # s
-        ("max_linear", "f8"),  # m/s
-        ("max_angular", "f8"),  # rad/s
-        ("linear_change", "f4"),  # largest change of a velocity in one step, as a fraction of its limit
-        ("angular_change", "f4"),
-        ("radius", "f4"),  # m, of the robot
+        ("spans", "f8", (len(QUANTITIES), 2)),  # lowest and highest of what robots draw; equal where they draw nothing
+        ("perceives", "i4"),  # 1 where the scan that is seen differs from the true one
+        ("drifts", "i4"),  # 1 where the believed pose differs from the true one
+        ("max_linear_acceleration", "f8"),  # m/s², 0 is unlimited
+        ("max_angular_acceleration", "f8"),  # rad/s²
+        ("radius", "f4"),  # m, of a round robot
+        ("half_length", "f4"),  # m, of a rectangular robot; 0 for a round one
+        ("half_width", "f4"),
         ("range", "f4"),  # m, of the LiDAR
-        ("noise", "f4"),  # m, standard deviation of a range
-        ("dropout", "f4"),  # probability that a ray sees nothing
         ("looks_ahead", "i4"),  # 1 when the field of view is within the front half plane
         ("batches", "i4"),
         ("rays_per_batch", "i4"),
         ("observation", "i4"),
+        ("frames", "i4"),  # observations that are stacked
         ("near", "f4"),  # m, see `sim.observations.near_distance`
         ("reward", "i4"),
         ("arrival_reward", "f4"),
@@ -40,6 +57,7 @@ PARAMETERS = np.dtype(
         ("spawn_clearance", "f4"),  # m
         ("path_samples", "i4"),  # points of a step at which the body is checked
         ("replica_stride", "i4"),  # tiles between one replica of the pool and the next
+        ("closing", "f4"),  # m that a robot and a mover may come nearer in one step
     ],
     align=True,
 )
@@ -62,6 +80,37 @@ ROBOT = np.dtype(
     align=True,
 )
 """What the simulator remembers of a robot besides pose and target."""
+
+PATROL, WALKER, PEDESTRIAN = 0, 1, 2
+"""Kinds of movers, see `sim.mover_config.MoverKind`."""
+
+MOVER = np.dtype(
+    [
+        ("random", "u8"),  # state of the mover's own generator
+        ("x", "f8"),  # m, in the arena's frame: independent of where the tile is, to the last bit
+        ("y", "f8"),
+        ("vx", "f8"),  # m/s, kept until the next decision
+        ("vy", "f8"),
+        ("goal_x", "f8"),  # m, where it goes; a walker's direction
+        ("goal_y", "f8"),
+        ("other_x", "f8"),  # m, other end of a patrol's line
+        ("other_y", "f8"),
+        ("patience", "f8"),  # s, until it gives up what it is about
+        ("radius", "f8"),  # m
+        ("speed", "f8"),  # m/s, top
+        ("kind", "i4"),
+        ("first_waypoint", "i4"),  # of a patrol's round, and how many it has
+        ("waypoints", "i4"),
+        ("waypoint", "i4"),  # the next one, counted from the first
+        ("way", "i4"),  # 1, or -1 where it goes round backwards
+        ("present", "i4"),  # 0 where the arena had no room for it
+    ],
+    align=True,
+)
+"""What the simulator remembers of a mover."""
+
+DISC_COLUMNS = 5
+"""x, y, radius, and how far it came in the last step in x and y; a radius below zero is an empty slot."""
 
 CIRCLE_COLUMNS = 3
 """x, y, radius; a radius below zero is an empty slot."""

@@ -1,4 +1,4 @@
-"""Rays and clearance against walls, circles and oriented boxes, for one robot at a time.
+"""Rays and clearance against walls, circles, oriented boxes and movers, for one robot at a time.
 
 All lengths are float32 metres in the arena's own frame: callers subtract the tile's origin in float64 first. Over random
 scenes the ranges agree with Chipmunk's exact queries within 1e-4 m (tests/sim/test_sensing.py keeps it so).
@@ -11,6 +11,7 @@ import numpy as np
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
+FAR = np.float32(1e6)  # m; the fast floating-point rules below do without infinities
 TINY = np.float32(1e-12)  # keeps divisions by a direction finite; far below any direction that a float32 angle gives
 
 FAST = {"nnan", "ninf", "nsz", "arcp", "contract", "afn", "reassoc"}
@@ -52,6 +53,24 @@ def nearest_of(ranges, row, first, last):
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy):
+    """Shorten the rays (dx, dy) that meet a circle whose centre is (fx, fy) away and whose surface `gap`."""
+    rays = dx.shape[0]
+    if gap <= ZERO:
+        for i in range(rays):
+            ranges[row, i] = ZERO
+        return
+    radius_squared = radius * radius
+    for i in range(rays):
+        ahead = fx * dx[i] + fy * dy[i]
+        # The perpendicular distance as a cross product: |f|² - ahead² would cancel.
+        aside = fx * dy[i] - fy * dx[i]
+        square = radius_squared - aside * aside
+        hit = ahead - math.sqrt(max(square, ZERO))
+        ranges[row, i] = min(ranges[row, i], hit if (square >= ZERO and hit >= ZERO) else limit)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, row, dx, dy):
     """Fill row `row` of `ranges` (n, rays) with the scan from a pose and return the clearance of the point, metres.
 
@@ -83,18 +102,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
         clearance = min(clearance, gap)
         if gap >= limit or (looks_ahead and cos_heading * fx + sin_heading * fy < -radius):
             continue
-        if gap <= ZERO:
-            for i in range(rays):
-                ranges[row, i] = ZERO
-            continue
-        radius_squared = radius * radius
-        for i in range(rays):
-            ahead = fx * dx[i] + fy * dy[i]
-            # The perpendicular distance as a cross product: |f|² - ahead² would cancel.
-            aside = fx * dy[i] - fy * dx[i]
-            square = radius_squared - aside * aside
-            hit = ahead - math.sqrt(max(square, ZERO))
-            ranges[row, i] = min(ranges[row, i], hit if (square >= ZERO and hit >= ZERO) else limit)
+        _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy)
     for j in range(boxes.shape[1]):
         half_length = boxes[index, j, 2]
         if half_length <= ZERO:
@@ -131,6 +139,65 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
             enter = max(mx - ex, my - ey)
             leave = min(mx + ex, my + ey)
             ranges[row, i] = min(ranges[row, i], max(enter, ZERO) if (leave >= enter and leave >= ZERO) else limit)
+    return clearance
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def disc_clearance(x, y, tile, discs):
+    """Signed distance from a point to the nearest mover of a tile, metres; `FAR` where there is none."""
+    distance = FAR
+    for j in range(discs.shape[1]):
+        radius = discs[tile, j, 2]
+        if radius > ZERO:
+            fx = discs[tile, j, 0] - x
+            fy = discs[tile, j, 1] - y
+            distance = min(distance, math.sqrt(fx * fx + fy * fy) - radius)
+    return distance
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def swept_clearance(x, y, dx, dy, tile, discs):
+    """The same, smallest while the point came to (x, y) by (dx, dy) and each mover by its last step, both straight."""
+    distance = FAR
+    for j in range(discs.shape[1]):
+        radius = discs[tile, j, 2]
+        if radius > ZERO:
+            # The mover as the point sees it, and how it came there.
+            fx = discs[tile, j, 0] - x
+            fy = discs[tile, j, 1] - y
+            sx = discs[tile, j, 3] - dx
+            sy = discs[tile, j, 4] - dy
+            back = min(max((fx * sx + fy * sy) / max(sx * sx + sy * sy, TINY), ZERO), ONE)
+            fx -= back * sx
+            fy -= back * sy
+            distance = min(distance, math.sqrt(fx * fx + fy * fy) - radius)
+    return distance
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
+    """Shorten row `row` of `ranges` by a tile's movers and return the clearance from them, `FAR` where there are none.
+
+    `dx` and `dy` are the rays' directions as `sense` leaves them.
+    """
+    clearance = FAR
+    if discs.shape[1] == 0:
+        return clearance
+    # Along the heading, and at most as long as 1: what is behind it is behind the heading too.
+    middle = dx.shape[0] // 2
+    ahead_x = np.float32(0.5) * (dx[middle] + dx[dx.shape[0] - 1 - middle])
+    ahead_y = np.float32(0.5) * (dy[middle] + dy[dx.shape[0] - 1 - middle])
+    for j in range(discs.shape[1]):
+        radius = discs[tile, j, 2]
+        if radius <= ZERO:
+            continue
+        fx = discs[tile, j, 0] - x
+        fy = discs[tile, j, 1] - y
+        gap = math.sqrt(fx * fx + fy * fy) - radius
+        clearance = min(clearance, gap)
+        if gap >= limit or (looks_ahead and ahead_x * fx + ahead_y * fy < -radius):
+            continue
+        _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy)
     return clearance
 
 

@@ -1,10 +1,14 @@
-"""One control step around the physics: commands before it; outcomes, rewards, observations and resets after it."""
+"""After the physics of a step: outcomes, rewards, observations and resets."""
 
 import math
+from typing import Any
 
 import numba as nb
 import numpy as np
 
+from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
+from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
+from sim.kernels.observing import bearing_of, observe, observe_first
 from sim.kernels.random import uniform
 from sim.kernels.records import (
     ALIGNMENT,
@@ -12,16 +16,16 @@ from sim.kernels.records import (
     BASIC,
     CLEARANCE,
     COLLISION,
+    MAX_ANGULAR,
+    MAX_LINEAR,
     NONE,
-    PAPER,
     TIMEOUT,
 )
-from sim.kernels.sensing import FAST, clearance_at, nearest_of, sense
+from sim.kernels.sensing import FAST, clearance_at, disc_clearance, nearest_of, sense, sense_discs, swept_clearance
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 PI = np.float32(math.pi)
-TWO_PI = np.float32(2.0 * math.pi)
 CELL = np.float32(0.1)  # sim.arenas.freespace.CELL
 
 MIN_TARGET_DISTANCE = np.float32(0.5)
@@ -30,98 +34,14 @@ MIN_TARGET_DISTANCE = np.float32(0.5)
 MAX_RATIO = np.float32(8.0)
 """Cap of d_{t-1}/d_t in the advanced reward, which would overflow when a robot stands on its target."""
 
+MOVER_ROOM = np.float32(1.1)
+"""Metres that a robot's centre starts away from every mover's surface."""
+
+UNCOUNTED: dict[str, Any] = {"_nrt": False}
+"""For a function that allocates nothing: counting references to all arrays, for every robot, took half of a step's time."""
+
 SPAWN_TRIES = 200
 """Draws before a start or target is taken as it is; the cells are free, so one in three or so is good."""
-
-_SERIES = 1e-4
-"""Below this half angle sin(h)/h is 1 - h²/6 to the last bit."""
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def write_commands(actions, records, state, command, parameters):
-    """Turn actions into the bodies' velocities.
-
-    The velocity points along the chord of the arc that the robot drives in one period, so that one explicit step of the
-    physics ends exactly on the arc (plain Euler is 48 mm off after 10 s).
-
-    Args:
-        actions: (N, 2) linear in [0, 1] and angular in [-1, 1], as fractions of the limits; clipped.
-        records: (N,) ROBOT.
-        state: (bodies, 3) x, y, angle in the Space.
-        command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the first N rows are written.
-        parameters: (1,) PARAMETERS.
-
-    Returns:
-        -1, or the first robot whose action is not finite; nothing is written for it and those after it.
-    """
-    p = parameters[0]
-    for i in range(actions.shape[0]):
-        for k in range(3):
-            command[i, k] = state[i, k]
-            command[i, 3 + k] = 0.0
-        if records[i].parked:
-            continue
-        linear = actions[i, 0]
-        angular = actions[i, 1]
-        if not (math.isfinite(linear) and math.isfinite(angular)):
-            return i
-        linear = min(max(linear, ZERO), ONE)
-        angular = min(max(angular, -ONE), ONE)
-        linear = min(max(linear, records[i].linear - p.linear_change), records[i].linear + p.linear_change)
-        angular = min(max(angular, records[i].angular - p.angular_change), records[i].angular + p.angular_change)
-        records[i].linear = linear
-        records[i].angular = angular
-        turn = p.max_angular * angular
-        half = 0.5 * turn * p.period
-        chord = math.sin(half) / half if abs(half) > _SERIES else 1.0 - half * half / 6.0
-        speed = p.max_linear * linear * chord
-        direction = state[i, 2] + half
-        command[i, 3] = speed * math.cos(direction)
-        command[i, 4] = speed * math.sin(direction)
-        command[i, 5] = turn
-    return -1
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _bearing(dx, dy, heading):
-    """Direction of (dx, dy) against the heading, in [-pi, pi], left positive."""
-    bearing = np.float32(math.atan2(dy, dx)) - heading
-    if bearing > PI:
-        bearing -= TWO_PI
-    elif bearing < -PI:
-        bearing += TWO_PI
-    return min(max(bearing, -PI), PI)
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
-def _observe(i, robots, geometry, p):
-    """Write robot i's observation; `sim.observations` says what each number is."""
-    record = robots.records[i]
-    out = robots.observations
-    rays = p.rays_per_batch
-    paper = p.observation == PAPER
-    for k in range(p.batches):
-        nearest = nearest_of(robots.ranges, i, k * rays, (k + 1) * rays)
-        out[i, k] = nearest / p.range if paper else p.near / max(nearest, p.near)
-    k = p.batches
-    out[i, k] = record.linear
-    out[i, k + 1] = record.angular
-    heading = robots.poses[i, 2]
-    dx = robots.targets[i, 0] - robots.poses[i, 0]
-    dy = robots.targets[i, 1] - robots.poses[i, 1]
-    bearing = _bearing(dx, dy, heading)
-    if paper:
-        width = geometry.bounds[record.map, 0]
-        height = geometry.bounds[record.map, 1]
-        direction = np.float32(math.atan2(dy, dx))
-        out[i, k + 2] = record.distance / (np.float32(2.0) * np.float32(math.sqrt(width * width + height * height)))
-        out[i, k + 3] = (direction if direction >= ZERO else direction + TWO_PI) / TWO_PI
-        out[i, k + 4] = (heading if heading >= ZERO else heading + TWO_PI) / TWO_PI
-    else:
-        out[i, k + 2] = record.distance / (record.distance + ONE)
-        out[i, k + 3] = bearing / PI
-        out[i, k + 4] = heading / PI
-    out[i, k + 5] = abs(bearing) / PI
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -168,10 +88,13 @@ def _draw_start(i, robots, geometry, p, state):
     cells = geometry.start_offsets[index + 1] - first
     x = ZERO
     y = ZERO
+    tile = records[i].replica * p.replica_stride + index
     for _ in range(SPAWN_TRIES):
         cell = first + np.int64(uniform(records, i) * cells)
         x = geometry.starts[cell, 0] + CELL * np.float32(uniform(records, i))
         y = geometry.starts[cell, 1] + CELL * np.float32(uniform(records, i))
+        if disc_clearance(x, y, tile, geometry.discs) < MOVER_ROOM:
+            continue
         if clearance_at(x, y, index, geometry.bounds, geometry.circles, geometry.boxes) >= p.spawn_clearance:
             break
     heading = np.float32((2.0 * uniform(records, i) - 1.0) * math.pi)
@@ -224,8 +147,6 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
         state: (bodies, 3) x, y, angle in the Space; written.
     """
     p = parameters[0]
-    dx = np.empty(geometry.ray_cos.shape[0], np.float32)
-    dy = np.empty(geometry.ray_cos.shape[0], np.float32)
     for i in range(poses.shape[0]):
         if math.isnan(poses[i, 0]):
             _draw_start(i, robots, geometry, p, state)
@@ -239,36 +160,29 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
             robots.records[i].distance = _distance_to_target(i, robots)
         _forget_attempt(robots.records[i])
         _nothing_happened(i, robots)
-        _sense(i, robots, geometry, p, dx, dy)
-        _disturb(i, robots, p)
-        _observe(i, robots, geometry, p)
+        begin_episode(i, robots, p)
+        _sense(i, robots, geometry, p)
+        if p.perceives:
+            perceive(i, robots, p)
+        observe_first(i, robots, geometry, p)
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _sense(i, robots, geometry, p, dx, dy):
+def _sense(i, robots, geometry, p):
     """Scan from robot i's pose; returns the clearance of its centre, metres."""
-    return sense(
-        robots.poses[i, 0], robots.poses[i, 1], robots.poses[i, 2], robots.records[i].map,
-        geometry.bounds, geometry.circles, geometry.boxes, geometry.ray_cos, geometry.ray_sin,
-        p.range, p.looks_ahead, robots.ranges, i, dx, dy,
+    x = robots.poses[i, 0]
+    y = robots.poses[i, 1]
+    heading = robots.poses[i, 2]
+    index = robots.records[i].map
+    clearance = sense(
+        x, y, heading, index, geometry.bounds, geometry.circles, geometry.boxes, geometry.ray_cos, geometry.ray_sin,
+        p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y,
     )  # fmt: skip
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _disturb(i, robots, p):
-    """Add the LiDAR's noise and dropouts to robot i's scan."""
-    if p.noise == ZERO and p.dropout == ZERO:
-        return
-    for k in range(robots.ranges.shape[1]):
-        if robots.ranges[i, k] >= p.range:
-            continue
-        if p.noise > ZERO:
-            # Box and Muller (1958); 1 - u keeps the logarithm finite.
-            size = math.sqrt(-2.0 * math.log(1.0 - uniform(robots.records, i)))
-            disturbance = np.float32(size * math.cos(2.0 * math.pi * uniform(robots.records, i)))
-            robots.ranges[i, k] = min(max(robots.ranges[i, k] + p.noise * disturbance, ZERO), p.range)
-        if p.dropout > ZERO and uniform(robots.records, i) < p.dropout:
-            robots.ranges[i, k] = p.range
+    tile = robots.records[i].replica * p.replica_stride + index
+    moving = sense_discs(
+        x, y, tile, geometry.discs, p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y
+    )
+    return min(clearance, moving)
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
@@ -280,6 +194,22 @@ def _clearance_on_the_way(i, x, y, clearance, robots, geometry, p):
         py = y + part * (robots.poses[i, 1] - y)
         here = clearance_at(px, py, robots.records[i].map, geometry.bounds, geometry.circles, geometry.boxes)
         clearance = min(clearance, here)
+    return clearance
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+def _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry, p):
+    """`clearance` or, where it is smaller, that of robot i's body from movers while all came where they are now, metres."""
+    x = robots.poses[i, 0]
+    y = robots.poses[i, 1]
+    dx = x - last_x
+    dy = y - last_y
+    if p.half_length > ZERO:
+        return swept_rectangle_clearance(
+            x, y, robots.poses[i, 2], dx, dy, tile, geometry.discs, p.closing, p.half_length, p.half_width, clearance
+        )  # fmt: skip
+    if clearance < p.closing:
+        clearance = min(clearance, swept_clearance(x, y, dx, dy, tile, geometry.discs) - p.radius)
     return clearance
 
 
@@ -307,13 +237,13 @@ def _reward(i, outcome, before, robots, p):
             elif p.reward == ALIGNMENT:
                 dx = robots.targets[i, 0] - robots.poses[i, 0]
                 dy = robots.targets[i, 1] - robots.poses[i, 1]
-                safety = ONE - abs(_bearing(dx, dy, robots.poses[i, 2])) / PI
+                safety = ONE - abs(bearing_of(dx, dy, robots.poses[i, 2])) / PI
             terms[i, 3] = -p.penalty * (ONE - safety)
     robots.rewards[i] = terms[i, 0] + terms[i, 1] + terms[i, 2] + terms[i, 3]
     robots.records[i].attempt_reward += robots.rewards[i]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def step_robots(state, robots, geometry, parameters):
     """Everything that follows the physics of a step.
 
@@ -324,8 +254,6 @@ def step_robots(state, robots, geometry, parameters):
         parameters: (1,) PARAMETERS.
     """
     p = parameters[0]
-    dx = np.empty(geometry.ray_cos.shape[0], np.float32)
-    dy = np.empty(geometry.ray_cos.shape[0], np.float32)
     records = robots.records
     for i in range(records.shape[0]):
         if records[i].parked:
@@ -340,19 +268,31 @@ def step_robots(state, robots, geometry, parameters):
             state[i, 2] -= 2.0 * math.pi * math.floor((state[i, 2] + math.pi) / (2.0 * math.pi))
         last_x = robots.poses[i, 0]
         last_y = robots.poses[i, 1]
+        last_heading = robots.poses[i, 2]
         robots.poses[i, 0] = x
         robots.poses[i, 1] = y
         robots.poses[i, 2] = np.float32(state[i, 2])
+        if p.drifts:
+            turn = robots.drawn[i, MAX_ANGULAR] * records[i].angular * p.period
+            drift(i, np.float64(x - last_x), np.float64(y - last_y), turn, robots)
 
-        clearance = _sense(i, robots, geometry, p, dx, dy)
-        if p.path_samples > 1:
-            clearance = _clearance_on_the_way(i, last_x, last_y, clearance, robots, geometry, p)
-        clearance -= p.radius
+        clearance = _sense(i, robots, geometry, p)
+        if p.half_length > ZERO:
+            clearance = moving_rectangle_clearance(
+                last_x, last_y, last_heading, x, y, robots.poses[i, 2], records[i].map,
+                geometry.bounds, geometry.circles, geometry.boxes, p.half_length, p.half_width, p.path_samples,
+            )  # fmt: skip
+        else:
+            if p.path_samples > 1:
+                clearance = _clearance_on_the_way(i, last_x, last_y, clearance, robots, geometry, p)
+            clearance -= p.radius
+        if geometry.discs.shape[1]:
+            clearance = _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry, p)
         nearest = nearest_of(robots.ranges, i, 0, robots.ranges.shape[1])
         before = records[i].distance
         records[i].distance = _distance_to_target(i, robots)
         records[i].steps += 1
-        records[i].path_length += p.max_linear * records[i].linear * p.period
+        records[i].path_length += robots.drawn[i, MAX_LINEAR] * records[i].linear * p.period
         if records[i].steps == 1 or clearance < records[i].min_clearance:
             records[i].min_clearance = clearance
 
@@ -369,15 +309,19 @@ def step_robots(state, robots, geometry, parameters):
         _reward(i, outcome, before, robots, p)
 
         # Outcomes and rewards are of the world as it is; the robot gets to see less.
-        _disturb(i, robots, p)
+        if p.perceives:
+            perceive(i, robots, p)
         if outcome == ARRIVAL:
             _draw_target(i, robots, geometry, p)
-        _observe(i, robots, geometry, p)
+            find_itself(i, robots)
+        observe(i, robots, geometry, p)
         if outcome in (COLLISION, TIMEOUT):
             for k in range(robots.observations.shape[1]):
                 robots.final_observations[i, k] = robots.observations[i, k]
             _draw_start(i, robots, geometry, p, state)
             _draw_target(i, robots, geometry, p)
-            _sense(i, robots, geometry, p, dx, dy)
-            _disturb(i, robots, p)
-            _observe(i, robots, geometry, p)
+            begin_episode(i, robots, p)
+            _sense(i, robots, geometry, p)
+            if p.perceives:
+                perceive(i, robots, p)
+            observe_first(i, robots, geometry, p)

@@ -101,7 +101,7 @@ def test_collision_flags_are_those_of_chipmunk(arena: Arena, seed: int) -> None:
     rng = np.random.default_rng(seed)
     half = np.array([arena.half_width, arena.half_height])
     positions = rng.uniform(-half, half, (400, 2))
-    positions = positions[free_distance(arena, positions) > task.robot.radius + 1e-4]
+    positions = positions[free_distance(arena, positions) > task.robot.inscribed_radius + 1e-4]
     assume(len(positions) > 0)
     poses = np.column_stack([positions, rng.uniform(-np.pi, np.pi, len(positions))])
     try:
@@ -113,6 +113,6 @@ def test_collision_flags_are_those_of_chipmunk(arena: Arena, seed: int) -> None:
     for i, pose in enumerate(poses.astype(np.float32).astype(float).tolist()):
         plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (0.0, 0.0))
         plain.step(1.0, 0.0)
-        touching = bool(plain.space.shape_query(plain.disc))
+        touching = bool(plain.space.shape_query(plain.shape))
         if abs(plain.clearance()) > 1e-4 and world.robots.outcomes[i] != ARRIVAL:
             assert (world.robots.outcomes[i] == COLLISION) == touching == (plain.clearance() < 0.0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from sim.arena_file import ArenaFile
-from sim.arenas import Arena, build_arenas, free_distance
+from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.arenas.families import FAMILIES, generate_arena
 from sim.arenas.files import load_arena, read_arena, to_arena, to_document, write_own
 from sim.config import ImportedArenaConfig, TaskConfig
@@ -90,6 +90,48 @@ def test_the_name_may_start_with_anything_and_does_not_change_the_hash() -> None
         assert read_arena({"x.yaml": write_own(renamed).encode()}).name == name
         assert renamed.sha256 == document.sha256
     assert document.model_copy(update={"width": 8.1}).sha256 != document.sha256
+
+
+MOVERS = """
+movers:
+  - {kind: patrol, radius: 0.2, speed: 0.8, waypoints: [{x: 3.0, y: -2.0}, {x: 3.0, y: 2.0}]}
+  - {kind: walker}
+  - {kind: pedestrian, radius: 0.3, speed: 1.5}
+"""
+
+
+def test_what_moves_is_read_written_and_part_of_the_hash() -> None:
+    document = read_arena({"lab.yaml": (OWN + MOVERS).encode()})
+    assert to_arena(document).movers == (
+        Mover("patrol", 0.2, 0.8, ((3.0, -2.0), (3.0, 2.0))),
+        Mover("walker", 0.25, 1.0),
+        Mover("pedestrian", 0.3, 1.5),
+    )
+    assert read_arena({"again.yaml": write_own(document).encode()}) == document
+    assert to_document(to_arena(document)).movers == document.movers
+    still = read_arena({"lab.yaml": OWN.encode()})
+    assert document.sha256 != still.sha256
+    assert "movers" not in write_own(still)
+
+
+def test_an_arena_in_which_nothing_moves_keeps_its_hash() -> None:
+    document = read_arena({"lab.yaml": OWN.encode()})
+    assert document.sha256 == "4e0b08252f028fa4c3ac3ecb8722fa4246b565dfd374043ed0abc64b267475ae"
+
+
+@pytest.mark.parametrize(
+    ("mover", "reason"),
+    [
+        ("{kind: patrol, waypoints: [{x: -3.0, y: 0.0}, {x: 3.0, y: 0.0}]}", r"does not get past \(-2\."),
+        ("{kind: patrol, waypoints: [{x: -3.0, y: 1.5}, {x: -3.0, y: 2.9}]}", "does not get past"),
+        ("{kind: patrol, waypoints: [{x: 3.0, y: 0.0}]}", "two waypoints or more"),
+        ("{kind: walker, speed: 1.6}", "less than or equal to 1.5"),
+        ("{kind: ghost}", "patrol"),
+    ],
+)
+def test_movers_that_cannot_be_are_refused(mover: str, reason: str) -> None:
+    with pytest.raises(ArenaFileError, match=reason):
+        read_arena({"lab.yaml": f"{OWN}movers: [{mover}]".encode()})
 
 
 def test_the_documented_schema_is_that_of_the_model() -> None:

@@ -1,28 +1,45 @@
 """Frozen suites, shortest paths, driving side by side, baselines."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sim
-from sim.arenas import Arena, build_arenas, free_distance
+from sim.arena_file import ArenaFile
+from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.arenas.document import to_document
 from sim.baselines import bearings, go_to_goal, random_policy
 from sim.config import ArenaConfig, GeneratedArenaConfig, ImportedArenaConfig, ObservationName, TaskConfig
 from sim.dwa import dynamic_window
-from sim.errors import SuiteError
-from sim.suite_builder import build_suite
-from sim.suites import Situation, Suite, content_hash, load_suite, run_controller, run_suite, suite_for, suite_names
+from sim.errors import PlacementError, SuiteError
+from sim.mover_config import MoversConfig
+from sim.scores import barn_score
+from sim.suite_builder import build_suite, suite_text
+from sim.suites import (
+    EpisodeTable,
+    Situation,
+    Suite,
+    content_hash,
+    load_suite,
+    run_controller,
+    run_suite,
+    suite_for,
+    suite_names,
+    suite_of,
+)
 from sim.vector_env import NavigationVectorEnv
 
 SIMPLE = TaskConfig()
 COMPLEX = TaskConfig(arena=ArenaConfig(name="complex"))
 
 HASHES = {
+    "barn-20": "5779fccd38ec0c72368f6f87be1d4ec8c5bd0ec2021d1ad012e18f9a8e8eacdc",
     "simple-200": "a4a8d01a0e689b5e6d55e0a0b51fe56ba9d967ed21afd1b68b8447c69b417016",
     "complex-200": "d83965c11e81fb0a12650ffc8d17ef283d1b282a725cfb5843992ecea7cbff87",
     "clutter-500": "645046dcb548e0964133b56604757fbd91c65942585dada333152c47054485dc",
+    "crowd-200": "6803dc58212205462590fcd5c59f0172d5622471ac5eb5d15eacfc97f7e51d69",
 }
 
 
@@ -47,6 +64,71 @@ def test_scenarios_fit_and_their_shortest_paths_are_no_shorter_than_a_crow_flies
     assert (suite.shortest_paths <= 2.0 * crow).all()
 
 
+def test_barn_worlds_are_driven_from_their_own_start_to_their_own_goal() -> None:
+    suite = load_suite("barn-20")
+    assert len(suite.arenas) == 20
+    assert (suite.starts == [0.0, -4.0, 1.5708]).all()
+    assert (suite.targets == [0.0, 6.0]).all()
+    assert ((suite.shortest_paths >= 10.0) & (suite.shortest_paths < 10.5)).all()
+    table = run_controller(dynamic_window(SIMPLE), SIMPLE, suite)
+    assert not (table.outcomes == 2).any()
+    assert 0.5 < (table.outcomes == 1).mean() < 0.8  # without a map it gets stuck in dead ends
+
+
+def test_the_barn_score_worked_by_hand() -> None:
+    # 10 m at 0.25 m/s is 40 s. 200 steps: 40 s, better than twice that counts as 80 s; 600 steps: 120 s; 1700: 340 s, beyond
+    # eight times; and a collision.
+    table = EpisodeTable(
+        outcomes=np.array([1, 1, 1, 2], dtype=np.uint8),
+        steps=np.array([200, 600, 1700, 200], dtype=np.int32),
+        rewards=np.zeros(4),
+        path_lengths=np.full(4, 10.0),
+        shortest_paths=np.full(4, 10.0),
+        min_clearances=np.zeros(4, dtype=np.float32),
+    )
+    assert barn_score(table, SIMPLE) == pytest.approx([0.5, 1 / 3, 0.125, 0.0])
+
+
+def walled(name: str, **own: object) -> ArenaFile:
+    box = {"x": 0.0, "y": 0.0, "length": 2.0, "width": 0.2, "angle": 90.0}
+    return ArenaFile.model_validate({"name": name, "width": 6.0, "height": 5.0, "boxes": [box], **own})
+
+
+START, TARGET = {"x": -2.0, "y": 0.0, "heading": 90.0}, {"x": 2.0, "y": 0.0}
+
+
+def test_arena_files_with_a_start_and_a_target_are_a_suite() -> None:
+    documents = [walled("one", start=START, target=TARGET), walled("two", start=TARGET, target={"x": 2.0, "y": 2.0})]
+    suite = suite_of("mine", documents)
+    assert suite.starts.tolist() == [[-2.0, 0.0, 1.5708], [2.0, 0.0, 0.0]]
+    assert suite.arena_indices.tolist() == [0, 1]
+    assert suite.shortest_paths[1] == 2.0
+    # Round the end of the wall, 1 m up, with the body's 0.105 m round its corners.
+    assert 2.0 * np.hypot(1.9, 1.0) < suite.shortest_paths[0] < 2.0 * np.hypot(2.0, 1.105) + 0.05
+    assert suite_of("mine", documents[::-1]).hash != suite.hash
+    again = json.loads(suite_text("mine", documents))
+    assert (again["name"], again["hash"], len(again["arenas"])) == ("mine", suite.hash, 2)
+    # A training on such an arena is measured on its own scenario first, and then on others that are drawn in it.
+    drawn = suite_for(TaskConfig(arena=ImportedArenaConfig.of(documents[0])))
+    assert (drawn.starts[0].tolist(), drawn.targets[0].tolist(), len(drawn)) == ([-2.0, 0.0, 1.5708], [2.0, 0.0], 200)
+
+
+@pytest.mark.parametrize(
+    ("own", "reason"),
+    [
+        ({"start": START}, "without a start and a target"),
+        ({"start": {"x": 0.0, "y": 0.5}, "target": TARGET}, "needs 0.20 m"),
+        (
+            {"start": START, "target": TARGET, "boxes": [{"x": 0.0, "y": 0.0, "length": 0.2, "width": 5.0}]},
+            "no path",
+        ),
+    ],
+)
+def test_arena_files_that_make_no_scenario_are_refused(own: dict[str, object], reason: str) -> None:
+    with pytest.raises(PlacementError, match=reason):
+        suite_of("mine", [walled("one", **own)])
+
+
 def test_any_change_is_another_hash() -> None:
     arena, scenarios = Arena("a", circles=np.array([[1.0, 1.0, 0.3]])), [[0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0]]
     hashes = {
@@ -54,8 +136,10 @@ def test_any_change_is_another_hash() -> None:
         content_hash((Arena("a", circles=np.array([[1.0, 1.0, 0.3001]])),), scenarios),
         content_hash((Arena("a", half_width=5.1, circles=arena.circles),), scenarios),
         content_hash((arena,), [[0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0001]]),
+        content_hash((Arena("a", circles=arena.circles, movers=(Mover("walker", 0.25, 1.0),)),), scenarios),
+        content_hash((Arena("a", circles=arena.circles, movers=(Mover("walker", 0.25, 1.1),)),), scenarios),
     }
-    assert len(hashes) == 4
+    assert len(hashes) == 6
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones() -> None:
@@ -139,6 +223,16 @@ def test_a_generated_arena_is_measured_on_maps_that_no_training_has() -> None:
     trained = {arena.boxes.tobytes() for arena in build_arenas(large.arena)}
     assert not trained & {arena.boxes.tobytes() for arena in suite.arenas}
     assert np.isfinite(suite.shortest_paths).all()
+
+
+def test_a_training_among_movers_is_measured_among_movers() -> None:
+    movers = MoversConfig(count=3, kind="walker", speed=0.7)
+    suite = suite_for(TaskConfig(arena=ArenaConfig(name="complex", movers=movers)))
+    assert (suite.name, len(suite)) == ("complex-3-walker-200", 200)
+    assert suite.arenas[0].movers == (Mover("walker", 0.25, 0.7),) * 3
+    suite = suite_for(TaskConfig(arena=GeneratedArenaConfig(name="rooms", difficulty=0.3, movers=movers)))
+    assert suite.name == "rooms-0.3-3-walker-200"
+    assert all(len(arena.movers) == 3 for arena in suite.arenas)
 
 
 def test_an_imported_arena_is_its_own_suite() -> None:

@@ -86,6 +86,8 @@ def write_own(document: ArenaFile) -> str:
     """The arena in YAML, one obstacle a line; `read_own` gives the same arena back."""
     lines = []
     for key, value in document.model_dump(mode="json", exclude_none=True).items():
+        if key == "movers" and not value:
+            continue
         if isinstance(value, list):
             lines.append(f"{key}:" if value else f"{key}: []")
             lines += [f"  - {_flow(item)}" for item in value]

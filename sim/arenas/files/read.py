@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 
 from sim.arena_file import ArenaFile
-from sim.arenas.document import check_free_space
+from sim.arenas.document import check_free_space, check_patrols
 from sim.arenas.files.limits import MAX_IMAGE_BYTES, MAX_SDF_BYTES, MAX_TEXT_BYTES
 from sim.arenas.files.own_yaml import load_yaml, read_own
 from sim.arenas.files.ros_map import parse_info, read_map
@@ -46,6 +46,7 @@ def read_arena(files: Mapping[str, bytes]) -> ArenaFile:
     else:
         document = read_own(name, content)
     check_free_space(document)
+    check_patrols(document)
     return document
 
 

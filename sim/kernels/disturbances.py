@@ -1,0 +1,84 @@
+"""What stands between a robot and the world: faults of its LiDAR, drift of its odometry, and drawing all of it anew."""
+
+import math
+
+import numba as nb
+import numpy as np
+
+from sim.kernels.random import normal, uniform
+from sim.kernels.records import DISTANCE_NOISE, DROPOUT, HEADING_NOISE, NOISE, RANGE, RATE
+
+ZERO = np.float32(0.0)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def begin_episode(i, robots, p):
+    """Draw what robot i is like in this episode; its pose is known, no action waits, and the next scan is new."""
+    for k in range(robots.drawn.shape[1]):
+        low = p.spans[k, 0]
+        high = p.spans[k, 1]
+        if low < high:
+            robots.drawn[i, k] = low + (high - low) * uniform(robots.records, i)
+    find_itself(i, robots)
+    if robots.pending.shape[1]:
+        robots.pending[i] = ZERO
+    if robots.scan_ages.shape[0]:
+        robots.scan_ages[i] = 0
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def find_itself(i, robots):
+    """Let robot i know its pose: with a new target, odometry starts anew."""
+    if robots.drift.shape[0]:
+        robots.drift[i] = 0.0
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def drift(i, dx, dy, turn, robots):
+    """Let robot i's believed pose drift while it truly moves by dx, dy, metres, and turns by `turn`, radians."""
+    heading_noise = robots.drawn[i, HEADING_NOISE] * math.sqrt(abs(turn))
+    if heading_noise > 0.0:
+        robots.drift[i, 2] += heading_noise * normal(robots.records, i)
+    cos = math.cos(robots.drift[i, 2])
+    sin = math.sin(robots.drift[i, 2])
+    way = math.sqrt(dx * dx + dy * dy)
+    stretch = 1.0
+    if way > 0.0:
+        stretch += robots.drawn[i, DISTANCE_NOISE] * math.sqrt(way) * normal(robots.records, i) / way
+    robots.drift[i, 0] += stretch * (cos * dx - sin * dy) - dx
+    robots.drift[i, 1] += stretch * (sin * dx + cos * dy) - dy
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def perceive(i, robots, p):
+    """Turn robot i's true scan into what it gets to see: a new scan with its faults, or the last one once more."""
+    if robots.scan_ages.shape[0] == 0:
+        _disturb(i, robots, p)
+        return
+    rate = robots.drawn[i, RATE]
+    steps = max(1, int(1.0 / (rate * p.period) + 0.5)) if rate > 0.0 else 1
+    if robots.scan_ages[i] % steps == 0:
+        _disturb(i, robots, p)
+        robots.held_ranges[i] = robots.ranges[i]
+    else:
+        robots.ranges[i] = robots.held_ranges[i]
+    robots.scan_ages[i] += 1
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _disturb(i, robots, p):
+    """Add the LiDAR's noise and dropouts to robot i's scan; what is beyond its own range is not seen."""
+    limit = np.float32(robots.drawn[i, RANGE])
+    noise = np.float32(robots.drawn[i, NOISE])
+    dropout = np.float32(robots.drawn[i, DROPOUT])
+    if noise == ZERO and dropout == ZERO and limit >= p.range:
+        return
+    for k in range(robots.ranges.shape[1]):
+        if robots.ranges[i, k] >= limit:
+            robots.ranges[i, k] = p.range
+            continue
+        if noise > ZERO:
+            disturbance = np.float32(normal(robots.records, i))
+            robots.ranges[i, k] = min(max(robots.ranges[i, k] + noise * disturbance, ZERO), p.range)
+        if dropout > ZERO and uniform(robots.records, i) < dropout:
+            robots.ranges[i, k] = p.range

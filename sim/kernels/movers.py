@@ -1,0 +1,314 @@
+"""How movers go: where each wants to, and what walls, obstacles and the other movers leave of that.
+
+Movers decide together, once in `DECISION` seconds, and keep their velocities until then. What they may not do is the same
+for all kinds, and so no two of them ever overlap and none enters an obstacle, to the rounding of a float64:
+
+- An obstacle is convex, so the plane through its nearest point keeps clear of it: the part of a velocity towards that point
+  is at most the gap over the time until the next decision.
+- Two movers keep to their sides of the plane between them: towards each other each goes at most half the gap (Zhou, Wang,
+  Bandyopadhyay and Schwager, "Fast, On-line Collision Avoidance for Dynamic Vehicles Using Buffered Voronoi Cells", 2017).
+
+Patrols and walkers keep their direction within that and slow down. Pedestrians give way early: they take the velocity
+closest to their wish that also keeps them apart for `HORIZON` seconds (ORCA, `sim.kernels.avoidance`).
+
+Positions are kept in the arena's own frame, so that a mover's way does not depend on the tile that its arena is in. Robots
+make no difference to movers.
+"""
+
+import math
+
+import numba as nb
+import numpy as np
+
+from sim.kernels.avoidance import choose_velocity, free_part, orca_line
+from sim.kernels.random import uniform
+from sim.kernels.records import PATROL, PEDESTRIAN, WALKER
+from sim.kernels.surroundings import EXACT, SKIN, free_length, gap, obstacle_lines
+
+DECISION = 0.6
+"""Seconds between two decisions, a person's stride; one control period where that is longer."""
+
+HORIZON = 2.0
+"""Seconds for which pedestrians look ahead."""
+
+_LINE_MARGIN = 0.05  # m beside a mover on the line to a new goal
+_TRIES = 200  # places drawn for a start
+_DIRECTIONS = 4  # looked into for a new goal
+_STRIDE = 1.5  # m of free way that a new goal's direction should have
+_ARRIVED = 0.02  # m
+_STANDING = 0.1  # of its top speed: slower, a patrol loses patience
+_TURNING = 0.5  # of its top speed: slower, a walker turns
+_PATIENCE = 1.5  # s of standing before a patrol turns round
+_DETOUR = 1.5  # times the straight way's time after which a pedestrian goes elsewhere
+_HESITATION = 2.0  # s more, likewise
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _draw_goal(m, index, crowd, furthest):
+    """Give mover m a goal in sight: somewhere on the way into a drawn direction, or at its end where `furthest`."""
+    records = crowd.records
+    record = records[m]
+    keep = record.radius + _LINE_MARGIN
+    longest = -1.0
+    for _ in range(_DIRECTIONS):
+        angle = 2.0 * math.pi * uniform(records, m)
+        dx = math.cos(angle)
+        dy = math.sin(angle)
+        length = free_length(record.x, record.y, dx, dy, keep, index, crowd.bounds, crowd.circles, crowd.boxes)
+        if length > longest:
+            longest = length
+            record.goal_x = dx
+            record.goal_y = dy
+        if length >= _STRIDE and not furthest:
+            break
+    distance = longest if furthest else longest * (0.5 + 0.5 * uniform(records, m))
+    record.goal_x = record.x + distance * record.goal_x
+    record.goal_y = record.y + distance * record.goal_y
+    record.patience = _HESITATION + _DETOUR * distance / record.speed
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _turn(m, records):
+    """Give walker m a new direction."""
+    angle = 2.0 * math.pi * uniform(records, m)
+    records[m].goal_x = math.cos(angle)
+    records[m].goal_y = math.sin(angle)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _next_waypoint(record, crowd):
+    """Send a patrol on: to its round's next corner, or back to where it came from."""
+    if record.waypoints:
+        record.waypoint = (record.waypoint + record.way) % record.waypoints
+        record.goal_x = crowd.waypoints[record.first_waypoint + record.waypoint, 0]
+        record.goal_y = crowd.waypoints[record.first_waypoint + record.waypoint, 1]
+    else:
+        x = record.goal_x
+        y = record.goal_y
+        record.goal_x = record.other_x
+        record.goal_y = record.other_y
+        record.other_x = x
+        record.other_y = y
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _draw_place(m, index, crowd):
+    """Put mover m somewhere: on its round if it has one, else anywhere within the walls."""
+    records = crowd.records
+    waypoints = crowd.waypoints
+    record = records[m]
+    if record.waypoints:
+        leg = int(uniform(records, m) * record.waypoints)
+        part = uniform(records, m)
+        a = record.first_waypoint + leg
+        record.waypoint = (leg + 1) % record.waypoints
+        b = record.first_waypoint + record.waypoint
+        record.x = waypoints[a, 0] + part * (waypoints[b, 0] - waypoints[a, 0])
+        record.y = waypoints[a, 1] + part * (waypoints[b, 1] - waypoints[a, 1])
+    else:
+        record.x = (2.0 * uniform(records, m) - 1.0) * (crowd.bounds[index, 0] - record.radius)
+        record.y = (2.0 * uniform(records, m) - 1.0) * (crowd.bounds[index, 1] - record.radius)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def place_movers(crowd):
+    """Put every mover of every tile, at rest, somewhere clear of obstacles and of the movers before it.
+
+    Args:
+        crowd: `sim.kernels.bundles.Crowd`, whose records and discs are written.
+    """
+    records = crowd.records
+    discs = crowd.discs
+    slots = discs.shape[1]
+    for m in range(records.shape[0]):
+        tile = m // slots
+        index = crowd.maps[tile]
+        record = records[m]
+        record.present = 0
+        record.vx = 0.0
+        record.vy = 0.0
+        for _ in range(_TRIES if record.radius > 0.0 else 0):
+            _draw_place(m, index, crowd)
+            keep = record.radius + SKIN
+            free = gap(record.x, record.y, index, crowd.bounds, crowd.circles, crowd.boxes) >= keep
+            for other in range(tile * slots, m):
+                apart = math.hypot(records[other].x - record.x, records[other].y - record.y)
+                free = free and (not records[other].present or apart >= keep + records[other].radius)
+            if free:
+                record.present = 1
+                break
+        if record.present:
+            record.way = 1
+            record.patience = _PATIENCE
+            if record.kind == WALKER:
+                _turn(m, records)
+            elif record.waypoints:
+                record.goal_x = crowd.waypoints[record.first_waypoint + record.waypoint, 0]
+                record.goal_y = crowd.waypoints[record.first_waypoint + record.waypoint, 1]
+            else:
+                record.other_x = record.x
+                record.other_y = record.y
+                _draw_goal(m, index, crowd, record.kind == PATROL)
+                if record.kind == PATROL:
+                    record.patience = _PATIENCE
+        else:
+            record.x = 0.0
+            record.y = 0.0
+        k = m % slots
+        discs[tile, k, 0] = record.x
+        discs[tile, k, 1] = record.y
+        discs[tile, k, 2] = record.radius if record.present else -1.0
+        discs[tile, k, 3] = 0.0
+        discs[tile, k, 4] = 0.0
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _dividing_lines(m, first, slots, records, interval, lines, n):
+    """Write, from row n on, the half-planes that keep mover m on its side of the others for `interval` seconds.
+
+    Returns how many rows there are then.
+    """
+    record = records[m]
+    for other in range(first, first + slots):
+        if other == m or not records[other].present:
+            continue
+        px = records[other].x - record.x
+        py = records[other].y - record.y
+        near = record.radius + records[other].radius + SKIN
+        far = near + 2.0 * record.speed * interval
+        squared = px * px + py * py
+        if squared < far * far:
+            distance = max(math.sqrt(squared), 1e-9)
+            lines[n, 0] = px / distance
+            lines[n, 1] = py / distance
+            lines[n, 2] = max(distance - near, 0.0) / (2.0 * interval)
+            n += 1
+    return n
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _orca_lines(m, first, slots, records, lines, n):
+    """Write, from row n on, the half-planes that keep mover m and the others apart for `HORIZON` seconds; likewise."""
+    record = records[m]
+    for other in range(first, first + slots):
+        if other == m or not records[other].present:
+            continue
+        px = records[other].x - record.x
+        py = records[other].y - record.y
+        near = record.radius + records[other].radius
+        far = near + (record.speed + records[other].speed) * HORIZON
+        squared = px * px + py * py
+        if near * near < squared < far * far:
+            orca_line(
+                px, py, record.vx - records[other].vx, record.vy - records[other].vy, near, HORIZON,
+                0.5 if records[other].kind == PEDESTRIAN else 1.0, record.vx, record.vy, lines, n,
+            )  # fmt: skip
+            n += 1
+    return n
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _decide(tile, crowd, interval, lines, scratch, chosen):
+    """Choose the velocities of a tile's movers for the next `interval` seconds."""
+    records = crowd.records
+    index = crowd.maps[tile]
+    slots = crowd.discs.shape[1]
+    first = tile * slots
+    velocity = chosen[slots]
+    for k in range(slots):
+        m = first + k
+        record = records[m]
+        if not record.present:
+            continue
+        hard = obstacle_lines(
+            record.x, record.y, record.radius, record.speed * interval, interval, index,
+            crowd.bounds, crowd.circles, crowd.boxes, lines,
+        )  # fmt: skip
+        hard = _dividing_lines(m, first, slots, records, interval, lines, hard)
+
+        if record.kind == WALKER:
+            part = free_part(lines, hard, record.speed * record.goal_x, record.speed * record.goal_y)
+            for _ in range(_DIRECTIONS if part < _TURNING else 0):
+                _turn(m, records)
+                part = free_part(lines, hard, record.speed * record.goal_x, record.speed * record.goal_y)
+                if part >= _TURNING:
+                    break
+            chosen[k, 0] = part * record.speed * record.goal_x
+            chosen[k, 1] = part * record.speed * record.goal_y
+            continue
+
+        record.patience -= interval
+        gx = record.goal_x - record.x
+        gy = record.goal_y - record.y
+        distance = math.sqrt(gx * gx + gy * gy)
+        if distance < _ARRIVED or (record.patience <= 0.0 and record.kind == PEDESTRIAN):
+            if record.kind == PATROL:
+                _next_waypoint(record, crowd)
+            else:
+                _draw_goal(m, index, crowd, False)
+            gx = record.goal_x - record.x
+            gy = record.goal_y - record.y
+            distance = math.sqrt(gx * gx + gy * gy)
+        pace = min(record.speed, distance / interval) / max(distance, 1e-9)
+        vx = pace * gx
+        vy = pace * gy
+        if record.kind == PATROL:
+            part = free_part(lines, hard, vx, vy)
+            if part >= _STANDING:
+                record.patience = _PATIENCE
+            elif record.patience <= 0.0:
+                record.way = -record.way
+                record.patience = _PATIENCE
+                _next_waypoint(record, crowd)
+            chosen[k, 0] = part * vx
+            chosen[k, 1] = part * vy
+            continue
+
+        count = _orca_lines(m, first, slots, records, lines, hard)
+        choose_velocity(lines, hard, count, record.speed, vx, vy, scratch, velocity)
+        part = free_part(lines, hard, velocity[0], velocity[1])
+        chosen[k, 0] = part * velocity[0]
+        chosen[k, 1] = part * velocity[1]
+    for k in range(slots):
+        if records[first + k].present:
+            records[first + k].vx = chosen[k, 0]
+            records[first + k].vy = chosen[k, 1]
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def move_movers(crowd, period, interval, decide, command, robots):
+    """Let every mover go on for one control period.
+
+    Args:
+        crowd: `sim.kernels.bundles.Crowd`, whose records and discs are updated.
+        period: seconds of this step.
+        interval: seconds until the next decision, where this step begins with one.
+        decide: whether it does.
+        command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the rows after the first `robots` are written.
+        robots: how many bodies are robots.
+    """
+    records = crowd.records
+    discs = crowd.discs
+    slots = discs.shape[1]
+    if decide:
+        most = 4 + crowd.circles.shape[1] + crowd.boxes.shape[1] + 2 * slots
+        lines = np.empty((most, 3))
+        scratch = np.empty((most, 3))
+        chosen = np.empty((slots + 1, 2))
+        for tile in range(discs.shape[0]):
+            _decide(tile, crowd, interval, lines, scratch, chosen)
+    for m in range(records.shape[0]):
+        record = records[m]
+        tile = m // slots
+        k = m % slots
+        row = robots + m
+        command[row, 0] = crowd.origins[tile, 0] + record.x
+        command[row, 1] = crowd.origins[tile, 1] + record.y
+        command[row, 3] = record.vx
+        command[row, 4] = record.vy
+        record.x += period * record.vx
+        record.y += period * record.vy
+        discs[tile, k, 0] = record.x
+        discs[tile, k, 1] = record.y
+        discs[tile, k, 3] = period * record.vx
+        discs[tile, k, 4] = period * record.vy

@@ -1,0 +1,110 @@
+"""The movers of all tiles: where they start, how they go on, and what the rest of the simulation sees of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arenas import Arena
+from sim.kernels.bundles import Crowd
+from sim.kernels.movers import DECISION, move_movers, place_movers
+from sim.kernels.random import seed_streams
+from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
+from sim.mover_config import MoverKind
+from sim.shapes import pack_shapes
+
+_KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}
+# Other streams than the robots', for the same seed.
+_STREAM = (1,)
+
+
+class Movers:
+    """What moves beside the robots. They take no notice of robots: a scenario is the same whoever drives in it.
+
+    Args:
+        arenas: the pool; tile t is a copy of arena t modulo their number.
+        origins: (tiles, 2) centres of the tiles, metres.
+        period: seconds of a step.
+        alike: whether all copies of an arena have the same movers in the same places.
+
+    Attributes:
+        discs: (tiles, K, 5) float32 x, y, radius, metres in the arena's frame, and how far each came in the last step, in
+            x and y; a radius below zero is an empty slot.
+        fastest: m/s, the highest top speed of them all.
+    """
+
+    def __init__(self, arenas: Sequence[Arena], origins: NDArray[np.float64], period: float, *, alike: bool) -> None:
+        tiles, slots = len(origins), max(len(arena.movers) for arena in arenas)
+        self.discs: NDArray[np.float32] = np.full((tiles, slots, DISC_COLUMNS), -1.0, dtype=np.float32)
+        self.fastest = max((mover.speed for arena in arenas for mover in arena.movers), default=0.0)
+        table = np.zeros((tiles, slots), dtype=MOVER)
+        table["radius"] = -1.0
+        waypoints: list[tuple[float, float]] = []
+        for index, arena in enumerate(arenas):
+            for slot, mover in enumerate(arena.movers):
+                records = table[index :: len(arenas), slot]
+                records["kind"] = _KINDS[mover.kind]
+                records["radius"] = mover.radius
+                records["speed"] = mover.speed
+                records["first_waypoint"] = len(waypoints)
+                records["waypoints"] = len(mover.waypoints)
+                waypoints += mover.waypoints
+        self._records = table.reshape(-1)
+        bounds, circles, boxes = pack_shapes(arenas)
+        self._crowd = Crowd(
+            records=self._records,
+            discs=self.discs,
+            waypoints=np.array(waypoints, dtype=np.float64).reshape(-1, 2),
+            maps=(np.arange(tiles) % len(arenas)).astype(np.int32),
+            bounds=bounds,
+            circles=circles,
+            boxes=boxes,
+            origins=origins,
+        )
+        self._copies = tiles // len(arenas) if alike else 1
+        self._period = period
+        self._steps_between = max(1, round(DECISION / period))
+        self._steps = np.zeros(1, dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def seed(self, seed: int | None) -> None:
+        """Start every mover's generator anew; None takes a seed from the operating system."""
+        streams = seed_streams(seed, len(self) // self._copies, key=_STREAM)
+        self._records["random"] = np.tile(streams, self._copies)
+
+    def place(self) -> None:
+        """Draw where all of them start."""
+        self._steps[0] = 0
+        place_movers(self._crowd)
+
+    def of(self, tile: int) -> NDArray[np.float32]:
+        """(n, 3) x, y, radius of the movers in a tile, metres."""
+        discs = self.discs[tile]
+        present: NDArray[np.float32] = discs[discs[:, 2] > 0.0, :3]
+        return present
+
+    def distance(self, tile: int, point: NDArray[np.float64]) -> float:
+        """From a point (2,) in a tile to the nearest mover's surface, metres; infinite where there is none."""
+        here = self.of(tile)
+        gaps = np.hypot(*(here[:, :2] - point).T) - here[:, 2]
+        return float(gaps.min(initial=np.inf))
+
+    def step(self, command: NDArray[np.float64], robots: int) -> None:
+        """Go on for one control period.
+
+        Args:
+            command: of `sim.physics.TiledSpace`, whose rows of movers are written.
+            robots: rows before them.
+        """
+        decide = self._steps[0] % self._steps_between == 0
+        move_movers(self._crowd, self._period, self._steps_between * self._period, decide, command, robots)
+        self._steps += 1
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """The arrays that the future depends on, by name; empty where nothing moves."""
+        if not len(self):
+            return {}
+        arrays: dict[str, NDArray[np.generic]] = {f"mover_{name}": self._records[name] for name in MOVER.names or ()}
+        return arrays | {"mover_discs": self.discs, "mover_steps": self._steps}
