@@ -1,0 +1,50 @@
+"""Routes of the policies that ship."""
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
+
+from server.exports.service import bundle_of
+from server.policies import service
+from server.policies.schemas import PolicyEpisodes, ReferencePolicy
+from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from workers.reference.library import reference_policies
+
+router = APIRouter(prefix="/api/policies", tags=["policies"])
+
+_ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}}
+
+
+@router.get("")
+def list_policies() -> list[ReferencePolicy]:
+    """Trained policies that ship with the project, to watch, to drive and to compare with."""
+    return [service.view(policy) for policy in reference_policies()]
+
+
+@router.get("/{name}", responses=NOT_FOUND)
+def get_policy(name: str) -> ReferencePolicy:
+    """One of them."""
+    return service.view(service.find(name))
+
+
+@router.get("/{name}/suites/{suite}/episodes", responses=NOT_FOUND)
+def list_policy_episodes(name: str, suite: str) -> PolicyEpisodes:
+    """Every episode behind its figures on a suite."""
+    return service.episodes(name, suite)
+
+
+@router.get("/{name}/download", response_class=FileResponse, responses=NOT_FOUND | _ZIP)
+def download_policy(name: str) -> FileResponse:
+    """The archive: weights as safetensors, and the manifest."""
+    policy = service.find(name)
+    return FileResponse(policy.archive, media_type="application/zip", filename=f"mapless-{policy.card.name}.zip")
+
+
+@router.get("/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | EXPORT_FAILED | _ZIP)
+def download_policy_bundle(name: str) -> FileResponse:
+    """All that it takes to drive a robot with it; compared with torch just now."""
+    policy = service.find(name)
+    bundle = bundle_of(policy.archive, f"mapless-{policy.card.name}-bundle.zip")
+    return FileResponse(
+        bundle.path, media_type="application/zip", filename=bundle.file_name, background=BackgroundTask(bundle.discard)
+    )

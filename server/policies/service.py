@@ -1,0 +1,80 @@
+"""What a person may do with the policies that ship: look, take away."""
+
+from server.errors import NotFoundError
+from server.policies.schemas import PolicyEpisodes, ReferencePolicy, SuiteResult, SuiteRow
+from server.schemas import Estimate
+from workers.errors import UnknownPolicyError
+from workers.reference import library
+from workers.reference.figures import Figures
+
+
+def find(name: str) -> library.ReferencePolicy:
+    """The policy of that name.
+
+    Raises:
+        NotFoundError: there is none.
+    """
+    try:
+        return library.reference_policy(name)
+    except UnknownPolicyError as error:
+        raise NotFoundError.of("reference policy", name) from error
+
+
+def view(policy: library.ReferencePolicy) -> ReferencePolicy:
+    """A policy in JSON, with the baselines on its suites."""
+    card = policy.card
+    return ReferencePolicy(
+        name=card.name,
+        title=card.title,
+        description=card.description,
+        command=card.command,
+        training=card.training,
+        seed=card.seed,
+        step=card.step,
+        size=policy.archive.stat().st_size,
+        results=[
+            SuiteResult(
+                suite=result.suite,
+                suite_hash=result.suite_hash,
+                policy=_row(card.title, result.figures),
+                baselines=[
+                    _row(baseline.name, measured.figures)
+                    for baseline in library.baselines().baselines
+                    for measured in baseline.results
+                    if measured.suite_hash == result.suite_hash
+                ],
+            )
+            for result in card.results
+        ],
+    )
+
+
+def episodes(name: str, suite: str) -> PolicyEpisodes:
+    """Every episode behind a policy's figures on a suite.
+
+    Raises:
+        NotFoundError: there is no such policy, or it was not measured on that suite.
+    """
+    policy = find(name)
+    try:
+        evaluation = policy.evaluation(suite)
+    except UnknownPolicyError as error:
+        raise NotFoundError(f"The policy {name} was not measured on {suite}.") from error
+    return PolicyEpisodes(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=evaluation.episodes)
+
+
+def _row(name: str, figures: Figures) -> SuiteRow:
+    return SuiteRow(
+        name=name,
+        success=Estimate(
+            value=figures.success,
+            low=figures.success_low,
+            high=figures.success_high,
+            seeds=1,
+            episodes=figures.episodes,
+        ),
+        collision=figures.collision,
+        timeout=figures.timeout,
+        spl=figures.spl,
+        steps=figures.steps,
+    )

@@ -1,0 +1,174 @@
+"""The policies that ship are what their cards say: same training, same figures, same actions once exported."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sim.baselines import go_to_goal
+from sim.config import GeneratedArenaConfig, TaskConfig
+from sim.suites import load_suite, suite_for, suite_named, suite_names
+from workers.checkpoints import read_checkpoint, read_manifest, read_policy
+from workers.cli import app
+from workers.config import PpoConfig, TrainingConfig
+from workers.errors import ArchiveIntegrityError
+from workers.evaluation import evaluate
+from workers.export.bundle import export_checkpoint
+from workers.policy import torch_policy
+from workers.reference.build import BestCheckpoint, build, main
+from workers.reference.figures import figures
+from workers.reference.library import FOLDER, ReferencePolicy, baselines, reference_policies, reference_policy
+from workers.reference.recipes import RECIPES, Recipe, recipe
+from workers.reporting import EpisodeResult, EvaluationResult, Outcome
+
+POLICIES = [pytest.param(policy, id=policy.card.name) for policy in reference_policies()]
+# Another processor rounds otherwise, and an episode on the edge may end otherwise.
+ODD_EPISODES = 0.02
+
+
+def episode(outcome: Outcome, steps: int = 10, path: float = 2.0, shortest: float = 2.0) -> EpisodeResult:
+    return EpisodeResult(
+        outcome=outcome, steps=steps, reward=1.0, path_length=path, shortest_path=shortest, min_clearance=0.5
+    )
+
+
+def test_every_recipe_ships_with_its_policy() -> None:
+    assert [policy.card.name for policy in reference_policies()] == [each.name for each in RECIPES]
+    assert {path.name for path in FOLDER.iterdir()} == {each.name for each in RECIPES}
+    assert sum(file.stat().st_size for file in FOLDER.rglob("*") if file.is_file()) < 2**20
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_a_card_tells_what_was_trained_and_how(policy: ReferencePolicy) -> None:
+    card, manifest, made_from = policy.card, read_manifest(policy.archive), recipe(policy.card.name)
+    assert (card.training, card.seed, card.step) == (manifest.training, manifest.seed, manifest.step)
+    assert (card.title, card.description, card.training, card.seed) == (
+        made_from.title,
+        made_from.description,
+        made_from.training,
+        made_from.seed,
+    )
+    assert card.command == f"python -m workers.reference.build {card.name}"
+    assert tuple(result.suite for result in card.results) == made_from.suites
+    assert made_from.suites[0] == suite_for(made_from.training.task).name
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_figures_are_those_of_the_episodes_on_the_suite_of_today(policy: ReferencePolicy) -> None:
+    for result in policy.card.results:
+        evaluation = policy.evaluation(result.suite)
+        assert evaluation.suite_hash == result.suite_hash == suite_named(result.suite, policy.card.training.task).hash
+        assert result.figures == figures(evaluation.episodes, policy.card.training.task.arrival_distance)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_evaluating_a_policy_again_gives_its_recorded_result(policy: ReferencePolicy) -> None:
+    manifest, numpy_policy = read_policy(policy.archive)
+    act = torch_policy(numpy_policy.network, numpy_policy.weights)
+    name = policy.card.results[0].suite
+    again = evaluate(act, manifest.training.task, suite_named(name, manifest.training.task)).episodes
+    recorded = policy.evaluation(name).episodes
+    odd = sum((one.outcome, one.steps) != (other.outcome, other.steps) for one, other in zip(again, recorded, strict=True))
+    assert odd <= ODD_EPISODES * len(recorded)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_a_policy_leaves_the_house_as_it_was_trained(policy: ReferencePolicy) -> None:
+    report = export_checkpoint(policy.archive).report
+    assert report.rows == 1000
+    assert report.policy_difference <= 1e-5
+
+
+def test_a_policy_is_not_for_resuming() -> None:
+    with pytest.raises(ArchiveIntegrityError, match="cannot be resumed"):
+        read_checkpoint(reference_policy("simple").archive)
+
+
+def test_baselines_are_those_of_the_suites_of_today() -> None:
+    hashes = {name: load_suite(name).hash for name in suite_names()}
+    hashes |= {result.suite: result.suite_hash for policy in reference_policies() for result in policy.card.results}
+    for baseline in baselines().baselines:
+        assert {result.suite: result.suite_hash for result in baseline.results} == hashes
+    task, suite = TaskConfig(), load_suite("complex-200")
+    recorded = {baseline.name: baseline.results for baseline in baselines().baselines}["go-to-goal"]
+    again = figures(evaluate(go_to_goal(task), task, suite).episodes, task.arrival_distance)
+    (found,) = (result.figures for result in recorded if result.suite == suite.name)
+    assert found.success == pytest.approx(again.success, abs=ODD_EPISODES)
+    assert found.spl == pytest.approx(again.spl, abs=ODD_EPISODES)
+
+
+def test_figures_by_hand() -> None:
+    episodes = [
+        episode("arrival", steps=10, path=3.6, shortest=2.0),
+        episode("arrival", steps=20, path=1.0, shortest=2.0),
+        episode("collision"),
+        episode("timeout"),
+    ]
+    found = figures(episodes, arrival_distance=0.2)
+    # Paths end at the arrival circle: 1.8 m of 3.6 m, and a path that is shorter than the shortest counts as 1.
+    assert found.spl == pytest.approx((0.5 + 1.0) / 4)
+    assert (found.success, found.collision, found.timeout, found.steps) == (0.5, 0.25, 0.25, 15.0)
+    assert found.success_low < 0.5 < found.success_high
+    assert figures([episode("timeout")], 0.2).steps is None
+
+
+def test_the_best_checkpoint_arrives_most_often_then_soonest() -> None:
+    def result(*episodes: EpisodeResult) -> EvaluationResult:
+        return EvaluationResult(suite="s", suite_hash="h", episodes=episodes)
+
+    best = BestCheckpoint()
+    for step, evaluation in enumerate(
+        [
+            None,
+            result(episode("timeout"), episode("timeout")),
+            result(episode("arrival", 30), episode("arrival", 30)),
+            result(episode("arrival", 20), episode("arrival", 30)),
+            result(episode("arrival", 1), episode("collision", 1)),
+        ]
+    ):
+        best.checkpoint(step, Path(f"{step}.zip"), evaluation)
+    assert (best.step, best.archive) == (3, Path("3.zip"))
+
+
+def test_the_same_recipe_gives_the_same_files(tmp_path: Path) -> None:
+    tiny = Recipe(
+        name="tiny",
+        title="Tiny",
+        description="Too short to learn anything.",
+        training=TrainingConfig(
+            task=TaskConfig(arena=GeneratedArenaConfig(name="rooms", maps=2)),
+            steps=2_000,
+            algorithm=PpoConfig(robots=32, rollout_steps=16, minibatch_size=128, epochs=1),
+        ),
+        seed=3,
+        # The first is drawn for its arena, the second is frozen.
+        suites=("rooms-0.5-200", "simple-200"),
+    )
+    assert suite_for(tiny.training.task).name == tiny.suites[0]
+    for folder in ("one", "two"):
+        build(tiny, tmp_path / folder)
+    one, two = ({path.name: path.read_bytes() for path in (tmp_path / name / "tiny").iterdir()} for name in ("one", "two"))
+    assert one.keys() == {"policy.zip", "card.json", "rooms-0.5-200.json", "simple-200.json"}
+    assert one == two
+
+
+@pytest.mark.parametrize(("arguments", "answer"), [([], "name at least one policy"), (["nobody"], "choose one of")])
+def test_what_to_build_has_to_be_named(arguments: list[str], answer: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert answer in capsys.readouterr().err
+
+
+def test_the_command_lists_and_copies(tmp_path: Path) -> None:
+    listed = CliRunner().invoke(app, ["policies", "list"])
+    assert listed.exit_code == 0
+    for policy in reference_policies():
+        assert f"{policy.card.name}: {policy.card.description}" in listed.output
+        for result in policy.card.results:
+            assert f"{result.suite}: {result.figures.success:.1%} success" in listed.output
+    copied = CliRunner().invoke(app, ["policies", "export", "simple", "--out", str(tmp_path / "mine.zip")])
+    assert copied.exit_code == 0
+    assert (tmp_path / "mine.zip").read_bytes() == reference_policy("simple").archive.read_bytes()
+    unknown = CliRunner().invoke(app, ["policies", "export", "nobody"])
+    assert unknown.exit_code == 1
+    assert "choose one of" in unknown.output

@@ -1,0 +1,189 @@
+"""Trains reference policies from their recipes, measures them, and writes the files that ship.
+
+    python -m workers.reference.build NAME ...     # these policies
+    python -m workers.reference.build --baselines  # what they are compared with
+
+The same recipe gives the same files on the same machine; another processor rounds otherwise, and trains another policy.
+"""
+
+import argparse
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pydantic import BaseModel
+
+from sim.baselines import go_to_goal, random_policy
+from sim.config import TaskConfig
+from sim.dwa import dynamic_window
+from sim.suites import EpisodeTable, Suite, load_suite, run_controller, run_suite, suite_named, suite_names
+from workers.checkpoints import copy_policy, read_policy
+from workers.evaluation import evaluate, to_result
+from workers.frames import Frame
+from workers.policy import torch_policy
+from workers.reference.figures import figures
+from workers.reference.library import (
+    ARCHIVE,
+    BASELINES,
+    CARD,
+    FOLDER,
+    Baseline,
+    Baselines,
+    Card,
+    SuiteFigures,
+)
+from workers.reference.recipes import RECIPES, Recipe, recipe
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.trainer import train
+
+_TASK = TaskConfig()
+CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {
+    "random": lambda suite: run_suite(random_policy(), _TASK, suite),
+    "go-to-goal": lambda suite: run_suite(go_to_goal(_TASK), _TASK, suite),
+    "dynamic window": lambda suite: run_controller(dynamic_window(_TASK), _TASK, suite),
+}
+"""The baselines, of the default task: what each does in a suite."""
+
+_COMMAND = "python -m workers.reference.build"
+_DECIMALS = 4  # of lengths and rewards in the files: tenths of a millimetre
+
+
+class BestCheckpoint:
+    """A reporter that remembers the best of a training's checkpoints: most arrivals, then fewest steps, then the newest."""
+
+    def __init__(self) -> None:
+        self.archive: Path | None = None
+        self.step = 0
+        self._merit = (-1.0, 0.0)
+
+    def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        """Not of interest."""
+
+    def event(self, step: int, level: EventLevel, message: str) -> None:
+        """Not of interest."""
+
+    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
+        """See `Reporter.checkpoint`."""
+        if evaluation is None:
+            return
+        arrived = [episode.steps for episode in evaluation.episodes if episode.outcome == "arrival"]
+        merit = (evaluation.success_rate, -sum(arrived) / len(arrived) if arrived else float("-inf"))
+        if merit >= self._merit:
+            self.archive, self.step, self._merit = archive, step, merit
+
+    def frames(self, frames: Sequence[Frame]) -> None:
+        """Nobody watches."""
+
+    @property
+    def watch(self) -> WatchRequest | None:
+        """Nobody watches."""
+        return None
+
+    @property
+    def stop_requested(self) -> bool:
+        """Never."""
+        return False
+
+
+def build(made_from: Recipe, folder: Path = FOLDER) -> Card:
+    """Trains a policy and writes its files into `folder`/NAME, whatever was there before."""
+    target = folder / made_from.name
+    with TemporaryDirectory() as scratch:
+        best = BestCheckpoint()
+        train(made_from.training, made_from.seed, best, Path(scratch))
+        assert best.archive is not None  # every training ends with an evaluation
+        shutil.rmtree(target, ignore_errors=True)
+        target.mkdir(parents=True)
+        copy_policy(best.archive, target / ARCHIVE)
+        # Checkpoints are their owner's alone; these are everybody's.
+        (target / ARCHIVE).chmod(0o644)
+    manifest, policy = read_policy(target / ARCHIVE)
+    task = manifest.training.task
+    act = torch_policy(policy.network, policy.weights)
+    results = []
+    for name in made_from.suites:
+        result = _rounded(evaluate(act, task, suite_named(name, task)))
+        _write(target / f"{name}.json", result)
+        results.append(_suite_figures(result, task))
+    card = Card(
+        name=made_from.name,
+        title=made_from.title,
+        description=made_from.description,
+        command=f"{_COMMAND} {made_from.name}",
+        training=made_from.training,
+        seed=made_from.seed,
+        step=best.step,
+        results=tuple(results),
+    )
+    _write(target / CARD, card, indent=2)
+    return card
+
+
+def measure_baselines(path: Path = BASELINES) -> Baselines:
+    """Drives the controllers that need no training through every suite, frozen or a recipe's, and writes how they did."""
+    drawn = {name: suite_named(name, each.training.task) for each in RECIPES for name in each.suites}
+    suites = [*map(load_suite, suite_names()), *(suite for name, suite in drawn.items() if name not in suite_names())]
+    measured = Baselines(
+        command=f"{_COMMAND} --baselines",
+        baselines=tuple(
+            Baseline(name=name, results=tuple(_suite_figures(to_result(drive(suite), suite), _TASK) for suite in suites))
+            for name, drive in CONTROLLERS.items()
+        ),
+    )
+    _write(path, measured, indent=2)
+    return measured
+
+
+def _suite_figures(result: EvaluationResult, task: TaskConfig) -> SuiteFigures:
+    return SuiteFigures(
+        suite=result.suite, suite_hash=result.suite_hash, figures=figures(result.episodes, task.arrival_distance)
+    )
+
+
+def _rounded(result: EvaluationResult) -> EvaluationResult:
+    episodes = tuple(
+        episode.model_copy(
+            update={
+                name: round(getattr(episode, name), _DECIMALS)
+                for name in ("reward", "path_length", "shortest_path", "min_clearance")
+            }
+        )
+        for episode in result.episodes
+    )
+    return result.model_copy(update={"episodes": episodes})
+
+
+def _write(path: Path, content: BaseModel, indent: int | None = None) -> None:
+    path.write_text(content.model_dump_json(indent=indent) + "\n", encoding="utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    known = ", ".join(each.name for each in RECIPES)
+    parser = argparse.ArgumentParser(prog=_COMMAND, description="Train, measure and write reference policies.")
+    # No `choices`: Python 3.11 would look for the empty list among them.
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"Which policies: {known}.")
+    parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with.")
+    options = parser.parse_args(arguments)
+    try:
+        recipes = [recipe(name) for name in options.names]
+    except KeyError as error:
+        parser.error(error.args[0])
+    if not recipes and not options.baselines:
+        parser.error(f"name at least one policy: {known}")
+    if options.baselines:
+        measure_baselines()
+    for made_from in recipes:
+        card = build(made_from)
+        for result in card.results:
+            found = result.figures
+            sys.stdout.write(
+                f"{card.name}, step {card.step:,}, {result.suite}: {found.success:.1%} success "
+                f"[{found.success_low:.1%}, {found.success_high:.1%}], SPL {found.spl:.2f}\n"
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""What each reference policy is trained from: the one table to change (pydantic only)."""
+
+from sim.config import Frozen, GeneratedArenaConfig, LidarConfig, TaskConfig
+from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
+from workers.presets import COMPLEX, DEFAULT
+
+
+class Recipe(Frozen):
+    """A training, and the suites that its policy is measured on.
+
+    Attributes:
+        name: of its folder and its address.
+        title: for people.
+        description: what it is good for, in a sentence or two.
+        training: what is trained; its best checkpoint on the training's own suite is kept.
+        seed: of the training.
+        suites: by name, the training's own first; the others are frozen ones.
+    """
+
+    name: str
+    title: str
+    description: str
+    training: TrainingConfig
+    seed: int
+    suites: tuple[str, ...]
+
+
+RECIPES: tuple[Recipe, ...] = (
+    Recipe(
+        name="simple",
+        title="Simple arena",
+        description="The default training: five seconds on one core.",
+        training=DEFAULT.training,
+        seed=0,
+        suites=("simple-200",),
+    ),
+    Recipe(
+        name="complex",
+        title="Complex arena",
+        description="The preset for 17 obstacles: half a minute on one core; clutter-500 is all new to it.",
+        training=COMPLEX.training,
+        seed=0,
+        suites=("complex-200", "clutter-500"),
+    ),
+    Recipe(
+        name="clutter",
+        title="Anywhere",
+        description="Trained on 1,024 maps of dense clutter with a scanner that looks all round, for places that it has "
+        "never seen: three minutes on one core.",
+        training=TrainingConfig(
+            task=TaskConfig(
+                arena=GeneratedArenaConfig(name="clutter", difficulty=0.9, maps=1024),
+                lidar=LidarConfig(rays=60, batches=30, field_of_view=360.0),
+            ),
+            algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128))),
+            steps=4_000_000,
+            evaluation=EvaluationConfig(every_steps=250_000),
+        ),
+        seed=0,
+        suites=("clutter-0.9-200", "clutter-500", "barn-20", "crowd-200", "complex-200"),
+    ),
+)
+
+
+def recipe(name: str) -> Recipe:
+    """The recipe of that name.
+
+    Raises:
+        KeyError: there is none; the message names those that exist.
+    """
+    for candidate in RECIPES:
+        if candidate.name == name:
+            return candidate
+    raise KeyError(f"no reference policy {name!r}: choose one of {', '.join(each.name for each in RECIPES)}")
