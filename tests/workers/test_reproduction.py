@@ -1,7 +1,8 @@
-"""The campaign covers the paper's tables, continues where it was, and says no more than its seeds can carry."""
+"""The paper's tables as trainings, the curves that come of them, and verdicts that say no more than the seeds can carry."""
 
+import math
 from collections.abc import Sequence
-from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -9,22 +10,74 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.config import TaskConfig
-from workers.config import EvaluationConfig, MlpNetwork, PpoConfig
-from workers.reproduction.campaign import RESULT, RunResult, drive, reproduce, reproduce_one
-from workers.reproduction.report import report
-from workers.reproduction.rows import CLAIMS, ROWS, Row, TableRow
-from workers.reproduction.verdict import bootstrap_difference, judge
+from workers.drives import drive
+from workers.reproduction.claims import CLAIMS, Claim, Comparison, Safety
+from workers.reproduction.curves import band, binned
+from workers.reproduction.drawing import draw_curves
+from workers.reproduction.pace import Share, seconds_left
+from workers.reproduction.results import SeedResult, Trained, learned_at, row_spread
+from workers.reproduction.rows import FIGURES, ROW_BY_ID, ROWS, STEPS, TABLES, scaled
+from workers.reproduction.table import METRICS, TableRow
+from workers.reproduction.verdict import judge, judge_all
+
+LEARNED_AT = 100_000
 
 
-def measured(*successes: float) -> list[TableRow]:
-    return [TableRow(reward=10.0, episodes=90, success=success, steps=111.0) for success in successes]
+def seeds(
+    *successes: float, reward: float = 10.0, steps: float = 111.0, collisions: float = 0.0, learned: int | None = LEARNED_AT
+) -> list[SeedResult]:
+    return [
+        SeedResult(
+            seed=seed,
+            steps=STEPS,
+            measured=TableRow(reward=reward, episodes=90, success=success, collisions=collisions, steps=steps),
+            learned_at=learned,
+        )
+        for seed, success in enumerate(successes)
+    ]
 
 
-def test_every_claim_compares_rows_that_exist() -> None:
-    rows = {row.id: row for row in ROWS}
-    assert len(rows) == len(ROWS) == 6
-    for claim in CLAIMS:
-        assert rows[claim.better].paper.success > rows[claim.worse].paper.success, "as the paper has it"
+def claim(identifier: str) -> Claim:
+    return next(one for one in CLAIMS if one.id == identifier)
+
+
+# --- what the paper says ---
+
+
+def test_the_tables_hold_every_row_and_multiply_to_about_ten_thousand_steps() -> None:
+    assert {row for table in TABLES for row in table.rows} == set(ROW_BY_ID)
+    assert [len(table.rows) for table in TABLES] == [3, 2, 3]
+    for row in ROWS:
+        assert 9_400 < row.paper.episodes * row.paper.steps < 10_010
+
+
+def test_every_comparison_is_one_that_the_papers_own_figures_make() -> None:
+    assert len({one.id for one in CLAIMS}) == len(CLAIMS)
+    for one in CLAIMS:
+        if isinstance(one, Comparison):
+            better, worse = ROW_BY_ID[one.better].paper, ROW_BY_ID[one.worse].paper
+            assert {
+                "success": better.success > worse.success,
+                "reward": (better.reward or 0) > (worse.reward or 0),
+                "steps": better.steps < worse.steps,
+                "learned_at": True,  # a curve without numbers
+            }[one.measure], one.id
+
+
+def test_all_methods_of_a_figure_get_the_same_steps() -> None:
+    for figure in FIGURES:
+        assert {ROW_BY_ID[row].training.steps for row in figure.rows} == {STEPS}
+
+
+def test_a_trial_has_a_part_of_the_steps_and_as_many_evaluations() -> None:
+    training = ROWS[0].training
+    trial = scaled(training, 0.1)
+    assert (trial.steps, trial.evaluation.every_steps) == (60_000, 2_500)
+    assert trial.model_copy(update={"steps": STEPS, "evaluation": training.evaluation}) == training
+    assert scaled(training, 1e-4).steps == 1_000
+
+
+# --- verdicts ---
 
 
 @pytest.mark.parametrize(
@@ -33,59 +86,149 @@ def test_every_claim_compares_rows_that_exist() -> None:
         ((0.99, 0.98, 0.97, 0.99, 0.98), (0.80, 0.82, 0.79, 0.85, 0.81), "holds"),
         ((0.80, 0.82, 0.79, 0.85, 0.81), (0.99, 0.98, 0.97, 0.99, 0.98), "does not hold"),
         ((1.0, 1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0, 1.0), "does not hold"),  # no difference to speak of
+        ((0.999, 0.999, 0.999, 0.999, 0.998), (0.996, 0.996, 0.996, 0.997, 0.996), "does not hold"),  # sure, and too small
         ((0.70, 0.95, 0.80, 0.90, 0.75), (0.72, 0.93, 0.85, 0.78, 0.80), "can't be told"),
         ((1.0, 1.0, 1.0, 1.0), (0.3, 0.3, 0.3, 0.3), "can't be told"),  # four seeds
     ],
 )
-def test_words_for_claims(better: Sequence[float], worse: Sequence[float], word: str) -> None:
-    claim = CLAIMS[0]
-    verdict = judge(claim, {claim.better: measured(*better), claim.worse: measured(*worse)})
-    assert verdict.word == word
+def test_words_for_a_comparison(better: Sequence[float], worse: Sequence[float], word: str) -> None:
+    one = claim("simple-success-vanilla")
+    assert isinstance(one, Comparison)
+    assert judge(one, {one.better: seeds(*better), one.worse: seeds(*worse)}).word == word
+
+
+def test_the_reason_has_the_difference_and_its_interval() -> None:
+    """Means 0.93 and 0.83; variances 0.00025 each over five: error 0.01, 8 degrees of freedom, 2.306 errors either way."""
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    results = {one.better: seeds(0.91, 0.92, 0.93, 0.94, 0.95), one.worse: seeds(0.81, 0.82, 0.83, 0.84, 0.85)}
+    verdict = judge(one, results)
+    assert verdict.reason == "10.0 points more, 95 % interval [+7.7, +12.3], all of it in favour of the claim."
+    assert verdict.evidence == "The paper: 59 of 63 against 59 of 87 with one seed each, p < 0.001 (Fisher's exact test)."
+    assert verdict.rows == (one.better, one.worse)
+
+
+def test_fewer_steps_are_better() -> None:
+    one = claim("complex-slower")
+    assert isinstance(one, Comparison)
+    quick, slow = seeds(1, 1, 1, 1, 1, steps=100.0), seeds(1, 1, 1, 1, 1, steps=150.0)
+    verdict = judge(one, {one.better: quick, one.worse: slow})
+    assert verdict.word == "holds"
+    assert verdict.reason.startswith("50.0 steps per episode fewer, 95 % interval [+50.0, +50.0]")
+    assert judge(one, {one.better: slow, one.worse: quick}).reason.startswith("50.0 steps per episode more")
+
+
+def test_who_never_learned_counts_as_having_learned_at_the_end() -> None:
+    one = claim("simple-converges-vanilla")
+    assert isinstance(one, Comparison)
+    learned, never = seeds(1, 1, 1, 1, 1), seeds(0, 0, 0, 0, 0, learned=None)
+    verdict = judge(one, {one.better: learned, one.worse: never})
+    assert verdict.word == "holds"
+    assert verdict.reason.startswith("500,000 training steps fewer")
+    assert judge(one, {one.better: never, one.worse: never}).reason.startswith("No seed of either reached 90%")
+
+
+@pytest.mark.parametrize(
+    ("rates", "word"),
+    [
+        ((0.0, 0.0, 0.0, 0.0, 0.0), "holds"),
+        ((0.10, 0.12, 0.08, 0.11, 0.09), "does not hold"),
+        ((0.0, 0.0, 0.05, 0.0, 0.0), "can't be told"),
+    ],
+)
+def test_safety_is_at_most_one_collision_in_a_hundred_attempts(rates: Sequence[float], word: str) -> None:
+    one = claim("safe")
+    assert isinstance(one, Safety)
+    results = {one.row: [seed for rate in rates for seed in seeds(1.0 - rate, collisions=rate)]}
+    assert judge(one, results).word == word
+
+
+def test_without_results_nothing_can_be_told() -> None:
+    verdicts = judge_all({})
+    assert {verdict.word for verdict in verdicts} == {"can't be told"}
+    assert len(verdicts) == len(CLAIMS)
+    assert verdicts[0].reason == "No seed of 5 done."
 
 
 @given(st.lists(st.floats(0, 1), min_size=5, max_size=8), st.lists(st.floats(0, 1), min_size=5, max_size=8))
-def test_interval_holds_the_difference_and_turns_with_it(better: list[float], worse: list[float]) -> None:
-    low, high = bootstrap_difference(better, worse)
-    assert low - 1e-9 <= np.mean(better) - np.mean(worse) <= high + 1e-9
-    mirrored = bootstrap_difference(worse, better)
-    assert mirrored == pytest.approx((-high, -low), abs=0.05)
+def test_a_claim_and_its_opposite_never_both_hold(better: list[float], worse: list[float]) -> None:
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    there = judge(one, {one.better: seeds(*better), one.worse: seeds(*worse)}).word
+    back = judge(one, {one.better: seeds(*worse), one.worse: seeds(*better)}).word
+    assert {there, back} in ({"holds", "does not hold"}, {"does not hold"}, {"can't be told"})
+
+
+# --- figures ---
 
 
 def test_drive_counts_as_the_tables_do() -> None:
     """A robot that stands still: a time-out every 500 steps, no progress, no reward."""
-    still = drive(lambda observations: np.zeros((len(observations), 2), np.float32), TaskConfig(), drives=3, steps=1_500)
-    assert still == TableRow(reward=0.0, episodes=3.0, success=0.0, steps=500.0)
+    still = drive(lambda seen: np.zeros((len(seen), 2), np.float32), TaskConfig(), drives=3, steps=1_500)
+    assert still == TableRow(reward=0.0, episodes=3.0, success=0.0, collisions=0.0, steps=500.0)
+    assert set(still.metrics()) == set(METRICS)
+    assert TableRow.from_metrics(still.metrics() | {"eval/return": 1.0}) == still
+    assert TableRow.from_metrics({"eval/return": 1.0}) is None
 
 
-def tiny_row() -> Row:
-    row = ROWS[1]
-    algorithm = PpoConfig(network=MlpNetwork(hidden_sizes=(8,)), robots=32, rollout_steps=16, minibatch_size=256, epochs=1)
-    training = row.training.model_copy(
-        update={"algorithm": algorithm, "steps": 2_000, "evaluation": EvaluationConfig(every_steps=1_000)}
-    )
-    return row.model_copy(update={"training": training})
+def test_the_papers_rows_have_no_collisions_to_report() -> None:
+    assert "table/collisions" not in ROWS[0].paper.metrics()
+    assert TableRow.from_metrics(ROWS[0].paper.metrics()) is None
 
 
-def test_done_work_is_not_done_again(tmp_path: Path) -> None:
-    row = tiny_row()
-    first = reproduce_one(row, 0, tmp_path)
-    (archive,) = (tmp_path / row.id / "seed-0").glob("step-*.zip")
-    assert archive.name == "step-2048.zip"  # the last one only
-    # Trained, but killed before the result was written: nothing is trained again, and the result is the same.
-    (tmp_path / row.id / "seed-0" / RESULT).unlink()
-    before = archive.stat().st_mtime_ns
-    assert reproduce_one(row, 0, tmp_path) == first
-    assert archive.stat().st_mtime_ns == before
-    archive.unlink()
-    assert reproduce_one(row, 0, tmp_path) == first  # from the result alone
+def test_spread_over_seeds_stays_within_what_can_be() -> None:
+    """Mean 0.98, deviation 0.02 over five: 2.776 x 0.02 / sqrt(5) = 0.0248 either way, cut at 1."""
+    spread = row_spread(seeds(0.96, 0.96, 0.98, 1.0, 1.0))
+    assert spread is not None
+    assert spread.success.low == pytest.approx(0.98 - 0.02483, abs=1e-5)
+    assert spread.success.high == 1.0
+    assert row_spread(seeds(0.5)) is not None
+    assert row_spread([]) is None
 
 
-def test_campaign_runs_rows_side_by_side_and_reports(tmp_path: Path) -> None:
-    row, told = tiny_row(), list[RunResult]()
-    results = reproduce(tmp_path, seeds=2, jobs=2, rows=[row], on_result=told.append)
-    assert sorted(result.seed for result in told) == [0, 1]
-    assert len(results[row.id]) == 2
-    page = report(results, "mapless reproduce", "2026-01-01")
-    assert "| PPO | paper | 3.34 | 23 | 30.43 | 419.69 |" in page
-    assert "ours, 2 seeds" in page
-    assert page.count("**Can't be told**") == len(CLAIMS)
+def test_learned_at_the_first_evaluation_that_is_good_enough() -> None:
+    assert learned_at([10, 20, 30], [0.5, 0.9, 0.8]) == 20
+    assert learned_at([10, 20], [0.5, 0.89]) is None
+
+
+def test_bins_average_and_bridge_gaps_only_between_points() -> None:
+    edges = np.array([0.0, 10, 20, 30, 40, 50])
+    curve = binned([12, 18, 35, 99], [1.0, 3.0, 6.0, 9.0], edges)
+    np.testing.assert_allclose(curve, [np.nan, 2.0, 4.0, 6.0, np.nan])
+    mean, low, high = band(np.array([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]]))
+    np.testing.assert_allclose(mean, [2.0, 5.0, np.nan])
+    # Two seeds, one degree of freedom: 12.706 x sqrt(2) / sqrt(2).
+    np.testing.assert_allclose(high - mean, [12.706, 0.0, np.nan], atol=1e-3)
+    np.testing.assert_allclose(mean - low, high - mean)
+
+
+def test_the_picture_draws_each_seed_and_the_mean_of_every_row_that_was_trained() -> None:
+    curve = (1.0, 50.0, 1_700.0)
+    trained = [Trained(result=one, curve_steps=(4_096, 300_000, STEPS), curve=curve) for one in seeds(0.9, 0.8)]
+    svg = ElementTree.fromstring(draw_curves({"complex-basic-ddpg": trained}))
+    paths = [path.attrib for path in svg.iter("{http://www.w3.org/2000/svg}path")]
+    # In two figures; each mean has its mark in the legend as well.
+    assert sum(path["class"].startswith("seed") for path in paths) == 2 * 2
+    assert sum(path["class"].startswith("mean") for path in paths) == 2 * 2
+    assert not any("nan" in path["d"] for path in paths)
+    assert "not trained" in ElementTree.tostring(svg, encoding="unicode")
+
+
+# --- time ---
+
+
+def test_time_left_starts_from_what_is_known_and_follows_what_is_seen() -> None:
+    fresh = [Share(expected=60.0, done=0.0)] * 4
+    assert seconds_left(fresh, side_by_side=2) == 120.0
+    assert seconds_left([Share(expected=60.0, done=0.0)], side_by_side=2) == 60.0, "one training has one core"
+    # Half the work took twice as long as foreseen, and so will the rest.
+    half = [Share(expected=60.0, done=1.0, spent=120.0)] * 2 + [Share(expected=60.0, done=0.0)] * 2
+    assert seconds_left(half, side_by_side=2) == 120.0
+    assert seconds_left([Share(expected=60.0, done=1.0, spent=60.0)], side_by_side=2) == 0.0
+
+
+@given(st.lists(st.tuples(st.floats(1, 1e4), st.floats(0, 1), st.floats(0, 1e5)), min_size=1), st.integers(1, 64))
+def test_time_left_is_a_time(parts: list[tuple[float, float, float]], side_by_side: int) -> None:
+    left = seconds_left([Share(expected=e, done=d, spent=s) for e, d, s in parts], side_by_side)
+    assert math.isfinite(left)
+    assert left >= 0.0

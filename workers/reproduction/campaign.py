@@ -1,153 +1,229 @@
 """The campaign on this machine: every row with every seed, several side by side, continued where it was interrupted."""
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context
+from multiprocessing.synchronize import Event
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
-import numpy as np
-import torch
+from sim.config import Frozen
+from sim.errors import SimError
+from workers.errors import InterruptedCampaignError, TrainingError
+from workers.processes import die_with_parent
+from workers.reproduction.pace import Share, seconds_left
+from workers.reproduction.results import Progress, Trained
+from workers.reproduction.rows import ROWS, Row, scaled
 
-from sim.config import Frozen, TaskConfig
-from sim.vector_env import NavigationVectorEnv
-from workers.checkpoints import read_policy
-from workers.errors import ArchiveError
-from workers.frames import Frame
-from workers.live.viewing import PolicyFunction
-from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.reproduction.rows import EPISODES_STEPS, ROWS, Row, TableRow
-from workers.trainer import train
-
-RESULT = "result.json"
-
-# One drive of 10,000 steps, as the paper's, holds about 90 attempts: ten of them are a fairer sample.
-DRIVES = 10
-# Of the drives' own starts and targets, apart from every training's.
-_DRIVE_SEED = 1_000_003
+_TIME = "campaign.json"
+# Numbers that a process tells of its training: before, done, seconds.
+_TOLD = 3
+_TICK_SECONDS = 0.5
 
 
-class RunResult(Frozen):
-    """One row with one seed, trained and measured."""
+class SeedDone(Frozen):
+    """One row with one seed: trained, or failed for a reason."""
 
     row: str
     seed: int
-    measured: TableRow
+    trained: Trained | None
+    error: str | None = None
 
 
-class Quiet:
-    """A reporter of trainings that nobody follows one by one."""
+class Tick(Frozen):
+    """How a campaign stands.
 
-    watch: WatchRequest | None = None
-    stop_requested = False
-
-    def metrics(self, step: int, values: Mapping[str, float]) -> None:
-        """Not kept."""
-
-    def event(self, step: int, level: EventLevel, message: str) -> None:
-        """Not kept."""
-
-    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
-        """Drops what came before: only the last one is needed to go on, and to measure."""
-        for other in archive.parent.glob("step-*.zip"):
-            if other != archive:
-                other.unlink()
-
-    def frames(self, frames: Sequence[Frame]) -> None:
-        """Not kept."""
-
-
-def drive(policy: PolicyFunction, task: TaskConfig, drives: int = DRIVES, steps: int = EPISODES_STEPS) -> TableRow:
-    """Measures a policy as the paper's tables do: target after target, for a number of steps.
-
-    Args:
-        policy: deterministic.
-        task: what it was trained for.
-        drives: robots, each alone.
-        steps: of each.
-
-    Returns:
-        Figures of one drive, the mean of all of them.
+    Attributes:
+        finished: trainings that are through.
+        trainings: all of them.
+        done: part of the work, 0 to 1.
+        seconds_left: to the end, about.
     """
-    env = NavigationVectorEnv(task, drives, seed=_DRIVE_SEED, copy=False)
-    observations, _ = env.reset(seed=_DRIVE_SEED)
-    outcomes, reward = np.zeros(4, np.int64), 0.0
-    for _ in range(steps):
-        observations, rewards, _, _, _ = env.step(policy(observations))
-        outcomes += np.bincount(env.outcomes, minlength=4)
-        reward += float(rewards.sum())
-    episodes = max(1, int(outcomes[1:].sum()))
-    return TableRow(
-        reward=reward / (drives * steps),
-        episodes=episodes / drives,
-        success=int(outcomes[1]) / episodes,
-        steps=drives * steps / episodes,
-    )
+
+    finished: int
+    trainings: int
+    done: float
+    seconds_left: float
 
 
-def reproduce_one(row: Row, seed: int, directory: Path) -> RunResult:
-    """Trains and measures one row with one seed in a folder of its own; done work is not done again."""
-    folder = directory / row.id / f"seed-{seed}"
-    done = folder / RESULT
-    if done.exists():
-        return RunResult.model_validate_json(done.read_text())
-    train(row.training, seed, Quiet(), folder, _last_checkpoint(folder))
-    archive = _last_checkpoint(folder)
-    assert archive is not None, "a completed training leaves a checkpoint"
-    torch.set_num_threads(1)
-    result = RunResult(row=row.id, seed=seed, measured=drive(read_policy(archive)[1], row.training.task))
-    partial = done.with_suffix(".part")
-    partial.write_text(result.model_dump_json(indent=2))
-    partial.replace(done)
-    return result
+class Outcome(Frozen):
+    """A campaign that is through.
+
+    Attributes:
+        done: every row with every seed, by row and seed.
+        seeds: of each row.
+        effort: part of the rows' training steps.
+        seconds: wall time, that of interrupted attempts included.
+    """
+
+    done: tuple[SeedDone, ...]
+    seeds: int
+    effort: float
+    seconds: float
+
+    def of_row(self, row: str) -> list[Trained]:
+        """The row's trainings that did not fail, by seed."""
+        return [one.trained for one in self.done if one.row == row and one.trained is not None]
+
+
+class _Time(Frozen):
+    seconds: float = 0.0
 
 
 def reproduce(
-    directory: Path, seeds: int, jobs: int, rows: Sequence[Row] = ROWS, on_result: Callable[[RunResult], None] | None = None
-) -> dict[str, list[TableRow]]:
-    """Runs every row with seeds 0 to `seeds` - 1, `jobs` at a time.
+    directory: Path,
+    seeds: int,
+    jobs: int,
+    *,
+    effort: float = 1.0,
+    rows: Sequence[Row] = ROWS,
+    on_done: Callable[[SeedDone], None] = lambda _: None,
+    on_tick: Callable[[Tick], None] = lambda _: None,
+) -> Outcome:
+    """Runs every row with seeds 0 to `seeds` - 1.
 
     Args:
         directory: of the campaign; one that was interrupted goes on where it was.
         seeds: of each row.
-        jobs: processes, one thread each.
+        jobs: trainings side by side, one process and one thread each.
+        effort: part of the rows' training steps, above 0, at most 1; below 1 it is a trial.
         rows: which.
-        on_result: told of each result as it comes.
+        on_done: told of each training as it ends.
+        on_tick: told twice a second how things stand.
 
-    Returns:
-        Results by row, in the order of seeds.
+    Raises:
+        InterruptedCampaignError: Ctrl-C was pressed, or a process was killed.
+        OtherTrainingError: the directory is that of another campaign.
     """
-    found: dict[tuple[str, int], TableRow] = {}
-    for result in _results(directory, seeds, jobs, rows):
-        found[result.row, result.seed] = result.measured
-        if on_result is not None:
-            on_result(result)
-    return {row.id: [found[row.id, seed] for seed in range(seeds)] for row in rows}
+    directory.mkdir(parents=True, exist_ok=True)
+    spent = directory / _TIME
+    before = _Time.model_validate_json(spent.read_text()) if spent.exists() else _Time()
+    begun = time.monotonic()
+    # Seed by seed: the first intervals can be looked at early.
+    tasks = [(row, seed) for seed in range(seeds) for row in rows]
+    try:
+        found = {(one.row, one.seed): one for one in _run(directory, tasks, effort, jobs, on_done, on_tick)}
+    finally:
+        spent.write_text(_Time(seconds=before.seconds + time.monotonic() - begun).model_dump_json())
+    return Outcome(
+        done=tuple(found[row.id, seed] for row in rows for seed in range(seeds)),
+        seeds=seeds,
+        effort=effort,
+        seconds=before.seconds + time.monotonic() - begun,
+    )
 
 
-def _results(directory: Path, seeds: int, jobs: int, rows: Sequence[Row]) -> Iterator[RunResult]:
+def _run(
+    directory: Path,
+    tasks: Sequence[tuple[Row, int]],
+    effort: float,
+    jobs: int,
+    on_done: Callable[[SeedDone], None],
+    on_tick: Callable[[Tick], None],
+) -> Iterator[SeedDone]:
     # A fresh interpreter for each process: torch's threads do not survive a fork.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        pending: set[Future[RunResult]] = {
-            pool.submit(reproduce_one, row, seed, directory) for seed in range(seeds) for row in rows
+    context = get_context("spawn")
+    told, stop = context.Array("d", _TOLD * len(tasks), lock=False), context.Event()
+    shared = (told, stop, os.getpid())
+    with (
+        ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_start, initargs=shared) as pool,
+        _on_interrupt(stop),
+    ):
+        pending: set[Future[SeedDone | None]] = {
+            pool.submit(_work, index, directory / row.id / f"seed-{seed}", row, seed, effort)
+            for index, (row, seed) in enumerate(tasks)
         }
-        try:
-            while pending:
-                finished, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    yield future.result()
-        finally:
-            for future in pending:
-                future.cancel()
+        finished = 0
+        while pending:
+            ended, pending = wait(pending, timeout=_TICK_SECONDS, return_when=FIRST_COMPLETED)
+            if stop.is_set():
+                for future in pending:
+                    future.cancel()
+                pending = {future for future in pending if not future.cancelled()}
+            for one in filter(None, map(_result, ended)):
+                finished += 1
+                on_done(one)
+                yield one
+            on_tick(_tick(told, [row.seconds * effort for row, _ in tasks], finished, jobs))
+        if finished < len(tasks):
+            raise InterruptedCampaignError("interrupted: the same command goes on where it was")
 
 
-def _last_checkpoint(folder: Path) -> Path | None:
-    """The newest archive that is whole."""
-    archives = {int(match[1]): path for path in folder.glob("step-*.zip") if (match := re.search(r"step-(\d+)", path.name))}
-    for step in sorted(archives, reverse=True):
-        try:
-            read_policy(archives[step])
-        except ArchiveError:
-            continue
-        return archives[step]
-    return None
+def _result(future: "Future[SeedDone | None]") -> SeedDone | None:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise InterruptedCampaignError(
+            "a training's process was killed, perhaps for want of memory: the same command goes on where it was, with fewer "
+            "jobs it needs less"
+        ) from error
+
+
+def _tick(told: Any, expected: Sequence[float], finished: int, jobs: int) -> Tick:
+    trainings = [Progress(before=told[at], done=told[at + 1], seconds=told[at + 2]) for at in range(0, len(told), _TOLD)]
+    shares = [
+        # What was done in an earlier attempt is no part of what is timed in this one.
+        Share(
+            expected=seconds * (1.0 - one.before),
+            done=(one.done - one.before) / (1.0 - one.before) if one.before < 1.0 else 1.0,
+            spent=one.seconds,
+        )
+        for one, seconds in zip(trainings, expected, strict=True)
+    ]
+    done = sum(one.done * seconds for one, seconds in zip(trainings, expected, strict=True)) / sum(expected)
+    return Tick(finished=finished, trainings=len(trainings), done=done, seconds_left=seconds_left(shares, jobs))
+
+
+@contextmanager
+def _on_interrupt(stop: Event) -> Iterator[None]:
+    """Ctrl-C asks the trainings to write a checkpoint and end; a second one interrupts at once."""
+
+    def ask(_signal: int, _frame: FrameType | None) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    previous = signal.signal(signal.SIGINT, ask)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+# --- in the processes ---
+
+_told: Any
+_stop: Event
+
+
+def _start(told: Any, stop: Event, parent: int) -> None:
+    global _told, _stop
+    die_with_parent(parent)
+    # Ctrl-C reaches the whole terminal; ending in order is the campaign's decision.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _told, _stop = told, stop
+
+
+def _work(index: int, folder: Path, row: Row, seed: int, effort: float) -> SeedDone | None:
+    # Only here: the process that waits for the others needs no torch.
+    from workers.reproduction.training import train_in
+
+    def tell(progress: Progress) -> None:
+        _told[_TOLD * index : _TOLD * (index + 1)] = [progress.before, progress.done, progress.seconds]
+
+    if _stop.is_set():
+        return None
+    try:
+        trained = train_in(folder, scaled(row.training, effort), seed, tell, _stop.is_set)
+    except (TrainingError, SimError) as error:
+        return SeedDone(row=row.id, seed=seed, trained=None, error=str(error))
+    if trained is None:
+        return None
+    if not _told[_TOLD * index + 2]:
+        tell(Progress(before=1.0, done=1.0, seconds=0.0))
+    return SeedDone(row=row.id, seed=seed, trained=trained)

@@ -1,66 +1,150 @@
-"""A campaign's result as a page of Markdown: the paper and ours side by side, and a sentence for each claim."""
+"""A campaign's result as a page of Markdown: the paper and ours side by side, curves, and a sentence for each claim."""
 
-from collections.abc import Mapping, Sequence
-from itertools import groupby
-from statistics import fmean
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
 
-from workers.reproduction.rows import ROWS, Row, TableRow
-from workers.reproduction.verdict import Verdict, judge_all
+from workers.reproduction.campaign import Outcome
+from workers.reproduction.drawing import draw_curves
+from workers.reproduction.results import LEARNED, SeedResult, Spread, row_spread
+from workers.reproduction.rows import ROW_BY_ID, ROWS, STEPS, TABLES, Row, Table
+from workers.reproduction.verdict import LEAST_SEEDS, Verdict, Word, judge_all
 
-_HEAD = "| method | | reward per step | episodes | success % | steps per episode |\n|---|---|---|---|---|---|"
+_HEAD = (
+    "| method | | avg. reward | episodes | success % | steps per episode | collisions % | success % of each seed |\n"
+    "|---|---|---|---|---|---|---|---|"
+)
+_PICTURE = Path("images") / "reproduction.svg"
+
+_MEASURED = f"""\
+Ours: the mean over seeds and its 95 % interval (Student's t). Every training has {STEPS:,} environment steps. A seed
+is its last policy, driven deterministically: ten robots, 10,000 steps each, target after target, as in the paper's
+tables; an episode is one target attempt, and a figure is that of one drive."""
+
+_CURVES = f"""\
+![Reward of a target attempt over training steps, in the paper's arrangement]({_PICTURE.as_posix()})
+
+Reward summed over a target attempt while training, exploration included, by environment steps. Thin: seeds. Bold:
+their mean. Band: its 95 % interval. The paper's own curves have no numbers that could be laid beside them."""
+
+_JUDGED = f"""\
+A comparison is judged by the difference of two means over seeds and its 95 % interval (Welch's t), from {LEAST_SEEDS}
+seeds on. It *holds* or *does not hold* where the whole interval lies on one side of zero; it *does not hold* either
+where the whole interval is smaller than what matters (1 point of success, 0.1 of reward, 1 step per episode);
+otherwise it *can't be told*. Convergence is the first evaluation on the frozen suite with {LEARNED:.0%} success. With
+so many comparisons at 95 %, about one interval in twenty misses the truth."""
+
+_PLURALS: dict[Word, str] = {"holds": "hold", "does not hold": "do not hold", "can't be told": "can't be told"}
 
 
-def report(results: Mapping[str, Sequence[TableRow]], command: str, date: str) -> str:
-    """The page.
+def write_report(page: Path, outcome: Outcome, command: str, date: str, machine: str) -> None:
+    """Writes the page, and its picture into `images/` beside it.
 
     Args:
-        results: one for each seed, by row.
-        command: that made them.
+        page: a Markdown file.
+        outcome: of the campaign.
+        command: that made it.
         date: when, as ISO 8601.
+        machine: on what, in a few words.
     """
+    picture = page.parent / _PICTURE
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    picture.write_text(draw_curves({row.id: outcome.of_row(row.id) for row in ROWS}))
+    page.write_text(report(outcome, command, date, machine))
+
+
+def report(outcome: Outcome, command: str, date: str, machine: str) -> str:
+    """The page; see `write_report`."""
+    results = {row.id: [trained.result for trained in outcome.of_row(row.id)] for row in ROWS}
+    verdicts = judge_all(results)
+    words = Counter(verdict.word for verdict in verdicts)
+    told = ", ".join(f"{words[word]} {plural}" for word, plural in _PLURALS.items())
+    summary = f"**Of the paper's {len(verdicts)} claims: {told}.**"
     lines = [
         "# The paper, reproduced",
         "",
-        f"Made by `{command}` on {date}. Ours: the mean over seeds, and in brackets the least and the greatest seed.",
-        "Each seed is measured by ten deterministic drives of 10,000 steps, target after target, as in the paper's tables.",
+        f"Made by `{command}` on {date}: {len(outcome.done)} trainings in {_duration(outcome.seconds)} on {machine}.",
+        "The same campaign is a button of the service's *Paper* page.",
+        "",
+        summary,
+        *_warnings(outcome),
+        "",
+        "## Tables",
+        "",
+        _MEASURED,
     ]
-    for table, rows in groupby(ROWS, key=lambda row: row.table):
-        lines += ["", f"## {table}", "", _HEAD]
-        for row in rows:
-            lines += [_paper(row), _ours(row, results.get(row.id, ()))]
-    lines += ["", "## The claims", "", *(_sentence(verdict) for verdict in judge_all(results)), ""]
+    for table in TABLES:
+        lines += ["", f"### {table.title}", "", _HEAD, *_rows(table, results)]
+    lines += [
+        "",
+        "## Learning curves",
+        "",
+        _CURVES,
+        "",
+        "## Claims",
+        "",
+        _JUDGED,
+        "",
+        *(_sentence(verdict) for verdict in verdicts),
+        "",
+    ]
     return "\n".join(lines)
 
 
-def _paper(row: Row) -> str:
+def _warnings(outcome: Outcome) -> list[str]:
+    failed = [
+        f"- {ROW_BY_ID[one.row].id} with seed {one.seed} failed and is left out: {one.error}"
+        for one in outcome.done
+        if one.error is not None
+    ]
+    trial = [
+        "",
+        f"A trial with {outcome.effort:.3g} of the training steps: its figures say nothing of the paper's.",
+    ]
+    return [*(trial if outcome.effort < 1.0 else []), *(["", *failed] if failed else [])]
+
+
+def _rows(table: Table, results: dict[str, list[SeedResult]]) -> list[str]:
+    lines = []
+    for row, label in zip(table.rows, table.labels, strict=True):
+        lines += [_paper(ROW_BY_ID[row], label), _ours(results[row])]
+    return lines
+
+
+def _paper(row: Row, label: str) -> str:
     figures = row.paper
-    reward = "not given" if figures.reward is None else f"{figures.reward:.2f}"
-    return (
-        f"| {row.method} | paper | {reward} | {figures.episodes:.0f} | {100 * figures.success:.2f} | {figures.steps:.2f} |"
-    )
+    reward = "–" if figures.reward is None else f"{figures.reward:.2f}"
+    success = f"{100 * figures.success:.2f}"
+    return f"| {label} | paper | {reward} | {figures.episodes:.0f} | {success} | {figures.steps:.2f} | – | {success} |"
 
 
-def _ours(row: Row, seeds: Sequence[TableRow]) -> str:
-    if not seeds:
-        return "| | ours | not run | | | |"
+def _ours(seeds: Sequence[SeedResult]) -> str:
+    spread = row_spread(seeds)
+    if spread is None:
+        return "| | ours | not trained | | | | | |"
     cells = (
-        _spread([seed.reward or 0.0 for seed in seeds], 2),
-        _spread([seed.episodes for seed in seeds], 0),
-        _spread([100 * seed.success for seed in seeds], 2),
-        _spread([seed.steps for seed in seeds], 1),
+        _spread(spread.reward, 2),
+        _spread(spread.episodes, 1),
+        _spread(spread.success, 1, 100.0),
+        _spread(spread.steps, 1),
+        _spread(spread.collisions, 1, 100.0),
+        ", ".join(f"{100 * seed.measured.success:.1f}" for seed in seeds),
     )
-    return f"| | ours, {len(seeds)} seeds | {' | '.join(cells)} |"
+    return f"| | ours, {'1 seed' if len(seeds) == 1 else f'{len(seeds)} seeds'} | {' | '.join(cells)} |"
 
 
-def _spread(values: Sequence[float], decimals: int) -> str:
-    return f"{fmean(values):.{decimals}f} [{min(values):.{decimals}f}, {max(values):.{decimals}f}]"
+def _spread(spread: Spread, decimals: int, factor: float = 1.0) -> str:
+    mean = f"**{factor * spread.mean:.{decimals}f}**"
+    if spread.low is None or spread.high is None:
+        return mean
+    return f"{mean} [{factor * spread.low:.{decimals}f}, {factor * spread.high:.{decimals}f}]"
 
 
 def _sentence(verdict: Verdict) -> str:
-    figures = ""
-    if verdict.difference is not None and verdict.low is not None and verdict.high is not None:
-        figures = (
-            f" Difference {100 * verdict.difference:+.1f} points, 95 % interval "
-            f"[{100 * verdict.low:+.1f}, {100 * verdict.high:+.1f}]."
-        )
-    return f"- {verdict.claim.statement} **{verdict.word.capitalize()}**: {verdict.reason}.{figures}"
+    parts = [f"- **{verdict.word.capitalize()}:** {verdict.statement} *({verdict.source})* {verdict.reason}"]
+    return " ".join([*parts, *filter(None, (verdict.evidence, verdict.reading))])
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    return f"{seconds:.0f} s" if minutes < 1 else f"{minutes} min"

@@ -1,4 +1,6 @@
-"""The rows of the paper's three tables, as the paper has them and as trainings of ours (pydantic only)."""
+"""The rows of the paper's three tables, as the paper has them and as trainings of ours, and its figures (pydantic only)."""
+
+from collections.abc import Mapping
 
 from sim.config import ArenaConfig, Frozen, RewardConfig, TaskConfig
 from workers.config import (
@@ -6,29 +8,24 @@ from workers.config import (
     DdpgConfig,
     EvaluationConfig,
     MlpNetwork,
-    PpoConfig,
     ResBlockNetwork,
     TrainingConfig,
 )
+from workers.presets import paper_ppo
+from workers.reproduction.table import TableRow
 
-EPISODES_STEPS = 10_000
-"""A table's row is one drive of about this many steps: in it, episodes x steps per episode is about 10,000."""
+STEPS = 600_000
+"""Environment steps of every training: the paper does not give its own, so all methods get the same."""
 
+EVALUATE_EVERY = 25_000
+"""Environment steps between two looks at the frozen suite: how finely speed of learning is told."""
 
-class TableRow(Frozen):
-    """What a table says of one method, over one drive of about `EPISODES_STEPS` steps.
-
-    Attributes:
-        reward: mean per step; None where the paper gives none.
-        episodes: target attempts.
-        success: part of them that arrived, 0 to 1.
-        steps: steps per episode, however it ended.
-    """
-
-    reward: float | None
-    episodes: float
-    success: float
-    steps: float
+# One drive of 10,000 steps, as the paper's, holds about 90 attempts: ten of them are a fairer sample.
+_DRIVES = 10
+# A checkpoint of DDPG holds its replay memory, so only every 200,000 steps keep one.
+_EVALUATIONS_PER_CHECKPOINT = 8
+# The least that a training and its evaluations may be scaled down to.
+_LEAST_STEPS = 1_000
 
 
 class Row(Frozen):
@@ -36,26 +33,25 @@ class Row(Frozen):
 
     Attributes:
         id: stable name, also of its folder in a campaign.
-        table: arena and reward, as the paper groups them.
         method: as the paper calls it.
         paper: the paper's figures.
         training: ours.
+        seconds: of one such training on one core, about; where a campaign's time is estimated before it has begun.
     """
 
     id: str
-    table: str
     method: str
     paper: TableRow
     training: TrainingConfig
+    seconds: float
 
 
-# The published learning rate; the other hyperparameters are not given, and are ours.
-_RESBLOCK = PpoConfig(network=ResBlockNetwork(), learning_rate=3e-4, learning_rate_schedule="constant")
-_VANILLA = PpoConfig(network=MlpNetwork(hidden_sizes=(64, 64)), learning_rate=3e-4, learning_rate_schedule="constant")
+_RESBLOCK = paper_ppo(ResBlockNetwork())
+_VANILLA = paper_ppo(MlpNetwork(hidden_sizes=(64, 64)))
 _DDPG = DdpgConfig()
 
 
-def _training(arena: str, reward: str, algorithm: Algorithm, steps: int) -> TrainingConfig:
+def _training(arena: str, reward: str, algorithm: Algorithm) -> TrainingConfig:
     return TrainingConfig(
         task=TaskConfig(
             arena=ArenaConfig.model_validate({"name": arena}),
@@ -63,84 +59,153 @@ def _training(arena: str, reward: str, algorithm: Algorithm, steps: int) -> Trai
             reward=RewardConfig.model_validate({"name": reward}),
         ),
         algorithm=algorithm,
-        steps=steps,
-        evaluation=EvaluationConfig(every_steps=100_000),
+        steps=STEPS,
+        evaluation=EvaluationConfig(
+            every_steps=EVALUATE_EVERY, evaluations_per_checkpoint=_EVALUATIONS_PER_CHECKPOINT, drives=_DRIVES
+        ),
     )
 
 
 ROWS: tuple[Row, ...] = (
     Row(
         id="simple-basic-resblock-ppo",
-        table="Simple arena, basic reward",
         method="ResBlock PPO",
         paper=TableRow(reward=17.49, episodes=90, success=1.0, steps=111.11),
-        training=_training("simple", "basic", _RESBLOCK, 500_000),
+        training=_training("simple", "basic", _RESBLOCK),
+        seconds=70,
     ),
     Row(
         id="simple-basic-vanilla-ppo",
-        table="Simple arena, basic reward",
-        method="PPO",
+        method="Vanilla PPO",
         paper=TableRow(reward=3.34, episodes=23, success=0.3043, steps=419.69),
-        training=_training("simple", "basic", _VANILLA, 500_000),
+        training=_training("simple", "basic", _VANILLA),
+        seconds=15,
     ),
     Row(
         id="simple-basic-ddpg",
-        table="Simple arena, basic reward",
         method="DDPG",
         paper=TableRow(reward=12.65, episodes=65, success=0.9846, steps=144.92),
-        training=_training("simple", "basic", _DDPG, 100_000),
+        training=_training("simple", "basic", _DDPG),
+        seconds=100,
     ),
     Row(
         id="complex-basic-ddpg",
-        table="Complex arena, basic reward",
         method="DDPG",
         paper=TableRow(reward=11.23, episodes=63, success=0.9365, steps=158.73),
-        training=_training("complex", "basic", _DDPG, 200_000),
+        training=_training("complex", "basic", _DDPG),
+        seconds=100,
     ),
     Row(
         id="complex-basic-resblock-ppo",
-        table="Complex arena, basic reward",
         method="ResBlock PPO",
         paper=TableRow(reward=9.07, episodes=87, success=0.6781, steps=114.94),
-        training=_training("complex", "basic", _RESBLOCK, 600_000),
+        training=_training("complex", "basic", _RESBLOCK),
+        seconds=70,
     ),
     Row(
         id="complex-advanced-resblock-ppo",
-        table="Complex arena, advanced reward",
         method="ResBlock PPO",
         paper=TableRow(reward=None, episodes=74, success=0.8513, steps=134.81),
-        training=_training("complex", "clearance", _RESBLOCK, 600_000),
+        training=_training("complex", "clearance", _RESBLOCK),
+        seconds=70,
     ),
 )
 
-
-class Claim(Frozen):
-    """A comparison that the paper makes: the success of one row is above that of another."""
-
-    statement: str
-    better: str
-    worse: str
+ROW_BY_ID: Mapping[str, Row] = {row.id: row for row in ROWS}
 
 
-CLAIMS: tuple[Claim, ...] = (
-    Claim(
-        statement="In the simple arena ResBlock PPO arrives more often than plain PPO.",
-        better="simple-basic-resblock-ppo",
-        worse="simple-basic-vanilla-ppo",
+class Table(Frozen):
+    """A table of the paper.
+
+    Attributes:
+        id: stable name.
+        title: arena and reward.
+        rows: their ids, in the paper's order.
+        labels: of the rows, as this table tells them apart.
+    """
+
+    id: str
+    title: str
+    rows: tuple[str, ...]
+    labels: tuple[str, ...]
+
+
+TABLES: tuple[Table, ...] = (
+    Table(
+        id="simple-basic",
+        title="Simple arena, basic reward",
+        rows=("simple-basic-resblock-ppo", "simple-basic-vanilla-ppo", "simple-basic-ddpg"),
+        labels=("ResBlock PPO", "Vanilla PPO", "DDPG"),
     ),
-    Claim(
-        statement="In the simple arena ResBlock PPO arrives more often than DDPG.",
-        better="simple-basic-resblock-ppo",
-        worse="simple-basic-ddpg",
+    Table(
+        id="complex-basic",
+        title="Complex arena, basic reward",
+        rows=("complex-basic-ddpg", "complex-basic-resblock-ppo"),
+        labels=("DDPG", "ResBlock PPO"),
     ),
-    Claim(
-        statement="In the complex arena with the basic reward DDPG arrives more often than ResBlock PPO.",
-        better="complex-basic-ddpg",
-        worse="complex-basic-resblock-ppo",
-    ),
-    Claim(
-        statement="In the complex arena the advanced reward makes ResBlock PPO arrive more often.",
-        better="complex-advanced-resblock-ppo",
-        worse="complex-basic-resblock-ppo",
+    Table(
+        id="complex-advanced",
+        title="Complex arena, advanced reward",
+        rows=("complex-basic-ddpg", "complex-advanced-resblock-ppo", "complex-basic-resblock-ppo"),
+        labels=("DDPG, basic reward", "ResBlock PPO, advanced reward", "ResBlock PPO, basic reward"),
     ),
 )
+"""The third repeats both rows of the second."""
+
+
+def title(row: Row) -> str:
+    """What a person knows the row by: 'ResBlock PPO, simple arena, basic reward'."""
+    setting = next(table.title for table in TABLES if row.id in table.rows)
+    return f"{row.method}, {setting[0].lower()}{setting[1:]}"
+
+
+class Figure(Frozen):
+    """Learning curves that the paper draws into one picture.
+
+    Attributes:
+        id: stable name, also of a file.
+        title: what the paper calls it.
+        rows: whose curves it shows.
+    """
+
+    id: str
+    title: str
+    rows: tuple[str, ...]
+
+
+FIGURES: tuple[Figure, ...] = (
+    Figure(
+        id="simple-basic",
+        title="Simple arena, basic reward",
+        rows=("simple-basic-resblock-ppo", "simple-basic-vanilla-ppo", "simple-basic-ddpg"),
+    ),
+    Figure(
+        id="complex-basic",
+        title="Complex arena, basic reward",
+        rows=("complex-basic-resblock-ppo", "complex-basic-ddpg"),
+    ),
+    Figure(id="complex-ddpg", title="DDPG, complex arena, basic reward", rows=("complex-basic-ddpg",)),
+    Figure(
+        id="complex-advanced",
+        title="ResBlock PPO, complex arena, advanced reward",
+        rows=("complex-advanced-resblock-ppo",),
+    ),
+)
+"""In the paper's order; it puts the last two side by side."""
+
+CURVE = "train/return"
+"""The metric of those curves: reward of a target attempt in training, summed; the paper calls it cumulative reward."""
+
+
+def scaled(training: TrainingConfig, effort: float) -> TrainingConfig:
+    """The training with a part of its steps and evaluated as often: a trial, whose figures say nothing of the paper's.
+
+    Args:
+        training: of a row.
+        effort: above 0, at most 1.
+    """
+    if effort == 1.0:
+        return training
+    every = max(_LEAST_STEPS, round(training.evaluation.every_steps * effort))
+    evaluation = training.evaluation.model_copy(update={"every_steps": every})
+    return training.model_copy(update={"steps": max(_LEAST_STEPS, round(training.steps * effort)), "evaluation": evaluation})

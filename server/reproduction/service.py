@@ -1,0 +1,143 @@
+"""Launches, reads, stops and resumes campaigns."""
+
+import time
+from collections.abc import Callable, Sequence
+from threading import Lock
+
+from sqlalchemy.orm import Session
+
+from server import models
+from server.errors import ConflictError
+from server.events.bus import Change
+from server.experiments.repository import ExperimentRepository
+from server.ids import new_id
+from server.metrics.points import Points
+from server.metrics.repository import MetricRepository
+from server.reproduction.schemas import CampaignCreate, CampaignSummary, Reproduction
+from server.reproduction.views import campaign_view, reproduction_view
+from server.runs import states
+from server.runs.repository import RunRepository
+from server.runs.service import RunService, resume_run, stop_run
+from server.runs.states import Occasion
+from server.runs.views import EVAL_SUCCESS
+from server.services import Services
+from server.system.service import workers_lately
+from workers.protocol import queue_of
+from workers.reproduction.rows import ROWS, Row, scaled, title
+from workers.reproduction.table import METRICS
+
+# PostgreSQL would let two launches through that look at the same moment; one server process serves an installation.
+_LAUNCH = Lock()
+
+
+class ReproductionService:
+    """What a person may do with the paper's reproduction."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._runs = RunService(services)
+
+    def get(self, campaign_id: str | None = None) -> Reproduction:
+        """A campaign beside the paper, the newest if none is named; the paper alone before the first.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+        """
+        with self._services.database.read() as session:
+            repository = ExperimentRepository(session)
+            campaigns = [CampaignSummary(id=each, created_at=at) for each, at in repository.campaigns()]
+            workers = len(workers_lately(session))
+            chosen = campaign_id or (campaigns[0].id if campaigns else None)
+            if chosen is None:
+                return reproduction_view((), {}, {}, None, campaigns, workers)
+            experiments = repository.campaign(chosen)
+            done = [run.id for experiment in experiments for run in experiment.runs if run.state == "completed"]
+            return reproduction_view(
+                experiments,
+                RunRepository(session).latest_metrics(done, METRICS),
+                _evaluations(session, done),
+                campaign_view(chosen, experiments, workers, time.time()),
+                campaigns,
+                workers,
+            )
+
+    def launch(self, request: CampaignCreate) -> Reproduction:
+        """Queue every row with every seed, and wake workers for them.
+
+        Raises:
+            ConflictError: a campaign is not finished yet.
+        """
+        campaign = new_id()
+        experiments = [_experiment(row, campaign, request) for row in ROWS]
+        with _LAUNCH, self._services.database.write() as session:
+            repository = ExperimentRepository(session)
+            if repository.unfinished_campaign() is not None:
+                raise ConflictError("A campaign is not finished yet: wait for it, or cancel it first.")
+            for experiment in experiments:
+                repository.add(experiment)
+        # Seed by seed: the first intervals can be looked at early.
+        queues = [queue_of(row.training) for row in ROWS]
+        for runs in zip(*(experiment.runs for experiment in experiments), strict=True):
+            for run, queue in zip(runs, queues, strict=True):
+                self._services.doorbell.ring(run.id, run.attempt, queue)
+        for experiment in experiments:
+            self._services.bus.publish(Change(experiment_id=experiment.id, run_id=None, kind="experiment"))
+        return self.get(campaign)
+
+    def stop(self, campaign_id: str) -> Reproduction:
+        """End every run that has not ended.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+            ConflictError: all of its runs have ended.
+        """
+        for run in self._move(campaign_id, "stop", stop_run, "All runs of this campaign have ended already."):
+            self._runs.announce_stopped(run)
+        return self.get(campaign_id)
+
+    def resume(self, campaign_id: str) -> Reproduction:
+        """Queue every run that was stopped or failed.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+            ConflictError: none of its runs was stopped or has failed.
+        """
+        refusal = "No run of this campaign was stopped or has failed, so there is nothing to go on with."
+        for run in self._move(campaign_id, "resume", resume_run, refusal):
+            self._runs.announce_queued(run)
+        return self.get(campaign_id)
+
+    def _move(
+        self, campaign_id: str, occasion: Occasion, move: Callable[[Session, models.Run], None], refusal: str
+    ) -> Sequence[models.Run]:
+        """The runs that were moved, by seed and then by row."""
+        with self._services.database.write() as session:
+            repository = ExperimentRepository(session)
+            runs = [
+                run
+                for experiment in repository.campaign(campaign_id)
+                for run in repository.lock_runs(experiment.id)
+                if states.allows(run.state, occasion)
+            ]
+            if not runs:
+                raise ConflictError(refusal)
+            runs.sort(key=lambda run: run.seed)
+            for run in runs:
+                move(session, run)
+        return runs
+
+
+def _experiment(row: Row, campaign: str, request: CampaignCreate) -> models.Experiment:
+    return models.Experiment(
+        id=new_id(),
+        name=f"Paper: {title(row)}",
+        training=scaled(row.training, request.effort).model_dump(mode="json"),
+        campaign=campaign,
+        campaign_row=row.id,
+        runs=[models.Run(id=new_id(), seed=seed) for seed in range(request.seeds)],
+    )
+
+
+def _evaluations(session: Session, run_ids: Sequence[str]) -> dict[str, Points]:
+    repository = MetricRepository(session)
+    return {run_id: repository.read(run_id, [EVAL_SUCCESS]).get(EVAL_SUCCESS, Points.joined([])) for run_id in run_ids}

@@ -1,0 +1,162 @@
+"""A campaign's rows and runs as JSON shows them, beside the paper's."""
+
+from collections.abc import Mapping, Sequence
+
+from server import models
+from server.experiments.repository import UNFINISHED, aggregate_state
+from server.metrics.points import Points
+from server.reproduction.schemas import (
+    Campaign,
+    CampaignRow,
+    CampaignRun,
+    CampaignSummary,
+    PaperFigure,
+    PaperTable,
+    Reproduction,
+)
+from workers.config import TrainingConfig
+from workers.reproduction.pace import Share, seconds_left
+from workers.reproduction.results import SeedResult, learned_at, row_spread
+from workers.reproduction.rows import CURVE, FIGURES, ROW_BY_ID, ROWS, TABLES, Row
+from workers.reproduction.table import TableRow
+from workers.reproduction.verdict import LEAST_SEEDS, judge_all
+
+Latest = Mapping[str, Mapping[str, float]]
+"""The newest value of each metric, by run and name."""
+
+
+def reproduction_view(
+    experiments: Sequence[models.Experiment],
+    latest: Latest,
+    evaluations: Mapping[str, Points],
+    campaign: Campaign | None,
+    campaigns: Sequence[CampaignSummary],
+    workers: int,
+) -> Reproduction:
+    """The paper and a campaign, side by side.
+
+    Args:
+        experiments: of the campaign.
+        latest: what its runs have reported of their drives.
+        evaluations: success rates on the frozen suite, by run, of those that are done.
+        campaign: how it stands; None before the first.
+        campaigns: all of them.
+        workers: that are here.
+    """
+    by_row = {experiment.campaign_row: experiment for experiment in experiments}
+    results = {row.id: _results(by_row.get(row.id), latest, evaluations) for row in ROWS}
+    return Reproduction(
+        campaign=campaign,
+        campaigns=list(campaigns),
+        workers=workers,
+        seconds=expected_seconds(max(1, workers)),
+        curve=CURVE,
+        tables=[
+            PaperTable(id=table.id, title=table.title, rows=list(table.rows), labels=list(table.labels)) for table in TABLES
+        ],
+        figures=[PaperFigure(id=figure.id, title=figure.title, rows=list(figure.rows)) for figure in FIGURES],
+        rows=[_row_view(row, by_row.get(row.id), latest, results[row.id]) for row in ROWS],
+        claims=list(judge_all(results)),
+    )
+
+
+def expected_seconds(workers: int) -> float:
+    """That a campaign with as many seeds as claims need takes with so many workers, about."""
+    shares = [Share(expected=row.seconds, done=0.0) for row in ROWS for _ in range(LEAST_SEEDS)]
+    return seconds_left(shares, workers)
+
+
+def campaign_view(campaign_id: str, experiments: Sequence[models.Experiment], workers: int, now: float) -> Campaign:
+    """How a campaign stands.
+
+    Args:
+        campaign_id: its id.
+        experiments: of it, at least one.
+        workers: that are here.
+        now: seconds since the epoch.
+    """
+    runs = [(run, experiment) for experiment in experiments for run in experiment.runs]
+    shares = [_share(run, experiment, now) for run, experiment in runs]
+    # What was stopped or has failed takes no more time.
+    going_on = [
+        share.model_copy(update={"expected": share.expected * share.done, "done": 1.0}) if run.state in _ENDED else share
+        for (run, _), share in zip(runs, shares, strict=True)
+    ]
+    active = any(run.state in UNFINISHED for run, _ in runs)
+    return Campaign(
+        id=campaign_id,
+        created_at=experiments[0].created_at,
+        state=aggregate_state([run.state for run, _ in runs]),
+        seeds=max(len(experiment.runs) for experiment in experiments),
+        effort=_effort(experiments[0]),
+        progress=sum(share.expected * share.done for share in shares) / sum(share.expected for share in shares),
+        seconds_left=seconds_left(going_on, workers) if active and workers else None,
+    )
+
+
+_ENDED = frozenset({"stopped", "failed", "stopping"})
+
+
+def _share(run: models.Run, experiment: models.Experiment, now: float) -> Share:
+    row = _row(experiment)
+    done = _progress(run, TrainingConfig.model_validate(experiment.training))
+    # A run that was taken up more than once has waited in between.
+    timed = run.started_at is not None and run.attempt == 1 and run.state in ("running", "completed")
+    spent = (run.finished_at or now) - run.started_at if timed and run.started_at is not None else None
+    expected = (row.seconds if row else 1.0) * _effort(experiment)
+    return Share(expected=expected, done=done, spent=None if spent is None else max(0.0, spent))
+
+
+def _row(experiment: models.Experiment) -> Row | None:
+    """The row that it trains; None where a later version has dropped it."""
+    return ROW_BY_ID.get(experiment.campaign_row or "")
+
+
+def _effort(experiment: models.Experiment) -> float:
+    row = _row(experiment)
+    return TrainingConfig.model_validate(experiment.training).steps / row.training.steps if row else 1.0
+
+
+def _progress(run: models.Run, training: TrainingConfig) -> float:
+    return 1.0 if run.state == "completed" else min(1.0, run.step / training.steps)
+
+
+def _results(experiment: models.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
+    if experiment is None:
+        return []
+    steps = TrainingConfig.model_validate(experiment.training).steps
+    results = []
+    for run in experiment.runs:
+        measured = _measured(run, latest)
+        if measured is None:
+            continue
+        points = evaluations.get(run.id, Points.joined([]))
+        learned = learned_at(points.steps.tolist(), points.values.tolist())
+        results.append(SeedResult(seed=run.seed, steps=steps, measured=measured, learned_at=learned))
+    return results
+
+
+def _measured(run: models.Run, latest: Latest) -> TableRow | None:
+    return TableRow.from_metrics(latest.get(run.id, {})) if run.state == "completed" else None
+
+
+def _row_view(row: Row, experiment: models.Experiment | None, latest: Latest, results: Sequence[SeedResult]) -> CampaignRow:
+    training = TrainingConfig.model_validate(experiment.training) if experiment else row.training
+    return CampaignRow(
+        id=row.id,
+        method=row.method,
+        paper=row.paper,
+        ours=row_spread(results),
+        experiment_id=experiment.id if experiment else None,
+        runs=[
+            CampaignRun(
+                id=run.id,
+                seed=run.seed,
+                state=run.state,
+                progress=_progress(run, training),
+                error=run.error,
+                measured=_measured(run, latest),
+            )
+            for run in (experiment.runs if experiment else ())
+        ],
+    )
