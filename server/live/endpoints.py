@@ -1,6 +1,7 @@
 """Routes of the live view: its settings, the page inside its frame, and the two sockets of that page."""
 
 import asyncio
+from contextlib import AsyncExitStack
 from functools import partial
 from typing import Annotated
 
@@ -8,20 +9,16 @@ from fastapi import APIRouter, Depends, Request, WebSocket
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
-from server.arenas.references import with_geometry
 from server.errors import NotFoundError
 from server.live.bridge import bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
 from server.live.themes import Theme
+from server.live.watched import Watched, policy_view, watched
 from server.problems import NOT_FOUND
-from server.runs.repository import RunRepository
-from server.runs.schemas import RunDetail
-from server.runs.service import RunService
 from server.services import Services, ServicesDep
 from sim.errors import ArenaError
-from workers.config import TrainingConfig
 
 router = APIRouter(tags=["live"])
 
@@ -34,41 +31,59 @@ _MAX_REASON = 120
 _DISPLAY_SECONDS = 0.25
 
 
-async def _run(run_id: str, services: ServicesDep) -> RunDetail:
-    return await run_in_threadpool(RunService(services).get, run_id)
+async def _watched(run_id: str, services: ServicesDep) -> Watched:
+    return await run_in_threadpool(watched, services, run_id)
 
 
-RunDep = Annotated[RunDetail, Depends(_run)]
+async def _watched_policy(name: str, services: ServicesDep) -> Watched:
+    return await run_in_threadpool(watched, services, policy_view(name))
+
+
+WatchedDep = Annotated[Watched, Depends(_watched)]
+WatchedPolicyDep = Annotated[Watched, Depends(_watched_policy)]
 
 
 @router.get("/api/runs/{run_id}/live", responses=NOT_FOUND)
-async def get_live(run: RunDep, services: ServicesDep) -> LiveState:
+async def get_live(subject: WatchedDep, services: ServicesDep) -> LiveState:
     """What the live view of a run shows, and whether it has anything to show."""
-    return _state(run, services)
+    return _state(subject, services)
 
 
 @router.put("/api/runs/{run_id}/live", responses=NOT_FOUND)
-async def change_live(run: RunDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
+async def change_live(subject: WatchedDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
     """Change what the live view of a run shows, for everyone who watches it."""
-    services.live.configure(run.id, settings)
-    return _state(run, services)
+    services.live.configure(subject.id, settings)
+    return _state(subject, services)
+
+
+@router.get("/api/policies/{name}/live", responses=NOT_FOUND)
+async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep) -> LiveState:
+    """What the live view of a reference policy shows."""
+    return _state(subject, services)
+
+
+@router.put("/api/policies/{name}/live", responses=NOT_FOUND)
+async def change_policy_live(subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
+    """Change what the live view of a reference policy shows, for everyone who watches it."""
+    services.live.configure(subject.id, settings)
+    return _state(subject, services)
 
 
 @router.get("/live/{run_id}/", include_in_schema=False)
-async def choose_theme(run: RunDep, request: Request) -> Response:
+async def choose_theme(subject: WatchedDep, request: Request) -> Response:
     """On to the page in the look that the query asks for."""
     dark = "darkMode" in request.query_params
-    return RedirectResponse(f"/live/{run.id}/dark/?darkMode" if dark else f"/live/{run.id}/light/")
+    return RedirectResponse(f"/live/{subject.id}/dark/?darkMode" if dark else f"/live/{subject.id}/light/")
 
 
 @router.get("/live/{run_id}/{theme}/", include_in_schema=False)
-async def show_page(run: RunDep, theme: Theme, request: Request) -> Response:
+async def show_page(subject: WatchedDep, theme: Theme, request: Request) -> Response:
     """The page inside the live view's frame.
 
     viser's client would connect to any server that `websocket` names, and play any file of `playbackPath`: both can bring
     scripts along, so values that are not the page's own are taken out of the address.
     """
-    path = f"/live/{run.id}/{theme}"
+    path = f"/live/{subject.id}/{theme}"
     query = request.query_params
     servers = query.getlist("websocket")
     foreign = any(not own_websocket(server, request.headers.get("host", ""), path) for server in servers)
@@ -81,12 +96,15 @@ async def show_page(run: RunDep, theme: Theme, request: Request) -> Response:
 @router.websocket("/live/{run_id}/{theme}")
 async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep, theme: Theme = "light") -> None:
     """The socket of viser itself, bridged to the scene of the run; whoever holds it counts as a watcher."""
-    training = await _training(run_id, services)
-    if training is None or VISER_PROTOCOL not in websocket.scope.get("subprotocols", []):
+    subject = await _found(run_id, services)
+    if subject is None or VISER_PROTOCOL not in websocket.scope.get("subprotocols", []):
         await websocket.close(_POLICY_VIOLATION)
         return
     try:
-        async with services.live.watch(run_id, training.task, theme) as view:
+        async with AsyncExitStack() as stack:
+            if subject.save is not None:
+                await stack.enter_async_context(services.drivers.driving(run_id, subject.save))
+            view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme))
             await bridge(websocket, view.port)
     except (TooManyViewsError, ArenaError) as error:
         await websocket.close(_TRY_AGAIN_LATER, str(error)[:_MAX_REASON])
@@ -95,7 +113,7 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
 @router.websocket("/live/{run_id}/{theme}/display")
 async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, services: ServicesDep) -> None:
     """The numbers of the head-up display, a few times a second where they change."""
-    if await _training(run_id, services) is None:
+    if await _found(run_id, services) is None:
         await websocket.close(_POLICY_VIOLATION)
         return
     await websocket.accept()
@@ -117,19 +135,12 @@ async def _wait_for_the_end(websocket: WebSocket) -> None:
         pass
 
 
-async def _training(run_id: str, services: Services) -> TrainingConfig | None:
-    """What the run trains; None if there is no such run."""
-
-    def read() -> TrainingConfig:
-        with services.database.read() as session:
-            training = TrainingConfig.model_validate(RunRepository(session).get(run_id).experiment.training)
-        return with_geometry(training, services.arenas)
-
+async def _found(identifier: str, services: Services) -> Watched | None:
     try:
-        return await run_in_threadpool(read)
+        return await run_in_threadpool(watched, services, identifier)
     except NotFoundError:
         return None
 
 
-def _state(run: RunDetail, services: Services) -> LiveState:
-    return LiveState(**services.live.settings(run.id).model_dump(), status=services.live.status(run.id))
+def _state(subject: Watched, services: Services) -> LiveState:
+    return LiveState(**services.live.settings(subject.id).model_dump(), status=services.live.status(subject.id))

@@ -7,6 +7,8 @@ The hub lives on the server's event loop, and every method is called from there.
     hub.frames(run_id, data)                 # for every binary message, in order; returns at once
     detach()                                 # when the link ends
 
+After a training, `attach_driver` and `driven_frames` are the same for a process that drives by its best policy.
+
 Nobody watches: `on_watch(None)`, and frames that still come are dropped unread.
 """
 
@@ -79,6 +81,7 @@ class _Channel:
 
     settings: LiveSettings = field(default_factory=LiveSettings)
     callbacks: list[WatchCallback] = field(default_factory=list)
+    driver: WatchCallback | None = None
     told: WatchRequest | None = None
     screens: dict[Theme, _Screen] = field(default_factory=dict)
     last_frame: float = float("-inf")
@@ -87,6 +90,11 @@ class _Channel:
     def views(self) -> list[View]:
         """The scenes that somebody looks at."""
         return [screen.view for screen in self.screens.values() if screen.watchers and screen.view is not None]
+
+    @property
+    def connected(self) -> bool:
+        """Whether anybody is there to send frames."""
+        return bool(self.callbacks) or self.driver is not None
 
     def request(self) -> WatchRequest | None:
         return self.settings.watch_request() if self.views else None
@@ -133,6 +141,25 @@ class LiveHub:
 
         return detach
 
+    def attach_driver(self, run_id: str, on_watch: WatchCallback) -> Callable[[], None]:
+        """The same for whoever drives by a finished policy; while a worker is linked, its frames are the ones shown."""
+        channel = self._channel(run_id)
+        channel.driver = on_watch
+        on_watch(channel.request())
+        self._apply(channel)
+
+        def detach() -> None:
+            if channel.driver is on_watch:
+                channel.driver = None
+                self._apply(channel)
+
+        return detach
+
+    def driven_frames(self, run_id: str, data: bytes) -> None:
+        """A frame of the driver has arrived; see `frames`."""
+        if not self._channel(run_id).callbacks:
+            self.frames(run_id, data)
+
     def frames(self, run_id: str, data: bytes | Frame) -> None:
         """A frame has arrived; dropped where nobody watches.
 
@@ -169,7 +196,7 @@ class LiveHub:
         """Whether the live view of this run has anything to show."""
         channel = self._channels.get(run_id, _NOBODY)
         return LiveStatus(
-            connected=bool(channel.callbacks),
+            connected=channel.connected,
             receiving=time.monotonic() - channel.last_frame < RECEIVING_SECONDS,
             watchers=sum(screen.watchers for screen in channel.screens.values()),
         )
@@ -198,8 +225,10 @@ class LiveHub:
         channel = self._channels.get(run_id, _NOBODY)
         screen = channel.screens.get(theme)
         if screen is None or screen.view is None:
-            return Score(state="waiting" if channel.callbacks else "no worker")
-        return screen.view.score()
+            score = Score(state="waiting" if channel.connected else "no worker")
+        else:
+            score = screen.view.score()
+        return score.model_copy(update={"after_training": channel.driver is not None and not channel.callbacks})
 
     async def close(self) -> None:
         """Closes every scene; the hub is of no use afterwards."""
@@ -217,11 +246,11 @@ class LiveHub:
     def _apply(self, channel: _Channel) -> None:
         """Tells the scene and the worker's link where they stand, the latter only what is new to it."""
         for view in channel.views:
-            view.apply(channel.settings, bool(channel.callbacks))
+            view.apply(channel.settings, channel.connected)
         request = channel.request()
         if request != channel.told:
             channel.told = request
-            for on_watch in tuple(channel.callbacks):
+            for on_watch in (*channel.callbacks, *filter(None, [channel.driver])):
                 on_watch(request)
 
     def _start(self, work: Coroutine[Any, Any, _T]) -> asyncio.Task[_T]:

@@ -1,4 +1,4 @@
-"""Low-poly shapes of the scene: a robot in the manner of a TurtleBot3 Burger, rings and beacons. Metres, z up, x ahead."""
+"""Low-poly shapes of the scene: robots like a TurtleBot3 Burger or a Jackal, rings and beacons. Metres, z up, x ahead."""
 
 from dataclasses import dataclass
 
@@ -68,6 +68,33 @@ def shell(radius: float) -> Mesh:
     deck = np.column_stack([0.98 * r * np.cos(half), 0.98 * r * np.sin(half)])
     outline = np.concatenate([deck, [[1.5 * r, 0.0]]])
     return prism(outline, 1.38 * r, 1.58 * r) + prism(circle(0.26 * r, 14, (-0.1 * r, 0.0)), 1.98 * r, 2.06 * r)
+
+
+def box_chassis(half_length: float, half_width: float) -> Mesh:
+    """The dark parts of a robot with a rectangular body: hull, four wheels and the scanner on its neck."""
+    r = min(half_length, half_width)
+    wheel = min(0.45 * r, 0.45 * half_length)
+    mesh = prism(rectangle(0.0, 0.0, half_length, 0.72 * half_width), 0.3 * r, 0.8 * r)
+    for x in (-1.0, 1.0):
+        for y in (-1.0, 1.0):
+            part = _wheel(wheel, y * 0.87 * half_width, 0.13 * half_width)
+            mesh += Mesh(part.vertices + np.array([x * (half_length - wheel), 0.0, 0.0], np.float32), part.faces)
+    return mesh + prism(circle(0.28 * r, 14), 1.05 * r, 1.4 * r)
+
+
+def box_shell(half_length: float, half_width: float) -> Mesh:
+    """The coloured parts of a robot with a rectangular body: the top deck with a nose that points ahead, and a cap."""
+    r = min(half_length, half_width)
+    deck = prism(rectangle(0.0, 0.0, half_length, 0.98 * half_width), 0.92 * r, 1.05 * r)
+    nose = np.array([[half_length, -0.4 * half_width], [half_length + 0.3 * r, 0.0], [half_length, 0.4 * half_width]])
+    return deck + prism(nose, 0.92 * r, 1.05 * r) + prism(circle(0.22 * r, 14), 1.4 * r, 1.48 * r)
+
+
+def mover() -> Mesh:
+    """Something that moves, of radius 1 and 0.6 m tall: a round foot that is as wide as it is, shoulders and a head."""
+    foot = prism(circle(1.0, 28), 0.0, 0.06)
+    body = prism(circle(0.72, 20), 0.06, 0.42)
+    return foot + body + prism(circle(0.42, 16), 0.46, 0.6)
 
 
 def ring(inner: float, outer: float, corners: int = 40) -> Mesh:

@@ -33,10 +33,16 @@ _DIRECTORY = Path(__file__).parent
 @functools.cache
 def live_page(theme: Theme) -> str:
     """The HTML of the live view in one theme."""
+    styles = asset("panels.css") + asset("display.css")
+    head = f"<style>{styles}</style><script>{asset('display.js')}</script>"
+    return viser_page(theme, head, '<div id="display" hidden></div>')
+
+
+def viser_page(theme: Theme, head: str, body: str) -> str:
+    """Viser's client in one theme, with something at the end of its head and at the beginning of its body."""
     client = _viser_client()
-    head = f"<style>{_asset('display.css')}</style><script>{_asset('display.js')}</script></head>"
-    body = f'<body data-theme="{theme}"><div id="display" hidden></div>'
-    return client.replace("</head>", head, 1).replace("<body>", body, 1)
+    client = client.replace("</head>", f"{head}</head>", 1)
+    return client.replace("<body>", f'<body data-theme="{theme}">{body}', 1)
 
 
 def own_websocket(value: str, host: str, path: str) -> bool:
@@ -53,5 +59,6 @@ def _viser_client() -> str:
     return (Path(spec.origin).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A file that goes into the page."""
     return (_DIRECTORY / "assets" / name).read_text(encoding="utf-8")

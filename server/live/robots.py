@@ -8,7 +8,7 @@ from server.live import meshes
 from server.live.continuity import continues, ended
 from server.live.themes import OUTCOMES, Colours, linear, robot_colours
 from server.live.trails import Trails, trail_colours
-from sim.config import TaskConfig
+from sim.config import AnyRobotConfig, TaskConfig
 from sim.lidar import ray_angles
 from workers.frames import Frame
 
@@ -43,7 +43,8 @@ class RobotNodes:
     def __init__(self, server: viser.ViserServer, parent: str, task: TaskConfig, colours: Colours, frame: Frame) -> None:
         robots, rays = frame.ranges.shape
         scene = server.scene
-        radius = task.robot.radius
+        chassis, shell = _body(task.robot)
+        halo = max(task.collision_distance, 1.5 * task.robot.inscribed_radius)
         few = robots <= _FEW
         own = robot_colours(robots)
         still = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (robots, 1))
@@ -72,11 +73,20 @@ class RobotNodes:
                 **look,  # type: ignore[arg-type]
             )
 
-        self._chassis = batch("chassis", meshes.chassis(radius), linear(colours.chassis), flat_shading=True)
-        self._shells = batch("shells", meshes.shell(radius), linear(_LIT * own), flat_shading=True)
+        self._chassis = batch(
+            "chassis",
+            chassis,
+            linear(colours.chassis),
+            flat_shading=True,
+        )
+        self._shells = batch("shells", shell, linear(_LIT * own), flat_shading=True)
         self._halos = batch(
             "halos",
-            meshes.prism(meshes.circle(max(task.collision_distance, 1.5 * radius), 32), 0.021, 0.024),
+            meshes.prism(
+                meshes.circle(halo, 32),
+                0.021,
+                0.024,
+            ),
             linear(_LIT * own),
             opacity=0.4,
             cast_shadow=False,
@@ -244,6 +254,13 @@ class RobotNodes:
             self._flashing = bool(active.any())
             self._rings.batched_scales = np.where(active, 0.15 + 0.55 * np.sqrt(np.clip(age, 0, 1)), 1e-3).astype(np.float32)
             self._rings.batched_opacities = np.where(active, 1.0 - age, 0.0).astype(np.float32)
+
+
+def _body(robot: AnyRobotConfig) -> tuple[meshes.Mesh, meshes.Mesh]:
+    """Dark and coloured parts of a robot."""
+    if robot.half_extents is None:
+        return meshes.chassis(robot.inscribed_radius), meshes.shell(robot.inscribed_radius)
+    return meshes.box_chassis(*robot.half_extents), meshes.box_shell(*robot.half_extents)
 
 
 def _mesh_arguments(mesh: meshes.Mesh) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:

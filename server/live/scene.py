@@ -1,11 +1,12 @@
-"""The scene of one run: light, floor, walls and obstacles, built once, and the robots that come and go in it."""
+"""The scene of one run: light, floor, walls and obstacles, built once, and the robots and movers that come and go in it."""
 
 import numpy as np
 import viser
 
+from server.live.movers import MoverNodes
 from server.live.robots import RobotNodes
 from server.live.themes import COLOURS, Colours, Theme
-from sim.arenas import Arena, build_arena
+from sim.arenas import Arena, arena_clearance, build_arena
 from sim.config import TaskConfig
 from workers.frames import Frame
 
@@ -32,6 +33,7 @@ class Scene:
         self._colours = COLOURS[theme]
         self._rays_visible = True
         self._robots: RobotNodes | None = None
+        self._movers: MoverNodes | None = None
         self._shape: tuple[int, ...] = ()
         self._world = server.scene.add_frame(_WORLD, show_axes=False)
         _light(server, theme, self._colours)
@@ -71,11 +73,17 @@ class Scene:
             self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
             self._robots.show_rays(self._rays_visible)
         self._robots.update(frame, now)
+        if len(frame.movers) != (0 if self._movers is None else len(self._movers)):
+            if self._movers is not None:
+                self._movers.remove()
+            self._movers = MoverNodes(self._server, _WORLD, self._colours, len(frame.movers)) if len(frame.movers) else None
+        if self._movers is not None:
+            self._movers.update(frame)
 
     def _enter(self, index: int) -> None:
         """Builds the arena of that number in the task's pool."""
         self._arena_index = index
-        self._arena = build_arena(self._task.arena, index)
+        self._arena = build_arena(self._task.arena, index, clearance=arena_clearance(self._task))
         self._place = self._server.scene.add_frame(_ARENA, show_axes=False)
         _build(self._server, self._arena, self._colours)
 

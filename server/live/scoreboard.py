@@ -29,6 +29,7 @@ class Score(BaseModel):
         state: no worker runs this training; one does, but no frames come yet; or frames come.
         mode: what is shown.
         step: environment steps of the training behind it.
+        after_training: whether the policy is a finished one.
         speed: simulated seconds per wall second.
         arrivals, collisions, timeouts: attempts of the robots on screen that ended since the view began.
         robots: the first few, or the one that is followed.
@@ -37,6 +38,7 @@ class Score(BaseModel):
     state: ViewState = "waiting"
     mode: ViewMode | None = None
     step: int = 0
+    after_training: bool = False
     speed: float = 1.0
     arrivals: int = 0
     collisions: int = 0

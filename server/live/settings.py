@@ -34,7 +34,7 @@ class LiveStatus(BaseModel):
     """Whether the live view of a run has anything to show.
 
     Attributes:
-        connected: a worker that runs this training is linked to the server.
+        connected: a worker that runs this training is linked to the server, or its finished policy drives.
         receiving: frames have arrived within the last seconds.
         watchers: browsers that watch this run now.
     """

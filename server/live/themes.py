@@ -19,6 +19,7 @@ class Colours:
     section: Rgb
     wall: Rgb
     obstacle: Rgb
+    mover: Rgb
     chassis: Rgb
     ray: Rgb
     hit: Rgb
@@ -38,6 +39,7 @@ COLOURS: dict[Theme, Colours] = {
         section=(48, 55, 71),
         wall=(58, 67, 88),
         obstacle=(72, 83, 108),
+        mover=(186, 176, 160),
         chassis=(92, 100, 116),
         ray=(70, 200, 235),
         hit=(255, 110, 88),
@@ -55,6 +57,7 @@ COLOURS: dict[Theme, Colours] = {
         section=(219, 224, 232),
         wall=(150, 163, 186),
         obstacle=(124, 140, 168),
+        mover=(104, 82, 120),
         chassis=(98, 106, 122),
         ray=(20, 140, 200),
         hit=(232, 62, 40),

@@ -1,36 +1,18 @@
 """The scene of one watched run on a viser server of its own, drawn by one thread thirty times a second."""
 
-import contextlib
 import threading
 import time
-from collections.abc import Iterator
-
-import rich
-import viser
-from viser import _messages
 
 from server.live.camera import CameraRig
 from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
+from server.live.quiet import start_viser, stop_viser
 from server.live.scene import Scene
 from server.live.scoreboard import Score, Scoreboard, ViewState
 from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
 from server.live.themes import Theme
 from sim.config import GeneratedArenaConfig, TaskConfig
+from sim.mover_config import MAX_MOVERS
 from workers.frames import Frame, FrameError
-
-_console = threading.Lock()
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Keeps viser from announcing on the console that a server comes or goes, which it does whatever it is told."""
-    console = rich.get_console()
-    with _console:
-        console.quiet, quiet = True, console.quiet
-        try:
-            yield
-        finally:
-            console.quiet = quiet
 
 
 class LiveView:
@@ -45,11 +27,7 @@ class LiveView:
     """
 
     def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
-        with _silence():
-            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
-            # With these, any browser could open a public tunnel to this port.
-            self._server._websock_server.unregister_handler(message)  # noqa: SLF001
+        self._server = start_viser()
         self._rays = task.lidar.rays
         self._arenas = task.arena.maps if isinstance(task.arena, GeneratedArenaConfig) else 1
         self._scene = Scene(self._server, task, theme)
@@ -78,6 +56,8 @@ class LiveView:
         robots, rays = frame.ranges.shape
         if rays != self._rays or frame.arena >= self._arenas or not 1 <= robots <= MAX_ROBOTS:
             raise FrameError(f"{robots} robots with {rays} rays in arena {frame.arena}: not what this training has")
+        if len(frame.movers) > MAX_MOVERS:
+            raise FrameError(f"{len(frame.movers)} movers: an arena has {MAX_MOVERS} at most, not what this training has")
         with self._lock:
             self._buffer.put(frame)
             self._arrived = time.monotonic()
@@ -101,8 +81,7 @@ class LiveView:
         """Stops the thread and the port; blocks until both are gone."""
         self._stopping.set()
         self._thread.join()
-        with _silence():
-            self._server.stop()
+        stop_viser(self._server)
 
     def _draw(self) -> None:
         tick = time.monotonic()

@@ -245,7 +245,27 @@ def test_a_scene_follows_the_training_into_another_arena() -> None:
         view.close()
 
 
-@pytest.mark.parametrize("other", [{"arena": 1}, {"ranges": np.ones((2, 7), np.float32)}])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_scene_shows_movers_where_they_are_as_wide_as_they_are(theme: Theme) -> None:
+    view = LiveView(TaskConfig(), theme, LiveSettings())
+    nodes = view._server.scene._handle_from_node_name
+    try:
+        for number, movers in enumerate(([], [[1.0, 2.0, 0.25], [-3.0, 0.5, 0.4]], [[0.0, -1.0, 0.5]], [])):
+            frame = dataclasses.replace(make_frame(number), movers=np.array(movers, np.float32).reshape(-1, 3))
+            view._scene.update(frame, float(number))
+            assert ("/world/movers" in nodes) == bool(movers)
+            if movers:
+                drawn: Any = nodes["/world/movers"]
+                np.testing.assert_allclose(drawn.batched_positions[:, :2], frame.movers[:, :2])
+                np.testing.assert_allclose(drawn.batched_scales[:, :2], frame.movers[:, 2:].repeat(2, axis=1))
+    finally:
+        view.close()
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"arena": 1}, {"ranges": np.ones((2, 7), np.float32)}, {"movers": np.ones((17, 3), np.float32)}],
+)
 def test_frames_of_another_task_are_refused(other: dict[str, Any]) -> None:
     view = LiveView(TaskConfig(), "light", LiveSettings())
     try:

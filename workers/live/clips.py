@@ -8,6 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workers.frames import Frame
 
@@ -27,8 +28,8 @@ _LEAP = 1000
 class ClipRecorder:
     """Records on the training's thread; another one takes the frames away.
 
-    A clip shows robots of one arena, the one where most of them are. A robot that starts anew in another arena stays as it
-    was last seen until the clip is over.
+    A clip shows robots of one arena, the one where most of them are, and where something moves of one copy of it. A robot
+    that starts anew elsewhere stays as it was last seen until the clip is over.
 
     Args:
         robots: how many of the training robots to show at most.
@@ -43,7 +44,7 @@ class ClipRecorder:
         self._frames: deque[Frame] = deque()
         self._steps = 0
         self._left = 0
-        self._arena = 0
+        self._place = 0
         self._shown = np.zeros(0, np.intp)
         self._gone = np.zeros(0, np.bool_)
         self._last: Frame | None = None
@@ -65,8 +66,9 @@ class ClipRecorder:
 
     def _begin(self, env: "NavigationVectorEnv") -> None:
         self._left = CLIP_STEPS
-        self._arena = int(np.bincount(env.arena_indices).argmax())
-        shown = np.flatnonzero(env.arena_indices == self._arena)[: self.robots]
+        places = _places(env)
+        self._place = int(np.bincount(places).argmax())
+        shown = np.flatnonzero(places == self._place)[: self.robots]
         if not np.array_equal(shown, self._shown):
             # Other robots: nobody should take this clip for the continuation of the one before.
             self._steps += _LEAP
@@ -75,7 +77,8 @@ class ClipRecorder:
 
     def _frame(self, env: "NavigationVectorEnv", step: int) -> Frame:
         shown, gone = self._shown, self._gone
-        gone |= env.arena_indices[shown] != self._arena
+        gone |= _places(env)[shown] != self._place
+        discs = env.discs[self._place]
         frame = Frame(
             mode="training",
             step=step,
@@ -86,7 +89,8 @@ class ClipRecorder:
             ranges=env.ranges[shown],
             rewards=np.where(env.outcomes[shown] > 0, 0.0, env.attempt_rewards[shown]).astype(np.float32),
             outcomes=self._outcomes[shown],
-            arena=self._arena,
+            arena=self._place % len(env.arenas),
+            movers=discs[discs[:, 2] > 0.0, :3],
         )
         last = self._last
         if last is not None and gone.any():
@@ -104,3 +108,8 @@ class ClipRecorder:
             return self._frames.popleft()
         except IndexError:
             return None
+
+
+def _places(env: "NavigationVectorEnv") -> NDArray[np.int32]:
+    """(N,) where each robot is: robots of the same number drive among the same things."""
+    return env.tiles() if env.discs.shape[1] else env.arena_indices

@@ -68,6 +68,7 @@ class Showcase:
         self._last_outcomes = np.zeros(robots, np.uint8)
         self._begin()
         self._velocities = np.zeros((robots, 2), np.float32)
+        self._moved = np.zeros_like(self._discs[:, :2])
 
     @property
     def robots(self) -> int:
@@ -90,6 +91,9 @@ class Showcase:
             speed: simulated seconds per wall second.
         """
         poses = along_arc(self._poses, self._velocities, self._into)
+        discs = self._discs.copy()
+        discs[:, :2] += self._into / self._period * self._moved
+        movers = discs[discs[:, 2] > 0.0]
         return Frame(
             mode="policy",
             step=step,
@@ -97,17 +101,21 @@ class Showcase:
             speed=speed,
             poses=poses,
             targets=self._targets,
-            ranges=scan(self._env.arenas[0], poses, self._lidar),
+            ranges=scan(self._env.arenas[0], poses, self._lidar, movers=movers),
             rewards=self._rewards,
             outcomes=self._outcomes,
+            movers=movers,
         )
 
     def _step(self, policy: PolicyFunction) -> None:
         """One control step. What is shown during it is how things stood when it began."""
         self._begin()
         actions = np.clip(policy(self._observations), (0.0, -1.0), (1.0, 1.0)).astype(np.float32)
-        self._velocities = actions * self._limits
-        self._observations, *_ = self._env.step(actions)
+        self._observations, _, terminations, truncations, _ = self._env.step(actions)
+        # Late or slow, robots drive otherwise than commanded; of those that stand at a new start, that is all we know.
+        anew = (terminations | truncations)[:, None]
+        self._velocities = np.where(anew, actions * self._limits, self._env.velocities())
+        self._moved = self._env.discs[0, :, 3:].copy()
         ended = self._env.outcomes > 0
         self._last_outcomes[ended] = self._env.outcomes[ended]
 
@@ -118,3 +126,4 @@ class Showcase:
         # A reward that belongs to an attempt that has just ended is history.
         self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()
+        self._discs = env.discs[0, :, :3].copy()

@@ -23,10 +23,10 @@ addEventListener("DOMContentLoaded", () => {
       const rate = score.speed >= 10 ? Math.round(score.speed) : +score.speed.toFixed(1);
       const title = element("div", "title");
       title.append(
-        element("span", "mode", score.mode === "policy" ? "Policy" : "Training"),
+        element("span", "mode", score.after_training ? "Best policy" : score.mode === "policy" ? "Policy" : "Training"),
         element("span", "", score.mode === "policy" ? `${rate}× real time` : `time-lapse, ${rate}×`),
       );
-      parts.push(title, element("div", "step", `step ${count.format(score.step)}`));
+      parts.push(title, element("div", "step", `${score.after_training ? "after training, " : ""}step ${count.format(score.step)}`));
       const tally = element("div", "tally");
       for (const [name, word, value] of [
         ["arrival", "arrived", score.arrivals],
@@ -49,7 +49,7 @@ addEventListener("DOMContentLoaded", () => {
         parts.push(list);
       }
     } else {
-      parts.push(element("div", "waiting", waiting[score.state]));
+      parts.push(element("div", "waiting", score.after_training ? "Starting the best policy …" : waiting[score.state]));
     }
     display.dataset.state = score.state;
     display.replaceChildren(...parts);

@@ -1,0 +1,39 @@
+"""viser servers that keep to themselves: on 127.0.0.1, silent on the console, and closed to wishes for a public tunnel."""
+
+import contextlib
+import threading
+from collections.abc import Iterator
+
+import rich
+import viser
+from viser import _messages
+
+_console = threading.Lock()
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Keeps viser from announcing on the console that a server comes or goes, which it does whatever it is told."""
+    console = rich.get_console()
+    with _console:
+        console.quiet, quiet = True, console.quiet
+        try:
+            yield
+        finally:
+            console.quiet = quiet
+
+
+def start_viser() -> viser.ViserServer:
+    """A server on a free port of 127.0.0.1."""
+    with _silence():
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        # With these, any browser could open a public tunnel to this port.
+        server._websock_server.unregister_handler(message)  # noqa: SLF001
+    return server
+
+
+def stop_viser(server: viser.ViserServer) -> None:
+    """Closes the port; blocks until it is gone."""
+    with _silence():
+        server.stop()

@@ -1,0 +1,63 @@
+"""What a live view may be of: a run, or a policy that ships under 'policy-NAME'."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.arenas.references import with_geometry
+from server.checkpoints.repository import CheckpointRepository
+from server.checkpoints.service import CheckpointService
+from server.checkpoints.views import best_checkpoint
+from server.policies.service import find
+from server.runs.repository import RunRepository
+from server.runs.states import FINISHED
+from server.services import Services
+from sim.config import TaskConfig
+from workers.config import TrainingConfig
+
+# No run's id has a hyphen.
+_POLICY = "policy-"
+
+
+def policy_view(name: str) -> str:
+    """Under which the live view of a reference policy goes."""
+    return f"{_POLICY}{name}"
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A run or a policy to look at.
+
+    Attributes:
+        id: of its live view.
+        task: the place, and the geometry of robot and LiDAR.
+        save: writes the archive of the policy that drives after the training; None while its worker sends the frames.
+    """
+
+    id: str
+    task: TaskConfig
+    save: Callable[[Path], None] | None
+
+
+def watched(services: Services, identifier: str) -> Watched:
+    """What the live view of that id shows.
+
+    Raises:
+        NotFoundError: there is nothing of that id.
+    """
+    if identifier.startswith(_POLICY):
+        policy = find(identifier.removeprefix(_POLICY))
+        return Watched(identifier, policy.card.training.task, lambda path: _copy(policy.archive, path))
+    with services.database.read() as session:
+        run = RunRepository(session).get(identifier)
+        training = TrainingConfig.model_validate(run.experiment.training)
+        kept = CheckpointRepository(session).of_run(identifier) if run.state in FINISHED else []
+        best = best_checkpoint(kept)
+    task = with_geometry(training, services.arenas).task
+    if best is None:
+        return Watched(identifier, task, None)
+    return Watched(identifier, task, lambda path: CheckpointService(services).download(best).save(path))
+
+
+def _copy(source: Path, target: Path) -> None:
+    target.write_bytes(source.read_bytes())

@@ -1,0 +1,69 @@
+"""Routes of replays: driving an episode again, and the page that plays it."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+
+from server.live.page import HEADERS
+from server.live.themes import Theme
+from server.problems import NOT_FOUND, REPLAY_FAILED
+from server.replays.schemas import Replay
+from server.replays.service import ReplayService
+from server.replays.subject import Subject
+from server.replays.subjects import checkpoint_subject, policy_subject
+from server.services import ServicesDep
+
+router = APIRouter(tags=["replays"])
+
+_DOWNLOAD = "download"
+
+
+def _service(services: ServicesDep) -> ReplayService:
+    return ReplayService(services.recordings)
+
+
+def _checkpoint(checkpoint_id: str, services: ServicesDep) -> Subject:
+    return checkpoint_subject(services, checkpoint_id)
+
+
+ReplayServiceDep = Annotated[ReplayService, Depends(_service)]
+CheckpointDep = Annotated[Subject, Depends(_checkpoint)]
+PolicyDep = Annotated[Subject, Depends(policy_subject)]
+
+
+@router.get("/api/checkpoints/{checkpoint_id}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
+def replay_checkpoint(checkpoint_id: str, subject: CheckpointDep, episode: int, service: ReplayServiceDep) -> Replay:
+    """Drive an episode of a checkpoint's evaluation again: a few seconds for the first one, then at once."""
+    return service.prepare(subject, episode, f"/replays/checkpoints/{checkpoint_id}/{episode}/")
+
+
+@router.get("/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
+def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int, service: ReplayServiceDep) -> Replay:
+    """Drive an episode of a reference policy again: a few seconds for the first one, then at once."""
+    return service.prepare(subject, episode, f"/replays/policies/{name}/{suite}/{episode}/")
+
+
+@router.get("/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False)
+def play_checkpoint(
+    request: Request, subject: CheckpointDep, episode: int, theme: Theme, service: ReplayServiceDep
+) -> Response:
+    """The player of an episode of a checkpoint's evaluation."""
+    return _page(request, subject, episode, theme, service)
+
+
+@router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False)
+def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, service: ReplayServiceDep) -> Response:
+    """The player of an episode of a reference policy."""
+    return _page(request, subject, episode, theme, service)
+
+
+def _page(request: Request, subject: Subject, episode: int, theme: Theme, service: ReplayService) -> Response:
+    """The episode is inside the page. viser's client would do more that its address asks for: what is not ours goes."""
+    if request.query_params.keys() - {_DOWNLOAD}:
+        return RedirectResponse(request.url.path)
+    headers = dict(HEADERS)
+    if _DOWNLOAD in request.query_params:
+        name = f"{subject.file_name.removesuffix('.zip')}-episode{episode}.html"
+        headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return HTMLResponse(service.page(subject, episode, theme), headers=headers)

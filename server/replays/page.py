@@ -1,0 +1,69 @@
+"""A replay as one HTML file: viser's own client and player with the episode inside, for a frame or to take away."""
+
+import base64
+import html
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.live.page import asset, viser_page
+from server.live.themes import Theme
+from workers.reporting import EpisodeResult
+
+_DIRECTORY = Path(__file__).parent / "assets"
+_OUTCOMES = {"arrival": "Arrived", "collision": "Collided", "timeout": "Timed out"}
+_UNFAITHFUL = "Driven again, it ended otherwise than recorded: this processor rounds otherwise."
+
+
+def replay_page(theme: Theme, recording: bytes, caption: "Caption") -> str:
+    """The page.
+
+    Args:
+        theme: light or dark, as the recording is.
+        recording: a `.viser` file.
+        caption: what it shows.
+    """
+    data = base64.b64encode(recording).decode("ascii")
+    dark = str(theme == "dark").lower()
+    head = (
+        f"<style>{asset('display.css')}{_asset('replay.css')}</style><script>{_asset('replay.js')}</script>"
+        # By these names viser's client finds a recording that comes along with its page.
+        f'<script>window.__VISER_EMBED_DATA__="{data}";window.__VISER_EMBED_CONFIG__={{darkMode:{dark}}};</script>'
+    )
+    return viser_page(theme, head, caption.html())
+
+
+@dataclass(frozen=True)
+class Caption:
+    """What a replay shows.
+
+    Attributes:
+        title: of the policy.
+        suite: its name.
+        episode: its place in the suite, from 0.
+        result: how it ended now.
+        seconds: of simulated time.
+        faithful: whether it ended as recorded.
+    """
+
+    title: str
+    suite: str
+    episode: int
+    result: EpisodeResult
+    seconds: float
+    faithful: bool
+
+    def html(self) -> str:
+        """The caption over the picture."""
+        outcome, steps = self.result.outcome, self.result.steps
+        lines = (
+            f'<div class="title"><span class="mode">Episode {self.episode + 1}</span>',
+            f"<span>of {html.escape(self.suite)}</span></div>",
+            f'<div class="step">{html.escape(self.title)}</div>',
+            f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {steps:,} steps, {self.seconds:.1f} s</div>',
+            "" if self.faithful else f'<div class="note">{_UNFAITHFUL}</div>',
+        )
+        return f'<div id="display">{"".join(lines)}</div>'
+
+
+def _asset(name: str) -> str:
+    return (_DIRECTORY / name).read_text(encoding="utf-8")

@@ -1,0 +1,77 @@
+"""What a person may do with the episodes of an evaluation: look at any of them, and take it away."""
+
+from server.errors import NotFoundError
+from server.live.themes import Theme
+from server.replays.page import Caption, replay_page
+from server.replays.recordings import RecordingStore
+from server.replays.schemas import Replay
+from server.replays.subject import Subject
+from workers.replays.recording import Recording
+
+
+class ReplayService:
+    """Drives evaluations again and films their episodes.
+
+    Args:
+        store: keeps what was driven.
+    """
+
+    def __init__(self, store: RecordingStore) -> None:
+        self._store = store
+
+    def prepare(self, subject: Subject, episode: int, page: str) -> Replay:
+        """An episode, driven again so that its page opens at once.
+
+        Args:
+            subject: whose.
+            episode: its place in the suite, from 0.
+            page: path of the player.
+
+        Raises:
+            NotFoundError: there is no such episode.
+            ReplayFailedError: it can't be driven again.
+            ReplayTimeoutError: that took too long.
+        """
+        recording = self._recording(subject, episode)
+        found = recording.evaluation.episodes[episode]
+        return Replay(
+            episode=episode,
+            suite=subject.recorded.suite,
+            outcome=found.outcome,
+            steps=found.steps,
+            seconds=found.steps * subject.task.control_period,
+            faithful=_faithful(subject, recording, episode),
+            page=page,
+        )
+
+    def page(self, subject: Subject, episode: int, theme: Theme) -> str:
+        """The episode's player as HTML that needs nothing else.
+
+        Raises:
+            As `prepare`.
+        """
+        # viser takes a second to import, so nobody pays for it before somebody looks.
+        from server.replays.film import film
+
+        recording = self._recording(subject, episode)
+        result = recording.evaluation.episodes[episode]
+        caption = Caption(
+            title=subject.title,
+            suite=subject.recorded.suite,
+            episode=episode,
+            result=result,
+            seconds=result.steps * subject.task.control_period,
+            faithful=_faithful(subject, recording, episode),
+        )
+        return replay_page(theme, film(recording.track(episode), result, subject.task, theme), caption)
+
+    def _recording(self, subject: Subject, episode: int) -> Recording:
+        count = len(subject.recorded.episodes)
+        if not 0 <= episode < count:
+            raise NotFoundError(f"This evaluation has {count} episodes, 0 to {count - 1}: there is no {episode}.")
+        return self._store.get(subject)
+
+
+def _faithful(subject: Subject, recording: Recording, episode: int) -> bool:
+    again, then = recording.evaluation.episodes[episode], subject.recorded.episodes[episode]
+    return (again.outcome, again.steps) == (then.outcome, then.steps)

@@ -1,0 +1,58 @@
+"""Finds whose episodes are to be replayed: a checkpoint's or a reference policy's."""
+
+import hashlib
+from pathlib import Path
+
+from server.checkpoints.repository import CheckpointRepository, evaluation_result
+from server.checkpoints.service import CheckpointService
+from server.errors import NotFoundError
+from server.policies.service import find
+from server.replays.subject import Subject
+from server.runs.repository import RunRepository
+from server.services import Services
+from workers.config import TrainingConfig
+from workers.errors import UnknownPolicyError
+
+
+def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
+    """A checkpoint on the suite of its training.
+
+    Raises:
+        NotFoundError: there is no such checkpoint, or it was not evaluated.
+    """
+    with services.database.read() as session:
+        checkpoints = CheckpointRepository(session)
+        checkpoint = checkpoints.get(checkpoint_id)
+        run = RunRepository(session).get(checkpoint.run_id)
+        recorded = evaluation_result(checkpoints.evaluation(checkpoint_id))
+        title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
+        training = TrainingConfig.model_validate(run.experiment.training)
+    download = CheckpointService(services).download(checkpoint_id)
+    return Subject(title, download.file_name, training.task, download.sha256, None, recorded, download.save)
+
+
+def policy_subject(name: str, suite: str) -> Subject:
+    """A reference policy on one of its suites.
+
+    Raises:
+        NotFoundError: there is no such policy, or it was not measured on that suite.
+    """
+    policy = find(name)
+    try:
+        recorded = policy.evaluation(suite)
+    except UnknownPolicyError as error:
+        raise NotFoundError(f"The policy {name} was not measured on {suite}.") from error
+    archive = policy.archive.read_bytes()
+    return Subject(
+        title=policy.card.title,
+        file_name=f"mapless-{name}.zip",
+        task=policy.card.training.task,
+        sha256=hashlib.sha256(archive).hexdigest(),
+        suite=suite,
+        recorded=recorded,
+        save=lambda path: _write(path, archive),
+    )
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

@@ -1,0 +1,167 @@
+"""After a training its best policy drives in the live view, and so do the policies that ship."""
+
+import asyncio
+import os
+import subprocess
+import time
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.checkpoints.repository import CheckpointRepository
+from server.live.drivers import PolicyDrivers
+from server.live.hub import LiveHub, TooManyViewsError
+from server.services import Services
+from tests.server.harness import Reports
+from tests.server.test_live import Asked, connect, make_frame, receive_until, refused
+from workers.reference.library import reference_policy
+from workers.reporting import EvaluationResult
+
+POLICY = reference_policy("complex")
+RECORDED = POLICY.evaluation("complex-200")
+
+
+def finished_run(reports: Reports, services: Services, evaluations: dict[int, EvaluationResult | None]) -> dict[str, Any]:
+    """A completed run of the policy's training, its archive as the checkpoint of each of these steps."""
+    experiment = reports.experiment(**POLICY.card.training.model_dump(mode="json"))
+    run: dict[str, Any] = experiment["runs"][0]
+
+    async def blocks() -> AsyncIterator[bytes]:
+        yield POLICY.archive.read_bytes()
+
+    for step, evaluation in evaluations.items():
+        file = asyncio.run(services.files.write(os.urandom(8).hex(), blocks()))
+        with services.database.write() as session:
+            CheckpointRepository(session).add(run["id"], step, file, evaluation)
+    reports.state(run, "completed")
+    return run
+
+
+def drivers_running() -> int:
+    listed = subprocess.run(["ps", "-eo", "ppid,args"], capture_output=True, text=True, check=True).stdout
+    lines = [line.split(maxsplit=1) for line in listed.splitlines()[1:]]
+    return sum(int(parent) == os.getpid() and "workers.live.drive" in command for parent, command in lines)
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.05)
+
+
+def live_score(client: TestClient, subject: str) -> dict[str, Any]:
+    """What the display says once robots drive."""
+    with connect(client, f"/live/{subject}/light") as browser, connect(client, f"/live/{subject}/light/display") as display:
+        receive_until(browser, b"/world/arena/floor")
+        score: dict[str, Any] = display.receive_json()
+        while not (score["state"] == "live" and score["mode"]):
+            assert score["after_training"] or score["state"] == "no worker"
+            score = display.receive_json()
+        receive_until(browser, b"/world/shells", b"batched_positions")
+        return score
+
+
+@pytest.fixture
+def services(services: Services) -> Services:
+    # Nothing in these tests comes back to a view that was left.
+    services.drivers = PolicyDrivers(services.live, linger=0.0)
+    return services
+
+
+def test_the_best_policy_of_a_finished_run_drives(client: TestClient, services: Services, reports: Reports) -> None:
+    run = finished_run(reports, services, {4096: RECORDED, 8192: None})
+    score = live_score(client, run["id"])
+    # The step is the archive's own.
+    assert (score["mode"], score["after_training"], score["step"]) == ("policy", True, POLICY.card.step)
+    assert len(score["robots"]) == 8
+    assert client.get(f"/api/runs/{run['id']}/live").json()["status"]["receiving"]
+    wait_until(lambda: drivers_running() == 0)
+
+
+def test_a_policy_that_ships_drives(client: TestClient, services: Services) -> None:
+    wanted = client.get("/api/policies/simple/live").json() | {"robots": 3}
+    del wanted["status"]
+    assert client.put("/api/policies/simple/live", json=wanted).json()["robots"] == 3
+    score = live_score(client, "policy-simple")
+    assert (score["after_training"], len(score["robots"])) == (True, 3)
+    page = client.get("/live/policy-simple/?darkMode")
+    assert page.url.path == "/live/policy-simple/dark/"
+    wait_until(lambda: drivers_running() == 0)
+
+
+def test_there_is_no_view_of_other_policies(client: TestClient) -> None:
+    assert client.get("/api/policies/nobody/live").status_code == 404
+    assert client.put("/api/policies/nobody/live", json={}).status_code == 404
+    assert client.get("/live/policy-nobody/light/").status_code == 404
+    assert refused(client, "/live/policy-nobody/light")
+
+
+@pytest.mark.parametrize("state", ["queued", "running", "stopping"])
+def test_a_run_that_goes_on_is_its_workers(client: TestClient, services: Services, reports: Reports, state: str) -> None:
+    run = finished_run(reports, services, {4096: RECORDED})
+    reports.state(run, state)  # type: ignore[arg-type]
+    with connect(client, f"/live/{run['id']}/light") as browser:
+        receive_until(browser, b"/world/arena/floor")
+        assert drivers_running() == 0
+
+
+def test_a_finished_run_without_a_checkpoint_has_nothing_to_drive(
+    client: TestClient, services: Services, reports: Reports
+) -> None:
+    run = finished_run(reports, services, {})
+    with connect(client, f"/live/{run['id']}/light") as browser:
+        receive_until(browser, b"/world/arena/floor")
+        assert drivers_running() == 0
+
+
+def test_a_linked_worker_is_shown_instead() -> None:
+    async def scenario() -> None:
+        shown: list[int] = []
+
+        class Screen:
+            port = 1
+
+            def show(self, frame: Any) -> None:
+                shown.append(frame.step)
+
+            def apply(self, *_: object) -> None: ...
+
+            def close(self) -> None: ...
+
+        hub = LiveHub(lambda *_: Screen(), linger=0.0)  # type: ignore[arg-type]
+        worker, driver = Asked(), Asked()
+        detach_driver = hub.attach_driver("run", driver.tell)
+        async with hub.watch("run", POLICY.card.training.task):
+            assert driver.newest() is not None
+            hub.driven_frames("run", make_frame(1).encode())
+            detach_worker = hub.attach("run", worker.tell)
+            hub.driven_frames("run", make_frame(2).encode())
+            hub.frames("run", make_frame(3).encode())
+            detach_worker()
+            hub.driven_frames("run", make_frame(4).encode())
+            detach_driver()
+            assert not hub.status("run").connected
+        assert shown == [4097, 4099, 4100]
+        await hub.close()
+
+    asyncio.run(scenario())
+
+
+def test_only_so_many_drive_at_the_same_time() -> None:
+    async def scenario() -> None:
+        drivers = PolicyDrivers(LiveHub(lambda *_: None), capacity=1)  # type: ignore[arg-type]
+
+        async def watch(subject: str) -> None:
+            async with drivers.driving(subject, lambda path: path.touch()):
+                pass
+
+        async with drivers.driving("one", lambda path: path.touch()):
+            await watch("one")
+            with pytest.raises(TooManyViewsError, match="close one of their pages"):
+                await watch("two")
+        await drivers.close()
+
+    asyncio.run(scenario())

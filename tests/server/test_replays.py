@@ -1,0 +1,179 @@
+"""Replays: an episode of a recorded evaluation is driven again, and its page plays it with nothing else."""
+
+import asyncio
+import base64
+import os
+import re
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import msgspec
+import pytest
+import zstandard
+from fastapi.testclient import TestClient
+
+from server.app import create_app
+from server.checkpoints.repository import CheckpointRepository
+from server.replays.recordings import RecordingStore
+from server.services import Services
+from server.settings import Settings
+from tests.server.harness import BASE_URL, TOKEN
+from workers.reference.library import reference_policy
+from workers.reporting import EpisodeResult, EvaluationResult
+
+POLICY = reference_policy("complex")
+RECORDED = POLICY.evaluation("complex-200")
+
+
+def store_checkpoint(client: TestClient, services: Services, archive: bytes, recorded: EvaluationResult | None) -> str:
+    """The archive as a checkpoint of a new run; its id."""
+    training = POLICY.card.training.model_dump(mode="json")
+    created = client.post("/api/experiments", json={"name": "Tür <b>", "seeds": [4], "training": training})
+    assert created.status_code == 201, created.text
+
+    async def blocks() -> AsyncIterator[bytes]:
+        yield archive
+
+    file = asyncio.run(services.files.write(os.urandom(8).hex(), blocks()))
+    with services.database.write() as session:
+        CheckpointRepository(session).add(created.json()["runs"][0]["id"], 81_920, file, recorded)
+    return file.id
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where all of these tests keep their recordings, so that each is made once; with an old one to begin with."""
+    directory = tmp_path_factory.mktemp("replays")
+    (directory / "old.npz").write_bytes(b"x" * 1000)
+    os.utime(directory / "old.npz", (1.0, 1.0))
+    return directory
+
+
+@pytest.fixture(autouse=True)
+def _keep(services: Services, kept: Path) -> None:
+    services.recordings = RecordingStore(kept, max_bytes=1)
+
+
+@pytest.fixture
+def checkpoint(client: TestClient, services: Services) -> str:
+    return store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
+
+
+def recording_in(page: str) -> dict[str, object]:
+    """The `.viser` file inside a page, unpacked."""
+    (data,) = re.findall(r'__VISER_EMBED_DATA__="([A-Za-z0-9+/=]+)"', page)
+    packed = base64.b64decode(data)
+    unpacked = zstandard.ZstdDecompressor().decompress(packed[8:], max_output_size=int.from_bytes(packed[:8], "little"))
+    length = int.from_bytes(unpacked[:8], "little")
+    content: dict[str, object] = msgspec.msgpack.decode(unpacked[8 : 8 + length])
+    return content
+
+
+def test_an_episode_is_replayed_as_it_was_recorded(client: TestClient, checkpoint: str) -> None:
+    replay = client.get(f"/api/checkpoints/{checkpoint}/replays/7").json()
+    recorded = RECORDED.episodes[7]
+    assert (replay["outcome"], replay["steps"], replay["faithful"]) == (recorded.outcome, recorded.steps, True)
+    assert replay["seconds"] == pytest.approx(0.2 * recorded.steps)
+
+    page = client.get(f"{replay['page']}dark/")
+
+    assert page.status_code == 200
+    assert "darkMode:true" in page.text
+    assert f"after {recorded.steps} steps" in page.text
+    # Names are people's own.
+    assert "Tür &lt;b&gt;, seed 4, step 81,920" in page.text
+    content = recording_in(page.text)
+    assert content["durationSeconds"] == pytest.approx(0.2 * recorded.steps + 1.5)
+    times = [time for time, _ in content["messages"]]  # type: ignore[attr-defined]
+    assert times == sorted(times)
+    # From the second picture on, everything moves twenty times a second.
+    assert len(set(times)) == pytest.approx(20 * 0.2 * recorded.steps, rel=0.02)
+
+
+def test_all_episodes_after_the_first_come_at_once(client: TestClient, checkpoint: str, kept: Path) -> None:
+    assert client.get(f"/api/checkpoints/{checkpoint}/replays/0").status_code == 200
+    files = {path: path.stat().st_ino for path in kept.iterdir()}
+    started = time.monotonic()
+    for episode in range(1, 200, 10):
+        replay = client.get(f"/api/checkpoints/{checkpoint}/replays/{episode}").json()
+        assert (replay["outcome"], replay["steps"]) == (RECORDED.episodes[episode].outcome, RECORDED.episodes[episode].steps)
+    assert time.monotonic() - started < 10.0
+    assert {path: path.stat().st_ino for path in kept.iterdir()} == files
+
+
+def test_a_reference_policy_is_replayed_too(client: TestClient) -> None:
+    replay = client.get("/api/policies/complex/suites/complex-200/replays/199").json()
+    assert replay["suite"] == "complex-200"
+    assert replay["steps"] == RECORDED.episodes[199].steps
+    download = client.get(f"{replay['page']}light/?download")
+    assert download.headers["content-disposition"] == 'attachment; filename="mapless-complex-episode199.html"'
+    assert "darkMode:false" in download.text
+    assert 'data-theme="light"' in download.text
+
+
+def test_what_ended_otherwise_than_recorded_says_so(client: TestClient, services: Services) -> None:
+    first = EpisodeResult(outcome="collision", steps=3, reward=-100.0, path_length=0.1, shortest_path=3.0, min_clearance=0.0)
+    recorded = RECORDED.model_copy(update={"episodes": (first, *RECORDED.episodes[1:])})
+    checkpoint = store_checkpoint(client, services, POLICY.archive.read_bytes(), recorded)
+    assert client.get(f"/api/checkpoints/{checkpoint}/replays/1").json()["faithful"]
+    replay = client.get(f"/api/checkpoints/{checkpoint}/replays/0").json()
+    assert not replay["faithful"]
+    assert "ended otherwise than recorded" in client.get(f"{replay['page']}light/").text
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/api/checkpoints/0123456789abcdef/replays/0",
+        "/api/policies/nobody/suites/simple-200/replays/0",
+        "/api/policies/simple/suites/clutter-500/replays/0",
+        "/api/policies/simple/suites/simple-200/replays/200",
+        "/api/policies/simple/suites/simple-200/replays/-1",
+        "/replays/policies/simple/simple-200/200/dark/",
+    ],
+)
+def test_there_is_no_other_replay(client: TestClient, path: str) -> None:
+    assert client.get(path).status_code == 404
+
+
+def test_without_an_evaluation_there_is_nothing_to_replay(client: TestClient, services: Services) -> None:
+    checkpoint = store_checkpoint(client, services, b"archive", None)
+    response = client.get(f"/api/checkpoints/{checkpoint}/replays/0")
+    assert response.status_code == 404
+    assert "has not been evaluated" in response.json()["detail"]
+
+
+def test_a_damaged_archive_says_why_it_is_not_replayed(client: TestClient, services: Services, kept: Path) -> None:
+    before = sorted(kept.iterdir())
+    checkpoint = store_checkpoint(client, services, b"not an archive", RECORDED)
+    response = client.get(f"/api/checkpoints/{checkpoint}/replays/0")
+    assert response.status_code == 500
+    assert "is not a readable archive" in response.json()["detail"]
+    assert sorted(kept.iterdir()) == before
+
+
+def test_a_suite_that_has_changed_is_not_passed_off_as_the_old_one(client: TestClient, services: Services) -> None:
+    changed = RECORDED.model_copy(update={"suite_hash": "0" * 64})
+    checkpoint = store_checkpoint(client, services, POLICY.archive.read_bytes(), changed)
+    response = client.get(f"/api/checkpoints/{checkpoint}/replays/0")
+    assert response.status_code == 500
+    assert "has changed since" in response.json()["detail"]
+
+
+def test_players_need_a_login(settings: Settings) -> None:
+    with TestClient(create_app(settings), base_url=BASE_URL) as stranger:
+        assert stranger.get("/replays/policies/simple/simple-200/0/dark/").status_code == 401
+        stranger.headers["Authorization"] = f"Bearer {TOKEN}"
+        # viser's client would play any file that its address names.
+        redirected = stranger.get(
+            "/replays/policies/simple/simple-200/0/dark/?playbackPath=//evil.example/x.viser", follow_redirects=False
+        )
+        assert redirected.headers["location"] == "/replays/policies/simple/simple-200/0/dark/"
+
+
+def test_recordings_that_nobody_looked_at_go_first(client: TestClient, checkpoint: str, kept: Path) -> None:
+    assert client.get(f"/api/checkpoints/{checkpoint}/replays/0").status_code == 200
+    # The bound is a byte: only the newest stays, whatever its size.
+    assert not (kept / "old.npz").exists()
+    assert len(list(kept.iterdir())) == 1

@@ -1,0 +1,99 @@
+"""An evaluation driven again is the evaluation: same outcomes, same steps, every moment where the simulation says."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.scan import scan
+from sim.suites import load_suite
+from workers.checkpoints import read_policy
+from workers.errors import EpisodesTooLongError
+from workers.evaluation import evaluate
+from workers.policy import torch_policy
+from workers.reference.library import reference_policy
+from workers.replays import record as recorder
+from workers.replays.record import record
+from workers.replays.recording import Recording
+
+POLICY = reference_policy("complex")
+SUITE = load_suite("complex-200")
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return record(POLICY.archive)
+
+
+def test_it_ends_as_the_evaluation_did(recording: Recording) -> None:
+    manifest, policy = read_policy(POLICY.archive)
+    # torch flushes denormal numbers in a training; that this evaluation does not makes no difference to any episode.
+    evaluation = evaluate(torch_policy(policy.network, policy.weights), manifest.training.task, SUITE)
+    assert recording.evaluation == evaluation
+
+
+def test_every_episode_is_there_from_its_start_to_its_end(recording: Recording) -> None:
+    for episode, result in enumerate(recording.evaluation.episodes):
+        track = recording.track(episode)
+        assert len(track.poses) == len(track.ranges) == result.steps + 1
+        np.testing.assert_allclose(track.poses[0], SUITE.starts[episode], atol=1e-5)
+        np.testing.assert_allclose(track.target, SUITE.targets[episode], atol=1e-5)
+        driven = np.hypot(*np.diff(track.poses[:, :2], axis=0).T).sum()
+        assert driven == pytest.approx(result.path_length, rel=0.01, abs=0.01)
+        if result.outcome == "arrival":
+            assert np.hypot(*(track.poses[-1, :2] - track.target)) <= 0.2 + 1e-5
+
+
+def test_rays_are_those_of_the_poses(recording: Recording) -> None:
+    track = recording.track(7)
+    arena = SUITE.arenas[SUITE.arena_indices[7]]
+    task = POLICY.card.training.task
+    # Half-precision numbers are 2 mm apart at 3.5 m.
+    np.testing.assert_allclose(track.ranges, scan(arena, track.poses, task.lidar), atol=2e-3)
+    assert (track.arena.width, len(track.arena.circles)) == (2 * arena.half_width, len(arena.circles))
+
+
+def test_movers_are_where_the_rays_met_them() -> None:
+    suite = load_suite("crowd-200")
+    recording = record(POLICY.archive, "crowd-200")
+    task = POLICY.card.training.task
+    for episode in (3, 150):
+        track = recording.track(episode)
+        arena = suite.arenas[suite.arena_indices[episode]]
+        assert track.movers.shape == (len(track.poses), 4, 3)
+        for pose, ranges, movers in zip(track.poses, track.ranges, track.movers, strict=True):
+            np.testing.assert_allclose(ranges, scan(arena, pose[None], task.lidar, movers=movers)[0], atol=2e-3)
+
+
+def test_its_file_gives_everything_back(recording: Recording, tmp_path: Path) -> None:
+    recording.save(tmp_path / "recording.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["recording.npz"]
+    again = Recording.load(tmp_path / "recording.npz")
+    assert (again.evaluation, again.arenas) == (recording.evaluation, recording.arenas)
+    for name in ("arena_indices", "targets", "offsets", "poses", "ranges", "movers"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(recording, name))
+
+
+def test_what_is_no_recording_is_refused(recording: Recording, tmp_path: Path) -> None:
+    recording.save(tmp_path / "whole.npz")
+    whole = (tmp_path / "whole.npz").read_bytes()
+    np.savez(tmp_path / "other.npz", poses=recording.poses)
+    other = (tmp_path / "other.npz").read_bytes()
+    for content in (b"", b"not a recording", whole[: len(whole) // 2], whole[:500] + b"x" * 100 + whole[600:], other):
+        (tmp_path / "torn.npz").write_bytes(content)
+        with pytest.raises(ValueError, match=r"."):
+            Recording.load(tmp_path / "torn.npz")
+    with pytest.raises(OSError, match="No such file"):
+        Recording.load(tmp_path / "missing.npz")
+
+
+@pytest.mark.parametrize("episode", [-1, 200])
+def test_there_is_no_other_episode(recording: Recording, episode: int) -> None:
+    with pytest.raises(IndexError, match="200 episodes"):
+        recording.track(episode)
+
+
+def test_what_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder, "MAX_MOMENT_NUMBERS", 10_000)
+    with pytest.raises(EpisodesTooLongError, match="lower the step limit"):
+        record(POLICY.archive)

@@ -1,0 +1,1 @@
+"""Episodes of an evaluation, driven once more to be looked at."""

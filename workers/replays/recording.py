@@ -1,0 +1,115 @@
+"""What the robots of an evaluation did, moment by moment, and its file (NumPy only: the server draws it)."""
+
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from sim.arena_file import ArenaFile
+from workers.reporting import EvaluationResult
+
+_ARENAS = TypeAdapter(tuple[ArenaFile, ...])
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One episode of n steps: n + 1 moments, a control period apart; the last is where it ended.
+
+    Attributes:
+        arena: where.
+        poses: (n + 1, 3) float32: x, y, heading.
+        ranges: (n + 1, rays) float32, metres.
+        target: (2,) float32.
+        movers: (n + 1, movers, 3) float32: x, y, radius.
+    """
+
+    arena: ArenaFile
+    poses: NDArray[np.float32]
+    ranges: NDArray[np.float32]
+    target: NDArray[np.float32]
+    movers: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All S episodes of an evaluation, M moments in all.
+
+    Attributes:
+        evaluation: how they ended.
+        arenas: the suite's.
+        arena_indices: (S,) the arena of each episode.
+        targets: (S, 2) float32.
+        offsets: (S + 1,) where the moments of each episode begin, and the last one ends.
+        poses: (M, 3) float32.
+        ranges: (M, rays) float16: fine enough to draw.
+        movers: (T, A, K, 3) float32 x, y, radius of what moves in each of the A arenas, from the first moment of all
+            episodes to the last of the longest; a radius below zero is none.
+    """
+
+    evaluation: EvaluationResult
+    arenas: tuple[ArenaFile, ...]
+    arena_indices: NDArray[np.int32]
+    targets: NDArray[np.float32]
+    offsets: NDArray[np.int64]
+    poses: NDArray[np.float32]
+    ranges: NDArray[np.float16]
+    movers: NDArray[np.float32]
+
+    def track(self, episode: int) -> Track:
+        """One of the episodes.
+
+        Raises:
+            IndexError: there are not as many.
+        """
+        if not 0 <= episode < len(self.arena_indices):
+            raise IndexError(f"there are {len(self.arena_indices)} episodes: no {episode}")
+        moments = slice(self.offsets[episode], self.offsets[episode + 1])
+        discs = self.movers[: moments.stop - moments.start, self.arena_indices[episode]]
+        return Track(
+            arena=self.arenas[self.arena_indices[episode]],
+            poses=self.poses[moments],
+            ranges=self.ranges[moments].astype(np.float32),
+            target=self.targets[episode],
+            movers=discs[:, discs[0, :, 2] > 0.0],
+        )
+
+    def save(self, path: Path) -> None:
+        """Writes the file; whoever finds `path` finds it complete."""
+        torn = path.with_name(f"{path.name}.part")
+        with torn.open("wb") as file:
+            np.savez_compressed(
+                file,
+                evaluation=np.frombuffer(self.evaluation.model_dump_json().encode(), np.uint8),
+                arenas=np.frombuffer(_ARENAS.dump_json(self.arenas), np.uint8),
+                arena_indices=self.arena_indices,
+                targets=self.targets,
+                offsets=self.offsets,
+                poses=self.poses,
+                ranges=self.ranges,
+                movers=self.movers,
+            )
+        torn.replace(path)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """What `save` wrote.
+
+        Raises:
+            OSError: it is not there.
+            ValueError: it is not such a file, or a torn one.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+            return cls(
+                evaluation=EvaluationResult.model_validate_json(arrays.pop("evaluation").tobytes()),
+                arenas=_ARENAS.validate_json(arrays.pop("arenas").tobytes()),
+                **arrays,
+            )
+        except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError) as error:
+            raise ValueError(f"{path.name} is not a recording: {error}") from error
