@@ -3,12 +3,13 @@
 Both train on the same environment with the same networks, batch sizes, number of gradient steps and one thread:
 
     python -m pip install stable-baselines3
-    python -m benchmarks.training_throughput [--check]
+    python -m benchmarks.training_throughput [--check] [--ppo '{"robots": 128, "minibatch_size": 512}']
 
 Targets: PPO at least 2 times Stable-Baselines3, DDPG at least 1.5 times. CPU-seconds rather than seconds, so that other
 work on the machine does not count.
 """
 
+import json
 import statistics
 import tempfile
 import time
@@ -86,12 +87,15 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("--segments", type=int, default=4, help="measurements of each; the median counts")
     options.add_argument("--cases", nargs="*", default=list(CASES), choices=list(CASES))
+    options.add_argument("--ppo", type=json.loads, default={}, help="what PPO's cases shall differ in, as JSON")
     arguments = options.parse_args()
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     figures: dict[str, float] = {}
     for case in arguments.cases:
         algorithm = CASES[case]
+        if isinstance(algorithm, PpoConfig):
+            algorithm = PpoConfig.model_validate(algorithm.model_dump() | arguments.ppo)
         config = TrainingConfig(algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER))
         steps = SEGMENT_STEPS[algorithm.name]
         with tempfile.TemporaryDirectory() as directory:

@@ -7,6 +7,8 @@
 | state.safetensors   | optimiser, random states, environment: what only a resume needs |
 | state.json          | `workers.manifest.TrainingCounters` |
 
+The last two are missing where a policy was copied without them.
+
 Nothing is ever unpickled. Archives come over the network, so that reading one trusts nothing: members are stored, not
 compressed (nothing can inflate), known by name, bounded in size, and compared with the SHA-256 in the manifest.
 """
@@ -61,8 +63,22 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         STATE_ARRAYS: save_safetensors({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}),
         STATE_COUNTERS: _json(checkpoint.counters),
     }
+    _write(path, checkpoint.manifest, members)
+
+
+def copy_policy(archive: Path, target: Path) -> None:
+    """Writes an archive with the policy of another one, without the state to resume its training.
+
+    Raises:
+        ArchiveError: `archive` is not one that this release reads, or it is damaged.
+    """
+    manifest, policy = read_policy(archive)
+    _write(target, manifest, {POLICY: save_safetensors(policy.weights)})
+
+
+def _write(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> None:
     files = {name: FileEntry(sha256=hashlib.sha256(data).hexdigest(), size=len(data)) for name, data in members.items()}
-    manifest = checkpoint.manifest.model_copy(update={"files": files})
+    manifest = manifest.model_copy(update={"files": files})
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
         try:

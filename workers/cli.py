@@ -2,7 +2,6 @@
 
 import signal
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
@@ -18,12 +17,15 @@ from workers.errors import WorkerError
 from workers.export.command import export
 from workers.frames import Frame
 from workers.presets import PRESETS, preset
+from workers.reference.command import app as policies
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.reproduction.command import reproduce
 from workers.runtime.worker import worker
 from workers.statistics import wilson_interval
 
 app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)
 app.command()(export)
+app.add_typer(policies, name="policies")
 
 _console = Console()
 
@@ -159,26 +161,7 @@ def evaluate(
         _fail(str(error.args[0]))
 
 
-@app.command()
-def reproduce(
-    out: Annotated[Path, typer.Option(help="Directory of the campaign; an interrupted one goes on.")] = Path("reproduction"),
-    seeds: Annotated[int, typer.Option(min=1, max=100, help="Seeds of each row of the paper's tables.")] = 5,
-    jobs: Annotated[int, typer.Option(min=1, max=256, help="Trainings side by side, one core each.")] = 2,
-    page: Annotated[Path | None, typer.Option("--report", help="Also write the tables here, as Markdown.")] = None,
-) -> None:
-    """Train every row of the paper's tables with several seeds, and say which of its claims hold."""
-    from workers.reproduction.campaign import RunResult
-    from workers.reproduction.campaign import reproduce as run
-    from workers.reproduction.report import report
-
-    def tell(result: RunResult) -> None:
-        _console.print(f"{result.row:32} seed {result.seed}: {result.measured.success:7.2%} success", highlight=False)
-
-    results = run(out, seeds, jobs, on_result=tell)
-    text = report(results, f"mapless reproduce --seeds {seeds}", datetime.now(UTC).date().isoformat())
-    if page is not None:
-        page.write_text(text)
-    _console.print(text, markup=False, highlight=False)
+app.command()(reproduce)
 
 
 def _changes(

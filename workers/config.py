@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from sim.config import ADVANCED, Frozen, TaskConfig
+from sim.schema import HIDDEN
 
 
 class ResBlockNetwork(Frozen):
@@ -43,7 +44,7 @@ class PpoConfig(Frozen):
     name: Literal["ppo"] = Field("ppo", title="PPO")
     network: Network = Field(default_factory=MlpNetwork, title="Network")
     robots: int = Field(
-        128,
+        256,
         ge=1,
         le=4096,
         title="Robots",
@@ -59,15 +60,15 @@ class PpoConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     epochs: int = Field(6, ge=1, le=50, title="Epochs", description="Passes over each rollout.", json_schema_extra=ADVANCED)
-    minibatch_size: int = Field(512, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)
+    minibatch_size: int = Field(1024, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)
     learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Learning rate", json_schema_extra=ADVANCED)
     learning_rate_schedule: Literal["linear", "constant"] = Field(
         "linear", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
     )
-    gamma: float = Field(0.99, gt=0.0, le=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
+    gamma: float = Field(0.995, gt=0.0, le=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
     gae_lambda: float = Field(0.95, ge=0.0, le=1.0, title="GAE lambda", json_schema_extra=ADVANCED)
     clip_range: float = Field(0.2, gt=0.0, le=1.0, title="Clip range (epsilon)", json_schema_extra=ADVANCED)
-    entropy_coefficient: float = Field(0.0, ge=0.0, le=1.0, title="Entropy coefficient", json_schema_extra=ADVANCED)
+    entropy_coefficient: float = Field(0.003, ge=0.0, le=1.0, title="Entropy coefficient", json_schema_extra=ADVANCED)
     max_grad_norm: float = Field(0.5, gt=0.0, le=100.0, title="Gradient clipping", json_schema_extra=ADVANCED)
     initial_std_linear: float = Field(
         0.2, gt=0.01, le=2.0, title="Initial std, linear", description="Exploration noise.", json_schema_extra=ADVANCED
@@ -87,7 +88,7 @@ class PpoConfig(Frozen):
         if self.minibatch_size > self.robots * self.rollout_steps:
             raise ValueError(
                 f"minibatch_size {self.minibatch_size} is larger than a rollout of {self.robots} robots x "
-                f"{self.rollout_steps} steps"
+                f"{self.rollout_steps} steps: lower it, or take more robots or a longer rollout"
             )
         return self
 
@@ -199,6 +200,29 @@ class EvaluationConfig(Frozen):
         title="Evaluate and save every",
         description="Environment steps between two evaluations; each keeps a checkpoint.",
         json_schema_extra=ADVANCED,
+    )
+    evaluations_per_checkpoint: int = Field(
+        1,
+        ge=1,
+        title="Evaluations for each checkpoint",
+        description="Above 1 only every so-manieth evaluation keeps one; the last always does.",
+        json_schema_extra=HIDDEN,
+    )
+    drives: int = Field(
+        0,
+        ge=0,
+        le=1_000,
+        title="Drives",
+        description="Robots that drive from target to target after the training, measured as in the paper's tables.",
+        json_schema_extra=HIDDEN,
+    )
+    drive_steps: int = Field(
+        10_000,
+        ge=1,
+        le=1_000_000,
+        title="Steps of a drive",
+        description="About as many as a table's row holds.",
+        json_schema_extra=HIDDEN,
     )
 
 

@@ -3,7 +3,12 @@
 WorkerError
 ├── TrainingError          a training cannot go on
 │   └── NonFiniteError     its weights are no longer numbers
+├── CampaignError          the paper's reproduction does not go on here and now
+│   ├── InterruptedCampaignError  it was asked to stop, or a process was killed: it can be continued
+│   └── OtherTrainingError        its directory is that of another campaign
 ├── ExportError            a policy cannot be taken to another format
+├── UnknownPolicyError     there is no such reference policy
+├── EpisodesTooLongError   episodes do not fit into memory to be replayed
 ├── ArchiveError           a checkpoint archive is refused
 │   ├── ArchiveFormatError       not an archive of this project, or of a newer version
 │   ├── ArchiveIntegrityError    its content is not what its manifest says
@@ -27,8 +32,28 @@ class NonFiniteError(TrainingError):
     """The weights of a training are no longer finite numbers."""
 
 
+class CampaignError(WorkerError):
+    """The paper's reproduction does not go on here and now."""
+
+
+class InterruptedCampaignError(CampaignError):
+    """A campaign was asked to stop, or one of its processes was killed; it can be continued."""
+
+
+class OtherTrainingError(CampaignError):
+    """A folder of a campaign holds a training with other settings."""
+
+
 class ExportError(WorkerError):
     """A policy cannot be taken to another format without changing it."""
+
+
+class UnknownPolicyError(WorkerError):
+    """There is no reference policy of that name, or none that was measured on that suite."""
+
+
+class EpisodesTooLongError(WorkerError):
+    """The moments of an evaluation do not fit into memory."""
 
 
 class ArchiveError(WorkerError):

@@ -1,7 +1,7 @@
 """A policy on a frozen suite: one result per scenario."""
 
 from sim.config import TaskConfig
-from sim.suites import Suite, run_suite
+from sim.suites import EpisodeTable, Suite, run_suite
 from workers.live.viewing import PolicyFunction
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
 
@@ -17,7 +17,11 @@ def evaluate(policy: PolicyFunction, task: TaskConfig, suite: Suite) -> Evaluati
         task: the robot, its sensors, the observation and the limits; the arena is the suite's.
         suite: where each attempt starts and where it should arrive.
     """
-    table = run_suite(policy, task, suite)
+    return to_result(run_suite(policy, task, suite), suite)
+
+
+def to_result(table: EpisodeTable, suite: Suite) -> EvaluationResult:
+    """What was done in a suite, as it is reported."""
     episodes = tuple(
         EpisodeResult(
             outcome=_OUTCOMES[outcome - 1],

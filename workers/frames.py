@@ -2,7 +2,7 @@
 
 import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Self
 
 import numpy as np
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 ViewMode = Literal["training", "policy"]
 
-# version, mode, robots, rays, arena, step, seconds of simulated time, seconds of simulated time per wall second
-_HEADER = struct.Struct("<BBHHHQdf")
-_VERSION = 2
+# version, mode, movers, robots, rays, arena, step, seconds of simulated time, seconds of simulated time per wall second
+_HEADER = struct.Struct("<BBBHHHQdf")
+_VERSION = 3
 _MODES: tuple[ViewMode, ...] = ("training", "policy")
 
 
@@ -35,6 +35,7 @@ class Frame:
         rewards: (robots,) float32, reward since the last target.
         outcomes: (robots,) uint8: how the attempt that ended last ended (0 none yet, 1 arrival, 2 collision, 3 time-out).
         arena: which arena of the task's pool all of this is in.
+        movers: (movers, 3) float32: x, y, radius of what moves there, at most 255.
     """
 
     mode: ViewMode
@@ -47,15 +48,16 @@ class Frame:
     rewards: NDArray[np.float32]
     outcomes: NDArray[np.uint8]
     arena: int = 0
+    movers: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 3), np.float32))
 
     def encode(self) -> bytes:
         """The frame as bytes: a fixed header, then the arrays one after another, little-endian."""
         robots, rays = self.ranges.shape
-        header = _HEADER.pack(
-            _VERSION, _MODES.index(self.mode), robots, rays, self.arena, self.step, self.sim_time, self.speed
-        )
+        mode, movers = _MODES.index(self.mode), len(self.movers)
+        header = _HEADER.pack(_VERSION, mode, movers, robots, rays, self.arena, self.step, self.sim_time, self.speed)
         floats = np.concatenate(
-            [np.ravel(a).astype("<f4") for a in (self.poses, self.targets, self.ranges, self.rewards)], dtype="<f4"
+            [np.ravel(a).astype("<f4") for a in (self.poses, self.targets, self.ranges, self.rewards, self.movers)],
+            dtype="<f4",
         )
         return header + floats.tobytes() + self.outcomes.astype(np.uint8).tobytes()
 
@@ -68,10 +70,10 @@ class Frame:
         """
         if len(data) < _HEADER.size:
             raise FrameError("shorter than a frame's header")
-        version, mode, robots, rays, arena, step, sim_time, speed = _HEADER.unpack_from(data)
+        version, mode, movers, robots, rays, arena, step, sim_time, speed = _HEADER.unpack_from(data)
         if version != _VERSION or mode >= len(_MODES):
             raise FrameError(f"frame version {version}, mode {mode}: not known here")
-        sizes = (3 * robots, 2 * robots, rays * robots, robots)
+        sizes = (3 * robots, 2 * robots, rays * robots, robots, 3 * movers)
         if len(data) != _HEADER.size + 4 * sum(sizes) + robots:
             raise FrameError("length does not match the header")
         floats = np.frombuffer(data, "<f4", sum(sizes), _HEADER.size)
@@ -80,7 +82,9 @@ class Frame:
         outcomes = np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes))
         if (outcomes > 3).any():
             raise FrameError("an outcome that nobody knows")
-        poses, targets, ranges, rewards = np.split(floats, np.cumsum(sizes)[:-1])
+        poses, targets, ranges, rewards, discs = np.split(floats, np.cumsum(sizes)[:-1])
+        if (discs[2::3] <= 0.0).any():
+            raise FrameError("a mover without a size")
         return cls(
             mode=_MODES[mode],
             step=step,
@@ -92,4 +96,5 @@ class Frame:
             rewards=rewards,
             outcomes=outcomes,
             arena=arena,
+            movers=discs.reshape(movers, 3),
         )

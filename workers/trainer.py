@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from sim.observations import observation_layout
 from sim.suites import run_suite, suite_for
 from sim.vector_env import NavigationVectorEnv
-from workers.algorithms import build_algorithm
+from workers.algorithms import build_algorithm, ppo_loss
 from workers.algorithms.base import with_prefix, without_prefix
 from workers.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
 from workers.config import TrainingConfig
+from workers.drives import drive
 from workers.errors import ArchiveMismatchError, NonFiniteError
 from workers.evaluation import evaluate, evaluation_metrics
 from workers.layout import layout
@@ -88,6 +89,7 @@ def warm_up() -> None:
     run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
     NavigationVectorEnv(task, 1, seed=0).reset()
     build_algorithm(config.algorithm, observation_layout(task).size, 0, torch.device("cpu"))
+    ppo_loss.load()
 
 
 class Training:
@@ -130,7 +132,8 @@ class Training:
             if self.evaluation_due:
                 result = self.evaluate()
                 self.report(result)
-                self.save(result)
+                if self.checkpoint_due:
+                    self.save(result)
             elif self.reported < 0 or self.metrics.seconds >= self.report_interval:
                 self.report(None)
         return "completed"
@@ -189,11 +192,26 @@ class Training:
         passed = self.step // self.config.evaluation.every_steps
         return passed > self.evaluations or self.updates == self.total_updates
 
+    @property
+    def checkpoint_due(self) -> bool:
+        """Whether the evaluation just made keeps a checkpoint."""
+        evaluation = self.config.evaluation
+        interval = evaluation.every_steps * evaluation.evaluations_per_checkpoint
+        return self.updates == self.total_updates or self.step // interval > max(self.saved, 0) // interval
+
     def evaluate(self) -> EvaluationResult:
         """The deterministic policy on the task's frozen suite."""
         with self.metrics.phase("evaluation"):
             self.evaluations = self.step // self.config.evaluation.every_steps
             return evaluate(self.policy(torch_policy), self.config.task, self.suite)
+
+    def drive(self) -> dict[str, float]:
+        """The finished policy as the paper's tables measure one, where the training asks for that."""
+        config = self.config.evaluation
+        if not config.drives or self.updates < self.total_updates:
+            return {}
+        with self.metrics.phase("evaluation"):
+            return drive(self.policy(torch_policy), self.config.task, config.drives, config.drive_steps).metrics()
 
     def policy(self, runner: Callable[..., PolicyFunction]) -> PolicyFunction:
         """A copy of the newest deterministic policy."""
@@ -203,9 +221,9 @@ class Training:
         """Everything since the last report, and the evaluation of this step if there is one."""
         if self.metrics.empty:
             return
+        measured = {} if result is None else {**evaluation_metrics(result), **self.drive()}
         values = self.metrics.flush()
-        if result is not None:
-            values.update(evaluation_metrics(result))
+        values.update(measured)
         with self.metrics.phase("reporting"):
             self.reporter.metrics(self.step, values)
         self.reported = self.step

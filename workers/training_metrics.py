@@ -32,6 +32,7 @@ class TrainingMetrics:
         self._phases = dict.fromkeys(_PHASES, 0.0)
         self._outcomes = np.zeros(4, np.int64)
         self._attempt_rewards = self._attempt_steps = self._rewards = 0.0
+        self._reward_terms: dict[str, float] = {}
         self._steps = self._updates = 0
         self._diagnostics: dict[str, list[float]] = {}
 
@@ -69,6 +70,8 @@ class TrainingMetrics:
         self._behavior.step(observations, actions)
         self._steps += 1
         self._rewards += float(rewards.sum())
+        for name, total in zip(env.reward_term_names, env.reward_terms.sum(axis=0).tolist(), strict=True):
+            self._reward_terms[name] = self._reward_terms.get(name, 0.0) + total
         outcomes = env.outcomes
         if outcomes.any():
             ended = outcomes > 0
@@ -89,6 +92,7 @@ class TrainingMetrics:
         metrics = {name: sum(values) / len(values) for name, values in self._diagnostics.items()}
         if steps:
             metrics["train/reward"] = self._rewards / steps
+            metrics.update({f"reward/{name}": total / steps for name, total in self._reward_terms.items()})
         if attempts := int(self._outcomes[1:].sum()):
             for name, count in zip(_OUTCOME_RATES, self._outcomes[1:].tolist(), strict=True):
                 metrics[name] = count / attempts

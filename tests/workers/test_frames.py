@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workers.frames import Frame, FrameError
 
-HEADER_BYTES = 1 + 1 + 2 + 2 + 2 + 8 + 8 + 4
+HEADER_BYTES = 1 + 1 + 1 + 2 + 2 + 2 + 8 + 8 + 4
 
 
 def floats(*shape: int) -> st.SearchStrategy[NDArray[np.float32]]:
@@ -32,6 +32,7 @@ def frames(draw: st.DrawFn) -> Frame:
         rewards=draw(floats(robots)),
         outcomes=draw(hnp.arrays(np.uint8, (robots,), elements=st.integers(0, 3))),
         arena=draw(st.integers(0, 65_535)),
+        movers=np.abs(draw(floats(draw(st.integers(0, 4)), 3))) + np.float32(0.1),
     )
 
 
@@ -66,7 +67,7 @@ def test_a_frame_of_64_robots_takes_ten_kilobytes() -> None:
         rewards=np.zeros(robots, np.float32),
         outcomes=np.zeros(robots, np.uint8),
     )
-    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1) + 1) == 9308
+    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1) + 1) == 9309
 
 
 @given(frames(), st.data())
@@ -90,7 +91,7 @@ def test_any_bytes_are_a_frame_or_an_error(data: bytes) -> None:
 
 def test_a_header_that_promises_more_robots_than_come_is_refused() -> None:
     encoded = bytearray(one_robot().encode())
-    encoded[2:4] = (65_535).to_bytes(2, "little")
+    encoded[3:5] = (65_535).to_bytes(2, "little")
     with pytest.raises(FrameError, match="length"):
         Frame.decode(bytes(encoded))
 
@@ -100,6 +101,12 @@ def test_a_frame_of_another_version_is_refused() -> None:
     encoded[0] = 9
     with pytest.raises(FrameError, match="version 9"):
         Frame.decode(bytes(encoded))
+
+
+def test_a_mover_without_a_size_is_refused() -> None:
+    movers = np.array([[1.0, 2.0, 0.0]], np.float32)
+    with pytest.raises(FrameError, match="mover"):
+        Frame.decode(dataclasses.replace(one_robot(), movers=movers).encode())
 
 
 @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf])

@@ -7,17 +7,20 @@ import numpy as np
 import pytest
 import torch
 
-from sim.config import TaskConfig
+from sim.config import ArenaConfig, JackalConfig, MoversConfig, RandomisationConfig, TaskConfig
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveMismatchError, NonFiniteError
 from workers.evaluation import evaluation_metrics
 from workers.frames import Frame
 from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
+from workers.reproduction.table import TableRow
 from workers.trainer import train
 from workers.training_metrics import TrainingMetrics
 
+REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress", "reward/penalty"}
 METRICS = {
+    *REWARD_TERMS,
     *("train/reward", "loss/policy", "loss/value", "policy/kl", "policy/entropy", "policy/clip_fraction"),
     *("policy/std_linear", "policy/std_angular", "value/explained_variance", "optim/learning_rate"),
     *("time/steps_per_second", "time/simulation", "time/inference", "time/update", "time/reporting", "time/evaluation"),
@@ -94,6 +97,16 @@ def test_metrics_have_their_standard_names_and_growing_steps(whole: Recorder) ->
     assert all(np.isfinite(value) for _, values in whole.rows for value in values.values())
 
 
+def test_every_term_of_the_reward_is_told_and_together_they_are_the_reward(whole: Recorder) -> None:
+    for _, values in whole.rows:
+        assert sum(values[name] for name in REWARD_TERMS) == pytest.approx(values["train/reward"], abs=1e-3)
+        # The basic reward: 120 on arrival, -100 on collision, no penalty.
+        assert values["reward/arrival"] * 512 % 120 == pytest.approx(0.0, abs=1e-6)
+        assert values["reward/collision"] * 512 % 100 == pytest.approx(0.0, abs=1e-6)
+        assert values["reward/penalty"] == 0.0
+    assert any(values["reward/collision"] < 0.0 for _, values in whole.rows)
+
+
 def test_every_evaluation_keeps_a_checkpoint(whole: Recorder) -> None:
     assert [step for step, _, _ in whole.checkpoints] == [2048, 4096]
     for step, archive, evaluation in whole.checkpoints:
@@ -109,6 +122,27 @@ def test_first_report_comes_with_the_first_update(tmp_path: Path) -> None:
     recorder = Recorder()
     train(TINY, 5, recorder, tmp_path, report_interval=1e9)
     assert [step for step, _ in recorder.rows] == [512, 2048, 4096]
+
+
+def test_another_robot_among_movers_with_stacked_frames_and_drawn_disturbances_trains_and_resumes_as_well(
+    tmp_path: Path,
+) -> None:
+    task = TaskConfig(
+        arena=ArenaConfig(movers=MoversConfig(count=3)),
+        robot=JackalConfig(),
+        frames=3,
+        randomisation=RandomisationConfig(rate=(2.0, 10.0), heading_noise=(0.0, 0.1), command_delay=(0, 2)),
+    )
+    config = TINY.model_copy(update={"task": task, "steps": 2_000})
+    whole, first, second = Recorder(), Recorder(stop_after=2), Recorder()
+    train(config, 5, whole, tmp_path / "whole", report_interval=0.0)
+    train(config, 5, first, tmp_path / "first", report_interval=0.0)
+    train(config, 5, second, tmp_path / "second", resume=first.checkpoints[-1][1], report_interval=0.0)
+    assert learned(first.rows + second.rows) == learned(whole.rows)
+    manifest = read_manifest(whole.checkpoints[-1][1])
+    assert len(manifest.observation.numbers) == 48
+    assert manifest.evaluation is not None
+    assert manifest.evaluation.suite == "simple-3-pedestrian-0.33m-200"
 
 
 @pytest.mark.parametrize("updates", [3, 4])
@@ -243,3 +277,15 @@ def test_reports_tell_means_over_updates() -> None:
     metrics.update({"loss/value": 2.0})
     assert metrics.flush()["loss/value"] == 1.5
     assert metrics.empty
+
+
+def test_drives_are_reported_once_at_the_end_and_checkpoints_only_where_asked_for(tmp_path: Path) -> None:
+    evaluation = EvaluationConfig(every_steps=1_000, evaluations_per_checkpoint=2, drives=2, drive_steps=500)
+    recorder = Recorder()
+    assert train(TINY.model_copy(update={"evaluation": evaluation}), 5, recorder, tmp_path) == "completed"
+    assert [step for step, values in recorder.rows if "eval/success_rate" in values] == [1_024, 2_048, 3_072, 4_096]
+    assert [step for step, _, _ in recorder.checkpoints] == [2_048, 4_096]
+    (measured,) = [(step, TableRow.from_metrics(values)) for step, values in recorder.rows if "table/steps" in values]
+    assert measured[0] == 4_096
+    assert measured[1] is not None
+    assert measured[1].episodes * measured[1].steps == pytest.approx(500)

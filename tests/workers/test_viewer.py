@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sim.arenas import build_arena, build_arenas
-from sim.config import ArenaConfig, GeneratedArenaConfig, TaskConfig
+from sim.config import ArenaConfig, BurgerConfig, GeneratedArenaConfig, MoversConfig, RandomisationConfig, TaskConfig
 from sim.scan import scan
 from sim.vector_env import NavigationVectorEnv
 from workers.frames import Frame
@@ -113,6 +113,46 @@ def test_a_showcase_moves_smoothly_and_scans_where_it_shows_the_robots() -> None
     assert (last.mode, last.step, last.speed) == ("policy", 7, 1.0)
 
 
+def test_a_showcase_does_not_jump_where_robots_drive_otherwise_than_commanded() -> None:
+    task = TASK.model_copy(
+        update={
+            "robot": BurgerConfig(max_linear_acceleration=0.2),
+            "command_delay": 2,
+            "randomisation": RandomisationConfig(max_linear_speed=(0.1, 0.2)),
+        }
+    )
+    showcase = Showcase(task, 20)
+    steps = []
+    last: Frame | None = None
+    for _ in range(90):
+        showcase.advance(curve_left, 1 / 30)
+        frame = showcase.frame(step=7, speed=1.0)
+        if last is not None:
+            same_attempt = (frame.targets == last.targets).all(axis=1)
+            steps.append(np.hypot(*(frame.poses[:, :2] - last.poses[:, :2]).T)[same_attempt])
+        last = frame
+    assert steps[0].max() == 0.0  # the first command is yet to come
+    assert np.concatenate(steps).max() <= 0.5 * 0.2 / 30 + 1e-5  # at half of its top speed
+    assert np.concatenate(steps).mean() > 0.5 * 0.1 / 30 * 0.7
+
+
+def test_a_showcase_shows_movers_as_smoothly_as_robots_and_scans_them_where_it_shows_them() -> None:
+    arena = ArenaConfig(name="complex", movers=MoversConfig(count=5, speed=1.5))
+    task = TASK.model_copy(update={"arena": arena})
+    showcase = Showcase(task, 2)
+    places = []
+    for _ in range(120):
+        showcase.advance(curve_left, 1 / 30)
+        frame = showcase.frame(step=7, speed=1.0)
+        assert frame.movers[:, 2] == pytest.approx(0.25)
+        still = build_arenas(task.arena)[0]
+        np.testing.assert_allclose(frame.ranges, scan(still, frame.poses, task.lidar, movers=frame.movers), atol=1e-5)
+        places.append(frame.movers[:, :2])
+    moved = np.hypot(*np.moveaxis(np.diff(places, axis=0), -1, 0))
+    assert moved.max() <= 1.5 / 30 + 1e-5
+    assert moved.mean() > 0.5 / 30
+
+
 def test_a_showcase_at_ten_times_real_time_makes_every_control_step() -> None:
     calls = 0
 
@@ -184,6 +224,26 @@ def test_a_clip_stays_in_one_arena_of_a_pool() -> None:
             # Whoever has gone to another arena stays where he was last seen.
             np.testing.assert_array_equal(frame.poses[gone], frames[number - 1].poses[gone])
     assert gone.any()
+
+
+def test_a_clip_shows_the_movers_that_its_robots_meet() -> None:
+    movers = MoversConfig(count=3)
+    task = TaskConfig(arena=GeneratedArenaConfig(maps=2, movers=movers), collision_distance=0.0)
+    env = NavigationVectorEnv(task, 300, seed=5)
+    env.reset()
+    recorder = ClipRecorder(robots=64, control_period=0.2, frame_rate=30.0)
+    for step in range(CLIP_STEPS):
+        env.step(np.tile(np.array([0.3, 0.5], np.float32), (300, 1)))
+        before = env.tiles().copy()
+        recorder.record(env, step)
+        frame = recorder.take()
+        assert frame is not None
+        if step == 0:
+            tile = int(np.bincount(before).argmax())
+        assert frame.arena == tile % 2
+        np.testing.assert_array_equal(frame.movers, env.discs[tile, :, :3])
+    # Three copies of each map: the robots of a clip are of one of them.
+    assert env.discs.shape[:2] == (6, 3)
 
 
 def test_a_showcase_drives_in_one_arena_of_a_pool() -> None:

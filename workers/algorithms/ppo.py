@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
-from workers.algorithms.ppo_gradients import PpoGradients, WrittenPpo, entropy, log_prob
+from workers.algorithms.ppo_gradients import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
 from workers.algorithms.return_scaler import ReturnScaler
 from workers.algorithms.rollout import RolloutStorage, generalized_advantages
 from workers.config import PpoConfig
@@ -52,9 +52,7 @@ class Ppo:
         self.robots, self.steps_per_update = config.robots, config.rollout_steps
         self._generator = generator
         self._optimizer = FlatAdam(actor, critic, learning_rate=config.learning_rate)
-        self._gradients = gradients or WrittenPpo(
-            actor, critic, config.clip_range, config.entropy_coefficient, config.minibatch_size
-        )
+        self._gradients = gradients or fastest_gradients(config, actor, critic)
         self._scaler = ReturnScaler(config.robots, config.gamma)
 
     @torch.no_grad()
@@ -94,7 +92,7 @@ class Ppo:
         normalised = (advantages - advantages.mean()) / (advantages.std() + _EPSILON)
         log_probs = log_prob(storage.noise, self.actor.log_std)
 
-        totals, minibatches = torch.zeros(4, device=storage.device), 0
+        totals, minibatches = torch.zeros(4, dtype=torch.float64, device=storage.device), 0
         for _ in range(config.epochs):
             for batch in storage.minibatches(log_probs, normalised, returns, config.minibatch_size, self._generator):
                 totals += self._gradients(batch)
@@ -155,6 +153,13 @@ class Ppo:
         self._scaler.load_state(without_prefix("scaler", state))
         self._generator.set_state(torch.from_numpy(np.array(state["generator"], np.uint8)))
         self.storage.clear()
+
+
+def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: Body) -> PpoGradients:
+    """Written out on a CPU; by autograd elsewhere."""
+    if actor.log_std.device.type == "cpu":
+        return WrittenPpo(actor, critic, config.clip_range, config.entropy_coefficient, config.minibatch_size)
+    return AutogradPpo(actor, critic, config.clip_range, config.entropy_coefficient)
 
 
 def build_ppo(config: PpoConfig, observation_size: int, seed: int, device: torch.device) -> Ppo:

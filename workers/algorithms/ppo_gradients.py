@@ -1,4 +1,4 @@
-"""The gradients of PPO's losses: by autograd, which reads as the paper does, and written out, which is faster.
+"""The gradients of PPO's losses: by autograd, which reads as the paper does, and written out, which is faster on a CPU.
 
 The losses, over a minibatch of n samples (Schulman et al. 2017):
 
@@ -8,17 +8,17 @@ The losses, over a minibatch of n samples (Schulman et al. 2017):
 Actor and critic share nothing, so each gradient is that of its own loss and needs no weighing against the other.
 """
 
-import math
 from typing import Protocol
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from workers.algorithms.ppo_loss import LOG_SQRT_2PI, STATISTICS, differentiate_policy_loss, differentiate_value_loss
 from workers.algorithms.rollout import Minibatch
 from workers.backward import backward_of
+from workers.layout import ACTION_SIZE
 from workers.networks import Body, GaussianActor
-
-LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class PpoGradients(Protocol):
@@ -70,52 +70,40 @@ class AutogradPpo:
 
 
 class WrittenPpo:
-    """The same gradients without autograd; a test compares them with `AutogradPpo`'s."""
+    """The same gradients without autograd, on a CPU; a test compares them with `AutogradPpo`'s."""
 
     def __init__(
         self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float, batch_size: int
     ) -> None:
-        self._log_std = actor.log_std
+        log_std = actor.log_std
+        assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
+        self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
         self._policy = backward_of(actor.network, batch_size)
         self._critic = backward_of(critic, batch_size)
+        self._by_logits = log_std.new_empty(batch_size, ACTION_SIZE)
+        self._by_values = log_std.new_empty(batch_size, 1)
 
     @torch.no_grad()
     def __call__(self, batch: Minibatch) -> Tensor:
         """See `PpoGradients`."""
         rows = len(batch.advantages)
-        log_std, advantages = self._log_std, batch.advantages
-        logits = self._policy.forward(batch.observations)
-        mean = torch.empty_like(logits)
-        torch.sigmoid(logits[:, 0], out=mean[:, 0])
-        torch.tanh(logits[:, 1], out=mean[:, 1])
-        inverse_std = torch.exp(-log_std)
-        noise = (batch.actions - mean).mul_(inverse_std)
-        squares = noise.square()
-        log_ratio = squares.sum(1).mul_(-0.5).sub_(batch.log_probs).sub_(log_std.sum() + 2 * LOG_SQRT_2PI)
-        ratio = log_ratio.exp()
-
-        # min(r A, clip(r) A) is r A, whose derivative by log r is r A, unless clip(r) A is smaller: then it is constant.
-        surrogate = ratio * advantages
-        clipped = ratio.clamp(1.0 - self._clip_range, 1.0 + self._clip_range)
-        clipped_surrogate = clipped * advantages
-        by_log_prob = torch.where(clipped_surrogate < surrogate, 0.0, surrogate).mul_(-1.0 / rows).unsqueeze(1)
-        log_std_gradient = self._log_std.grad
-        assert log_std_gradient is not None, "FlatAdam gives every parameter its gradient"
-        torch.sum(squares.sub_(1.0).mul_(by_log_prob), 0, out=log_std_gradient)
-        log_std_gradient.sub_(self._entropy_coefficient)
-
-        # d log p / d mean = noise / std; then through sigmoid (s (1 - s)) and tanh (1 - t^2).
-        by_logits = noise.mul_(by_log_prob).mul_(inverse_std)
-        by_logits[:, 0].mul_(mean[:, 0] * (1.0 - mean[:, 0]))
-        by_logits[:, 1].mul_(1.0 - mean[:, 1].square())
+        by_logits, by_values = self._by_logits[:rows], self._by_values[:rows]
+        statistics = np.zeros(STATISTICS)
+        differentiate_policy_loss(
+            self._policy.forward(batch.observations).numpy(),
+            batch.actions.numpy(),
+            batch.log_probs.numpy(),
+            batch.advantages.numpy(),
+            self._log_std,
+            self._clip_range,
+            self._entropy_coefficient,
+            by_logits.numpy(),
+            self._by_log_std,
+            statistics,
+        )
         self._policy.backward(by_logits)
-
-        error = self._critic.forward(batch.observations)[:, 0] - batch.returns
-        value_loss = error.dot(error) / rows
-        self._critic.backward(error.mul_(2.0 / rows).unsqueeze(1))
-
-        policy_loss = -torch.minimum(surrogate, clipped_surrogate).mean()
-        kl = (ratio - 1.0 - log_ratio).mean()
-        clip_fraction = (ratio != clipped).float().mean()
-        return torch.stack((policy_loss, value_loss, kl, clip_fraction))
+        values = self._critic.forward(batch.observations).numpy()
+        differentiate_value_loss(values, batch.returns.numpy(), by_values.numpy(), statistics)
+        self._critic.backward(by_values)
+        return torch.from_numpy(statistics)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sim.observations import observation_size
 from workers.config import PpoConfig, TrainingConfig
 from workers.diagnoses.history import MIN_POINTS, History
 from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
@@ -58,7 +59,7 @@ def constant_observations(history: History) -> Diagnosis | None:
     constant = history.recent("observation/constant")
     if constant is None or constant < _CONSTANT:
         return None
-    numbers = history.training.task.lidar.batches + 6
+    numbers = observation_size(history.training.task)
     return Diagnosis(
         id="constant_observations",
         severity="error",

@@ -8,7 +8,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from workers.errors import ExportError
-from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, RANGES, TARGET, VELOCITY
+from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, PREVIOUS, RANGES, TARGET, VELOCITY
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
 from workers.live.viewing import PolicyFunction
@@ -55,6 +55,8 @@ def check_export(
     scene = _scene(rng, shipped)
     by_scene = run_graph(by_scan, scene)
     seen = observe(shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION])
+    if PREVIOUS in scene:
+        seen = np.concatenate((seen, scene[PREVIOUS]), axis=1)
     policy_difference = max(
         _difference(graph[ACTION], expected, "the ONNX graph's actions"),
         _difference(graph[VELOCITY] / limits, expected, "the ONNX graph's velocities, as fractions of their limits,"),
@@ -85,6 +87,9 @@ def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats
         TARGET: rng.uniform(-half, half, (_ROWS, 2)),
         LAST_ACTION: rng.uniform((0.0, -1.0), (1.0, 1.0), (_ROWS, 2)),
     }
+    if specification.frames > 1:
+        earlier = specification.observation_size - specification.frame_size
+        scene[PREVIOUS] = rng.uniform(0.0, 1.0, (_ROWS, earlier))
     cast = {name: values.astype(np.float32) for name, values in scene.items()}
     cast[RANGES] = np.minimum(cast[RANGES], np.float32(specification.range))
     return cast

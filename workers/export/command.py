@@ -16,8 +16,10 @@ class ExportFormat(StrEnum):
     ONNX_SCAN = "onnx-scan"
     BUNDLE = "bundle"
 
-
-_SUFFIXES = {ExportFormat.ONNX: ".onnx", ExportFormat.ONNX_SCAN: "-scan.onnx", ExportFormat.BUNDLE: "-bundle.zip"}
+    @property
+    def suffix(self) -> str:
+        """What a checkpoint's name gets in place of '.zip'."""
+        return {ExportFormat.ONNX: ".onnx", ExportFormat.ONNX_SCAN: "-scan.onnx", ExportFormat.BUNDLE: "-bundle.zip"}[self]
 
 
 def export(
@@ -35,7 +37,7 @@ def export(
     # Only now: torch and onnx take seconds to import, which `--help` should not.
     from workers.export.bundle import bundle, export_checkpoint
 
-    path = out or checkpoint.with_name(checkpoint.stem + _SUFFIXES[export_format])
+    path = out or checkpoint.with_name(checkpoint.stem + export_format.suffix)
     try:
         exported = export_checkpoint(checkpoint)
         if export_format is ExportFormat.BUNDLE:

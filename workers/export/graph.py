@@ -4,7 +4,8 @@
 |-------------|-------------------------------------------------------------|-------------------------------------|
 | observation | `observation` (n, size) as the manifest describes it         | `action`, `velocity`                |
 | scan        | `ranges` (n, rays), `pose` (n, 3), `target` (n, 2),          | `observation`, `action`, `velocity` |
-|             | `last_action` (n, 2)                                         |                                     |
+|             | `last_action` (n, 2); with stacked frames `previous`,        |                                     |
+|             | all but the last frame of the last `observation`             |                                     |
 
 `action` (n, 2) is in [0, 1] and [-1, 1]; `velocity` (n, 2) in m/s and rad/s, cut at the robot's limits. All numbers are
 float32. The manifest is in the file's metadata.
@@ -30,7 +31,7 @@ OPSET = 17
 IR_VERSION = 8
 
 OBSERVATION, ACTION, VELOCITY = "observation", "action", "velocity"
-RANGES, POSE, TARGET, LAST_ACTION = "ranges", "pose", "target", "last_action"
+RANGES, POSE, TARGET, LAST_ACTION, PREVIOUS = "ranges", "pose", "target", "last_action", "previous"
 
 # Keeps a quotient finite; far below any distance that matters.
 _TINY = 1e-12
@@ -49,6 +50,8 @@ def scan_graph(policy: Policy, specification: Specification, manifest: Manifest)
     graph.observe(specification)
     graph.act(OBSERVATION, specification)
     inputs = {RANGES: specification.rays, POSE: 3, TARGET: 2, LAST_ACTION: ACTION_SIZE}
+    if specification.frames > 1:
+        inputs[PREVIOUS] = specification.observation_size - specification.frame_size
     return graph.model(inputs, (OBSERVATION, ACTION, VELOCITY), manifest)
 
 
@@ -119,7 +122,8 @@ class _Graph:
                 self._node("Div", heading, self._number(math.pi)),
             )
         deviation = self._node("Div", self._node("Abs", bearing), self._number(math.pi))
-        self._node("Concat", seen, LAST_ACTION, *goal, deviation, name=OBSERVATION, axis=1)
+        earlier = (PREVIOUS,) if specification.frames > 1 else ()
+        self._node("Concat", seen, LAST_ACTION, *goal, deviation, *earlier, name=OBSERVATION, axis=1)
 
     def _direction(self, offset: str, distance: str) -> str:
         """atan2(dy, dx), which ONNX lacks, as 2 atan(dy / (d + dx)), or 2 atan((d - dx) / dy) where d + dx would cancel."""

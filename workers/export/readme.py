@@ -11,12 +11,13 @@ import sys
 
 sys.path.insert(0, "ros2/mapless_navigator")  # without ROS: these modules need NumPy only
 
-from mapless_navigator.observation import observe
+from mapless_navigator.observation import Frames, observe
 from mapless_navigator.policy import Policy
 
 policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.rays]  # metres, from right to left
-observation = observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[0.0, 0.0]])
+frames = Frames(policy.specification)  # of one robot, from start to target
+observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[0.0, 0.0]]))
 linear, angular = policy.velocities(observation)[0]
 print(f"{linear:.3f} m/s, {angular:.3f} rad/s")
 """
@@ -32,7 +33,7 @@ inputs = {
     "target": np.array([[2.0, 1.0]], np.float32),
     "last_action": np.zeros((1, 2), np.float32),  # the `action` of the step before
 }
-action, velocity = session.run(["action", "velocity"], inputs)
+PREVIOUSaction, velocity = session.run(["action", "velocity"], inputs)
 print(f"{velocity[0, 0]:.3f} m/s, {velocity[0, 1]:.3f} rad/s")
 """
 
@@ -46,9 +47,21 @@ def readme(manifest: Manifest, specification: Specification, report: CheckReport
             _contract(manifest, specification),
             _ros(specification),
             "## Python, without ROS\n\nWith NumPy alone:\n\n```python\n" + _NUMPY_EXAMPLE + "```\n",
-            "With onnxruntime:\n\n```python\n" + _ONNX_EXAMPLE.replace("RAYS", str(specification.rays)) + "```\n",
+            f"With onnxruntime:\n\n```python\n{_onnx_example(specification)}```\n",
         )
     )
+
+
+def _onnx_example(specification: Specification) -> str:
+    previous = ""
+    if specification.frames > 1:
+        size, earlier = specification.frame_size, specification.frames - 1
+        previous = (
+            f'inputs["previous"] = np.zeros((1, {earlier * size}), np.float32)\n'
+            f'first = session.run(["observation"], inputs)[0][:, :{size}]\n'
+            f'inputs["previous"] = np.tile(first, (1, {earlier}))  # later: observation[:, :-{size}] of the step before\n'
+        )
+    return _ONNX_EXAMPLE.replace("RAYS", str(specification.rays)).replace("PREVIOUS", previous)
 
 
 def _head(manifest: Manifest) -> str:
@@ -90,7 +103,7 @@ def _contract(manifest: Manifest, specification: Specification) -> str:
     return f"""\
 ## What the policy expects
 
-A differential-drive robot of radius {specification.robot_radius:g} m, a new command every
+A differential-drive robot with {_body(specification)}, a new command every
 {specification.control_period:g} s, 0 to {specification.max_linear_speed:g} m/s forwards and
 {specification.max_angular_speed:g} rad/s to either side. A LiDAR with {specification.rays} rays over
 {math.degrees(specification.field_of_view):g} degrees, symmetric about the heading, from right to left, cut at
@@ -100,6 +113,15 @@ A differential-drive robot of radius {specification.robot_radius:g} m, a new com
 |---|---|---|---|
 {rows}
 """
+
+
+def _body(specification: Specification) -> str:
+    if not specification.robot_length:
+        return f"a round body of radius {specification.robot_radius:g} m"
+    return (
+        f"a rectangular body {specification.robot_length:g} m long and {specification.robot_width:g} m wide, "
+        "the LiDAR in its middle"
+    )
 
 
 def _cell(text: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save as save_safetensors
 
-from sim.arenas import build_arenas
+from sim.arenas import build_arena
 from sim.observations import near_distance
 from workers.errors import ExportError
 from workers.export.ros2.mapless_navigator.policy import Specification
@@ -32,14 +32,16 @@ def specify(manifest: Manifest, packed_weights: bytes) -> Specification:
             f"the observation {observation.name!r} version {observation.version} can't be made on a robot: "
             "export with the release that trained this policy"
         )
-    arena = build_arenas(task.arena)[0]
+    arena = build_arena(task.arena, 0)
+    half_length, half_width = task.robot.half_extents or (0.0, 0.0)
     return Specification(
         format="mapless-deployment",
-        version=1,
+        version=2,
         observation=observation.name,
         observation_version=observation.version,
         rays=task.lidar.rays,
         batches=task.lidar.batches,
+        frames=task.frames,
         field_of_view=math.radians(task.lidar.field_of_view),
         range=task.lidar.range,
         near=near_distance(task),
@@ -49,7 +51,9 @@ def specify(manifest: Manifest, packed_weights: bytes) -> Specification:
         control_period=task.control_period,
         arrival_distance=task.arrival_distance,
         collision_distance=task.collision_distance,
-        robot_radius=task.robot.radius,
+        robot_radius=task.robot.inscribed_radius,
+        robot_length=2.0 * half_length,
+        robot_width=2.0 * half_width,
         network=manifest.network.name,
         layers=manifest.network.layers,
         activation=manifest.network.activation,

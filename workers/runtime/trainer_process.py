@@ -5,7 +5,6 @@ reports on the inherited file descriptor FD; whatever libraries print goes to st
 crash. It ends with the process that started it (PARENT), however that ends: standard input closes then.
 """
 
-import ctypes
 import os
 import signal
 import sys
@@ -19,6 +18,7 @@ from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import WorkerError
 from workers.frames import Frame
+from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.runtime.pipe import (
     CheckpointReport,
@@ -37,7 +37,6 @@ from workers.runtime.pipe import (
 
 # Frames that wait for the pipe, at most: two thirds of a second at 30 a second. Older ones are worth nothing.
 _FRAME_BACKLOG = 20
-_PR_SET_PDEATHSIG = 1
 
 
 class PipeReporter:
@@ -118,14 +117,6 @@ class PipeReporter:
                 return  # the task is gone, and so will this process be in a moment
 
 
-def _die_with_parent(parent: int) -> None:
-    """Linux kills this process when its parent dies, also while a library call holds the interpreter."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
-
-
 def _listen(incoming: Receiver[Order], reporter: PipeReporter) -> None:
     while (order := incoming.receive()) is not None:
         if isinstance(order, Control):
@@ -135,7 +126,7 @@ def _listen(incoming: Receiver[Order], reporter: PipeReporter) -> None:
 
 def main(descriptor: int, parent: int) -> None:
     """Wait for a job, train, report."""
-    _die_with_parent(parent)
+    die_with_parent(parent)
     # Ctrl-C reaches the whole terminal; ending in order is the worker's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

@@ -56,7 +56,7 @@ def sensed(ranges: np.ndarray, rng: np.random.Generator) -> Scan:
 
 def test_a_trained_policy_arrives_through_the_code_that_ships(tmp_path: Path) -> None:
     reporter = LastCheckpoint()
-    training = TrainingConfig(steps=60_000, evaluation=EvaluationConfig(every_steps=100_000))
+    training = TrainingConfig(steps=100_000, evaluation=EvaluationConfig(every_steps=100_000))
     train(training, 0, reporter, tmp_path / "checkpoints")
     with zipfile.ZipFile(io.BytesIO(bundle(export_checkpoint(reporter.archive)))) as archive:
         archive.extractall(tmp_path)

@@ -14,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from sim.config import LidarConfig, RobotConfig, TaskConfig
+from sim.config import BurgerConfig, JackalConfig, LidarConfig, TaskConfig
 from workers.checkpoints import read_policy
 from workers.config import MlpNetwork, Network, ResBlockNetwork
 from workers.errors import ArchiveFormatError, ExportError
@@ -22,6 +22,7 @@ from workers.export.bundle import bundle, export_checkpoint
 from workers.export.check import check_export, run_graph
 from workers.export.command import export as export_command
 from workers.export.graph import observation_graph
+from workers.export.readme import readme
 from workers.export.ros2.mapless_navigator.policy import Policy, PolicyFileError, read_safetensors
 from workers.manifest import Manifest
 from workers.policy import torch_policy
@@ -32,13 +33,14 @@ TASKS = [
     TaskConfig(observation="paper"),
     TaskConfig(
         lidar=LidarConfig(rays=24, batches=24, field_of_view=360.0, range=5.0),
-        robot=RobotConfig(max_linear_speed=0.5, max_angular_speed=2.5),
+        robot=BurgerConfig(max_linear_speed=0.5, max_angular_speed=2.5),
     ),
+    TaskConfig(frames=3),
 ]
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=repr)
-@pytest.mark.parametrize("task", TASKS, ids=["improved", "paper", "full circle"])
+@pytest.mark.parametrize("task", TASKS, ids=["improved", "paper", "full circle", "stacked"])
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
     archive = make_checkpoint(network, task)
     exported = export_checkpoint(archive)
@@ -53,6 +55,12 @@ def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: 
     np.testing.assert_allclose(found["action"], expected, rtol=0, atol=1e-5)
     limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)
     np.testing.assert_allclose(found["velocity"], expected * limits, rtol=0, atol=1e-5)
+
+
+def test_the_bundle_says_which_body_the_policy_was_trained_for(make_checkpoint: Callable[..., Path]) -> None:
+    for robot, words in ((BurgerConfig(), "round body of radius 0.105 m"), (JackalConfig(), "0.508 m long and 0.43 m wide")):
+        exported = export_checkpoint(make_checkpoint(task=TaskConfig(robot=robot)))
+        assert words in readme(exported.manifest, exported.specification, exported.report)
 
 
 def test_velocities_stay_within_the_limits_whatever_comes_in(make_checkpoint: Callable[..., Path]) -> None:
@@ -91,12 +99,15 @@ def test_an_export_that_is_not_a_number_is_refused(make_checkpoint: Callable[...
         check_export(torch_policy(policy.network, policy.weights), shipped, manifest, broken, exported.by_scan)
 
 
+def unpack(archive: Path, directory: Path) -> Path:
+    with zipfile.ZipFile(io.BytesIO(bundle(export_checkpoint(archive)))) as zipped:
+        zipped.extractall(directory)
+    return directory / "mapless-policy"
+
+
 @pytest.fixture
 def unpacked(make_checkpoint: Callable[..., Path], tmp_path: Path) -> Path:
-    data = bundle(export_checkpoint(make_checkpoint(ResBlockNetwork())))
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        archive.extractall(tmp_path)
-    return tmp_path / "mapless-policy"
+    return unpack(make_checkpoint(ResBlockNetwork()), tmp_path)
 
 
 def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[..., Path]) -> None:
@@ -104,7 +115,9 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
     assert bundle(export_checkpoint(archive)) == bundle(export_checkpoint(archive))
 
 
-def test_readme_examples_run_and_agree(unpacked: Path) -> None:
+@pytest.mark.parametrize("frames", [1, 4])
+def test_readme_examples_run_and_agree(make_checkpoint: Callable[..., Path], tmp_path: Path, frames: int) -> None:
+    unpacked = unpack(make_checkpoint(ResBlockNetwork(), TaskConfig(frames=frames)), tmp_path)
     readme = (unpacked / "README.md").read_text()
     numpy_example, onnx_example = (part.split("```")[0] for part in readme.split("```python\n")[1:])
 

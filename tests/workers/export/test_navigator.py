@@ -47,8 +47,12 @@ def test_it_drives_when_all_is_well(navigator: Navigator) -> None:
     assert abs(command.angular) <= 1.0
 
 
-def test_it_commands_what_the_policy_does_in_the_simulator(policy: Policy) -> None:
-    env = NavigationVectorEnv(TaskConfig(arena=ArenaConfig(name="complex")), 1, seed=3)
+@pytest.mark.parametrize("frames", [1, 3])
+def test_it_commands_what_the_policy_does_in_the_simulator(make_checkpoint: Callable[..., Path], frames: int) -> None:
+    task = TaskConfig(arena=ArenaConfig(name="complex"), frames=frames)
+    exported = export_checkpoint(make_checkpoint(task=task))
+    policy = Policy(exported.specification, read_safetensors(exported.weights))
+    env = NavigationVectorEnv(task, 1, seed=3)
     observations, _ = env.reset(seed=3)
     safety = replace(Safety.of(policy.specification), stop_distance=0.0, body_distance=0.0, goal_tolerance=0.0)
     navigator = Navigator(policy, safety)
@@ -111,6 +115,27 @@ def test_a_single_near_beam_stops(navigator: Navigator, degrees: int, distance: 
     assert command.state is state
     if state is State.TOO_NEAR:
         assert (command.linear, command.angular) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "distance", "state"),
+    [
+        (0, 0.52, State.TOO_NEAR),  # 0.5 m from the middle to the front, and a tenth of it on top
+        (0, 0.56, State.DRIVING),
+        (90, 0.21, State.TOO_NEAR),
+        (90, 0.23, State.DRIVING),  # half a width of 0.2 m
+        (180, 0.52, State.TOO_NEAR),
+        (45, 0.30, State.TOO_NEAR),  # the side, met at 45 degrees: 0.2 sqrt(2) = 0.283 m
+        (45, 0.32, State.DRIVING),
+    ],
+)
+def test_a_rectangular_body_keeps_its_outline_clear(policy: Policy, degrees: int, distance: float, state: State) -> None:
+    policy.specification = replace(policy.specification, robot_radius=0.2, robot_length=1.0, robot_width=0.4)
+    navigator = Navigator(policy, Safety.of(policy.specification))
+    navigator.set_scan(10.0, scan(3.0, **{f"at_{degrees}": distance}))
+    navigator.set_odometry(10.0, 0.0, 0.0, 0.0)
+    navigator.set_goal(2.0, 0.5)
+    assert navigator.command(10.1).state is state
 
 
 def test_after_a_near_obstacle_it_drives_again_only_with_a_margin(navigator: Navigator) -> None:

@@ -14,7 +14,7 @@ from sim.lidar import ray_angles as simulated_ray_angles
 from sim.vector_env import NavigationVectorEnv
 from workers.export.bundle import export_checkpoint
 from workers.export.check import run_graph
-from workers.export.ros2.mapless_navigator.observation import Scan, observe, ray_angles, resample, wrap
+from workers.export.ros2.mapless_navigator.observation import Frames, Scan, observe, ray_angles, resample, wrap
 from workers.export.ros2.mapless_navigator.policy import Specification
 
 TASKS = {
@@ -53,6 +53,32 @@ def test_observation_equals_the_simulators(make_checkpoint: Callable[..., Path],
         np.testing.assert_allclose(run_graph(exported.by_scan, scene)["observation"], observations, rtol=0, atol=1e-5)
         compared += len(made)
     assert compared == 3840
+
+
+def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path]) -> None:
+    task = TaskConfig(arena=ArenaConfig(name="complex"), frames=3)
+    exported = export_checkpoint(make_checkpoint(task=task))
+    specification = exported.specification
+    env = NavigationVectorEnv(task, 1, seed=5)
+    observations, _ = env.reset(seed=5)
+    rng = np.random.default_rng(5)
+    frames = Frames(specification)
+    last = np.zeros((1, 2), np.float32)
+    starts = 0
+    for _ in range(300):
+        made = frames.push(observe(specification, env.ranges, env.poses, env.targets, last))
+        np.testing.assert_allclose(made, observations, rtol=0, atol=1e-5)
+        scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets, "last_action": last}
+        scene["previous"] = observations[:, 16:]
+        by_scan = run_graph(exported.by_scan, {name: np.array(array) for name, array in scene.items()})
+        np.testing.assert_allclose(by_scan["observation"], observations, rtol=0, atol=1e-5)
+        last = rng.uniform((0.0, -1.0), (1.0, 1.0), (1, 2)).astype(np.float32)
+        observations, _, terminations, truncations, _ = env.step(last)
+        if terminations[0] or truncations[0]:
+            frames.clear()
+            last = np.zeros((1, 2), np.float32)
+            starts += 1
+    assert starts > 1
 
 
 @pytest.mark.parametrize("name", TASKS)

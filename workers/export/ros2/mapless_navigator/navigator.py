@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from .observation import Scan, observe, ray_angles, resample
+from .observation import Frames, Reals, Scan, observe, ray_angles, resample
 from .policy import Floats, Policy, Specification
 
 
@@ -33,7 +33,8 @@ class Safety:
 
     Attributes:
         stop_distance: a beam within the policy's field of view shorter than this stops the robot.
-        body_distance: the same for beams beside and behind.
+        body_distance: the same for beams beside and behind; of a rectangular body at its nearest side, and all round in
+            proportion to its outline.
         resume_margin: metres more than either that let it drive again.
         scan_timeout, odometry_timeout: seconds after which the newest message is stale.
         goal_tolerance: distance to the goal that counts as arrived.
@@ -77,6 +78,15 @@ class Command:
     state: State
 
 
+def outline(specification: Specification, angles: Reals) -> Reals:
+    """Distance from the middle of a rectangular body to its edge at angles against the heading, metres."""
+    half_length, half_width = 0.5 * specification.robot_length, 0.5 * specification.robot_width
+    edge: Reals = np.minimum(
+        half_length / np.maximum(np.abs(np.cos(angles)), 1e-9), half_width / np.maximum(np.abs(np.sin(angles)), 1e-9)
+    )
+    return edge
+
+
 class Navigator:
     """Keeps the newest scan, pose and goal; `command` is called once per control period.
 
@@ -94,6 +104,7 @@ class Navigator:
         self._arrived = False
         self._too_near = False
         self._last_action = np.zeros(2, np.float32)
+        self._frames = Frames(policy.specification)
 
     def set_scan(self, at: float, scan: Scan) -> None:
         """A scan, measured at that time."""
@@ -147,14 +158,19 @@ class Navigator:
         ranges = resample(scan, specification, safety.sensor_yaw, safety.max_gap)
         if np.isnan(ranges).any():
             return State.BLIND, None
-        return State.DRIVING, observe(specification, ranges[None], pose[None], goal[None], self._last_action[None])
+        frame = observe(specification, ranges[None], pose[None], goal[None], self._last_action[None])
+        return State.DRIVING, self._frames.push(frame)
 
     def _is_too_near(self, scan: Scan) -> bool:
         """Whether a beam is shorter than it may be; once it was, all must clear a margin more."""
         safety = self._safety
         margin = safety.resume_margin if self._too_near else 0.0
-        ahead = np.abs(scan.angles(safety.sensor_yaw)) <= self._policy.specification.field_of_view / 2.0 + 1e-6
-        allowed = np.where(ahead, safety.stop_distance, safety.body_distance) + margin
+        specification, angles = self._policy.specification, scan.angles(safety.sensor_yaw)
+        ahead = np.abs(angles) <= specification.field_of_view / 2.0 + 1e-6
+        allowed = np.where(ahead, safety.stop_distance, safety.body_distance)
+        if specification.robot_length:
+            allowed = np.maximum(allowed, safety.body_distance / specification.robot_radius * outline(specification, angles))
+        allowed = allowed + margin
         # Comparisons with nan, an unknown distance, are false.
         return bool((scan.distances() < allowed).any())
 
@@ -171,5 +187,6 @@ class Navigator:
         return Command(linear * slower, angular * slower, State.DRIVING)
 
     def _stop(self, state: State) -> Command:
+        self._frames.clear()
         self._last_action = np.zeros(2, np.float32)
         return Command(0.0, 0.0, state)

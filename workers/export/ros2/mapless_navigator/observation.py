@@ -45,7 +45,7 @@ def ray_angles(specification: Specification) -> Reals:
 def observe(
     specification: Specification, ranges: ArrayLike, poses: ArrayLike, targets: ArrayLike, last_actions: ArrayLike
 ) -> Floats:
-    """Observations of n robots.
+    """What n robots see at one moment: the whole observation where no frames are stacked, else see `Frames`.
 
     Args:
         specification: the policy's.
@@ -73,6 +73,27 @@ def observe(
         goal = (distance / (distance + 1.0), bearing / np.pi, heading / np.pi)
     columns = (seen, np.asarray(last_actions, np.float64), np.stack((*goal, np.abs(bearing) / np.pi), axis=1))
     return np.concatenate(columns, axis=1).astype(np.float32)
+
+
+class Frames:
+    """Stacks what was seen at the latest moments, the newest first; a way begins with its first frame repeated.
+
+    Args:
+        specification: the policy's.
+    """
+
+    def __init__(self, specification: Specification) -> None:
+        self._frames = specification.frames
+        self._seen: list[Floats] = []
+
+    def push(self, frame: Floats) -> Floats:
+        """The observation (n, frames * size) after the newest frame (n, size), one control period after the last."""
+        self._seen = [frame, *(self._seen or [frame] * self._frames)][: self._frames]
+        return np.concatenate(self._seen, axis=1)
+
+    def clear(self) -> None:
+        """Forget what was seen: a new way begins."""
+        self._seen = []
 
 
 @dataclass(frozen=True)

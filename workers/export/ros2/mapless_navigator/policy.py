@@ -37,6 +37,7 @@ class Specification:
         observation_version: version of that layout.
         rays: rays of a scan.
         batches: numbers that they become, each the minimum of rays / batches neighbours.
+        frames: observations of the latest steps that the policy sees at once.
         field_of_view: of the scan, symmetric about the heading.
         range: what a ray without a hit reads.
         near: distance at which the inverse range of 'improved' reaches 1.
@@ -46,7 +47,8 @@ class Specification:
         control_period: between two actions.
         arrival_distance: to the target, that counted as arrived.
         collision_distance: a shorter ray was a collision.
-        robot_radius: of the robot's body.
+        robot_radius: of the largest disc within the robot's body: its radius if it is round.
+        robot_length, robot_width: of the body if it is rectangular, about the LiDAR; 0 if it is round.
         network: 'mlp' or 'resblock'.
         layers: prefixes of the arrays '<prefix>.weight' (outputs, inputs) and '<prefix>.bias' (outputs,), in order.
         activation: of the hidden layers, 'relu', 'tanh' or 'leaky_relu'.
@@ -59,6 +61,7 @@ class Specification:
     observation_version: int
     rays: int
     batches: int
+    frames: int
     field_of_view: float
     range: float
     near: float
@@ -69,15 +72,22 @@ class Specification:
     arrival_distance: float
     collision_distance: float
     robot_radius: float
+    robot_length: float
+    robot_width: float
     network: str
     layers: tuple[str, ...]
     activation: str
     weights_sha256: str
 
     @property
-    def observation_size(self) -> int:
-        """Numbers in an observation: the batches, two velocities, and four of the target."""
+    def frame_size(self) -> int:
+        """Numbers of one moment: the batches, two velocities, and four of the target."""
         return self.batches + 6
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers in an observation: all frames."""
+        return self.frames * self.frame_size
 
     @classmethod
     def load(cls, path: Path) -> "Specification":
@@ -92,7 +102,7 @@ class Specification:
             specification = cls(**{field.name: values[field.name] for field in fields(cls)})
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise PolicyFileError(f"{path} is not a policy's specification ({error!r}): export the policy again") from error
-        known = ("mapless-deployment", 1), ("improved", "paper"), ("mlp", "resblock"), ("relu", "tanh", "leaky_relu")
+        known = ("mapless-deployment", 2), ("improved", "paper"), ("mlp", "resblock"), ("relu", "tanh", "leaky_relu")
         if (
             (specification.format, specification.version) != known[0]
             or (specification.observation not in known[1] or specification.observation_version != 1)
