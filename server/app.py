@@ -20,7 +20,11 @@ from server.files import FileStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.migrate import upgrade
+from server.policies import endpoints as policies
 from server.problems import UNAUTHORIZED, install_error_handlers
+from server.replays import endpoints as replays
+from server.replays.recordings import RecordingStore
+from server.reproduction import endpoints as reproduction
 from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
@@ -44,7 +48,10 @@ ROUTERS: tuple[APIRouter, ...] = (
     diagnoses.router,
     checkpoints.router,
     exports.router,
+    replays.router,
+    policies.router,
     comparison.router,
+    reproduction.router,
     events.router,
     live.router,
     worker_api.router,
@@ -69,7 +76,8 @@ def create_services(settings: Settings) -> Services:
     upgrade(database)
     files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
     arenas = ArenaStore(settings.arenas_dir)
-    return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas)
+    recordings = RecordingStore(settings.replays_dir, settings.max_replay_bytes)
+    return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas, recordings=recordings)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -86,6 +94,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             stack.callback(services.database.dispose)
             stack.callback(services.bus.close)
             stack.push_async_callback(services.live.close)
+            stack.push_async_callback(services.drivers.close)
             await run_in_threadpool(services.files.remove_torn)
             for background in BACKGROUND:
                 await stack.enter_async_context(background(services))

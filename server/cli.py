@@ -114,6 +114,12 @@ def export(context: typer.Context) -> None:
 
 
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
+def policies(context: typer.Context) -> None:
+    """List and export the trained policies that ship with Mapless."""
+    _workers_command("policies", context)
+
+
+@app.command(context_settings=_PASSED_ON, add_help_option=False)
 def reproduce(context: typer.Context) -> None:
     """Train every row of the paper's tables, and say which of its claims hold."""
     _workers_command("reproduce", context)

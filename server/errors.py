@@ -12,7 +12,9 @@ ServiceError                        500
 ├── CorruptUploadError              422  the bytes are not what their checksum says
 ├── TooManyAttemptsError            429  too many wrong tokens
 ├── ExportFailedError               500  a policy could not be exported faithfully
-└── ExportTimeoutError              503  exporting took too long
+├── ReplayFailedError               500  an evaluation could not be driven again
+├── ExportTimeoutError              503  exporting took too long
+└── ReplayTimeoutError              503  driving an evaluation again took too long
 """
 
 from pydantic import BaseModel
@@ -101,5 +103,17 @@ class ExportFailedError(ServiceError):
 
 class ExportTimeoutError(ServiceError):
     """Exporting took too long; later it may not."""
+
+    status = 503
+
+
+class ReplayFailedError(ServiceError):
+    """An evaluation could not be driven again."""
+
+    status = 500
+
+
+class ReplayTimeoutError(ServiceError):
+    """Driving an evaluation again took too long; later it may not."""
 
     status = 503

@@ -25,6 +25,9 @@ class Experiment(Base):
     name: Mapped[str] = mapped_column(String(120))
     training: Mapped[dict[str, Any]] = mapped_column(JSON)
     created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    # Of the paper's reproduction: experiments launched together share the first, the second names the table's row.
+    campaign: Mapped[str | None] = mapped_column(String(16), index=True)
+    campaign_row: Mapped[str | None] = mapped_column(String(64))
 
     runs: Mapped[list["Run"]] = relationship(
         back_populates="experiment", cascade="all, delete-orphan", passive_deletes=True, order_by="Run.seed"

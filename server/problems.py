@@ -17,6 +17,10 @@ EXPORT_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not exported: the reason is in the detail"},
     503: {"model": ErrorBody, "description": "Took too long"},
 }
+REPLAY_FAILED: Responses = {
+    500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
+    503: {"model": ErrorBody, "description": "Took too long"},
+}
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 

@@ -11,8 +11,10 @@ from server.database import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
 from server.files import FileStore
+from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
+from server.replays.recordings import RecordingStore
 from server.security.limits import LoginLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
@@ -27,11 +29,16 @@ class Services:
     database: Database
     files: FileStore
     arenas: ArenaStore
+    recordings: RecordingStore
     bus: EventBus = field(default_factory=EventBus)
     doorbell: Doorbell = field(default_factory=NoDoorbell)
     links: Links = field(default_factory=NoLinks)
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
+    drivers: PolicyDrivers = field(init=False)
     login_limiter: LoginLimiter = field(default_factory=LoginLimiter)
+
+    def __post_init__(self) -> None:
+        self.drivers = PolicyDrivers(self.live)
 
 
 def _services(connection: HTTPConnection) -> Services:

@@ -65,6 +65,7 @@ class Settings(BaseSettings):
     lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run.")
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
+    max_replay_bytes: int = Field(256 * 2**20, ge=0, description="Of all replays that are kept; older ones are made again.")
     max_body_bytes: int = Field(4 * 2**20, gt=0, description="Largest body of any other request.")
 
     @field_validator("data_dir")
@@ -105,6 +106,11 @@ class Settings(BaseSettings):
     def arenas_dir(self) -> Path:
         """Directory of the imported arenas."""
         return self.data_dir.resolve() / "arenas"
+
+    @property
+    def replays_dir(self) -> Path:
+        """Directory of the evaluations that were driven again: a cache."""
+        return self.data_dir.resolve() / "replays"
 
     @property
     def resolved_server_url(self) -> str:

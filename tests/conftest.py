@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
+from hypothesis import settings
 
 from sim.config import TaskConfig
 from sim.observations import observation_layout
@@ -18,6 +19,10 @@ from workers.layout import layout, weight_shapes
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 
 POSTGRES = ("127.0.0.1", 5432)
+
+# How long an example takes says something of the machine, nothing of the code.
+settings.register_profile("mapless", deadline=None)
+settings.load_profile("mapless")
 
 
 def require_service(name: str, host: str, port: int) -> None:

@@ -21,5 +21,11 @@ export default defineConfig({
       },
     },
   },
-  server: { proxy: { '/api': { target: server, ws: true }, '/live': { target: server, ws: true } } },
+  server: {
+    proxy: {
+      '/api': { target: server, ws: true },
+      '/live': { target: server, ws: true },
+      '/replays': { target: server },
+    },
+  },
 })

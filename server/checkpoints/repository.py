@@ -120,3 +120,8 @@ class CheckpointRepository:
 def decode_episodes(evaluation: models.Evaluation) -> tuple[EpisodeResult, ...]:
     """The evaluation's episodes, in the suite's order."""
     return _EPISODES.validate_json(zlib.decompress(evaluation.episodes))
+
+
+def evaluation_result(evaluation: models.Evaluation) -> EvaluationResult:
+    """The evaluation as it was reported."""
+    return EvaluationResult(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=decode_episodes(evaluation))

@@ -4,6 +4,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from server.checkpoints import views
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
@@ -22,6 +23,11 @@ class Download:
     size: int
     sha256: str
     blocks: Iterator[bytes]
+
+    def save(self, path: Path) -> None:
+        """Write the archive to a file."""
+        with path.open("wb") as file:
+            file.writelines(self.blocks)
 
 
 class CheckpointService:

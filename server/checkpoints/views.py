@@ -40,7 +40,7 @@ def evaluation_view(evaluation: models.Evaluation) -> Evaluation:
 
 def checkpoint_views(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> list[Checkpoint]:
     """A run's checkpoints in JSON, the best marked."""
-    best = _best(rows)
+    best = _best_evaluated(rows)
     return [
         Checkpoint(
             id=checkpoint.id,
@@ -55,7 +55,12 @@ def checkpoint_views(rows: Sequence[tuple[models.Checkpoint, models.Evaluation |
     ]
 
 
-def _best(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> str | None:
+def best_checkpoint(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> str | None:
+    """The id of a run's best checkpoint; of its last where none was evaluated, None where there is none."""
+    return _best_evaluated(rows) or (rows[-1][0].id if rows else None)
+
+
+def _best_evaluated(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> str | None:
     """The id with the highest success rate; of equal ones that with the fewest steps to the target, then the newest."""
 
     def merit(row: tuple[models.Checkpoint, models.Evaluation]) -> tuple[float, float, int]:

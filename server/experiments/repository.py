@@ -107,6 +107,43 @@ class ExperimentRepository:
         )
         return self._session.scalars(rows).all(), total
 
+    def campaign(self, campaign_id: str) -> Sequence[models.Experiment]:
+        """The experiments of a campaign with their runs; those that were deleted are missing.
+
+        Raises:
+            NotFoundError: none is left.
+        """
+        query = (
+            select(models.Experiment)
+            .where(models.Experiment.campaign == campaign_id)
+            .options(selectinload(models.Experiment.runs))
+            .order_by(models.Experiment.created_at, models.Experiment.id)
+        )
+        found = self._session.scalars(query).all()
+        if not found:
+            raise NotFoundError.of("campaign", campaign_id)
+        return found
+
+    def campaigns(self) -> list[tuple[str, float]]:
+        """Every campaign of which an experiment is left, with the time of its launch, the newest first."""
+        launched = func.min(models.Experiment.created_at)
+        query = (
+            select(models.Experiment.campaign, launched)
+            .where(models.Experiment.campaign.is_not(None))
+            .group_by(models.Experiment.campaign)
+            .order_by(launched.desc(), models.Experiment.campaign)
+        )
+        return [(campaign, at) for campaign, at in self._session.execute(query) if campaign is not None]
+
+    def unfinished_campaign(self) -> str | None:
+        """A campaign with a run that has not ended."""
+        query = (
+            select(models.Experiment.campaign)
+            .join(models.Run, models.Run.experiment_id == models.Experiment.id)
+            .where(models.Experiment.campaign.is_not(None), models.Run.state.in_(UNFINISHED))
+        )
+        return self._session.scalars(query).first()
+
     def delete(self, experiment: models.Experiment) -> None:
         """Remove the experiment with everything that hangs on it."""
         self._session.delete(experiment)

@@ -147,6 +147,7 @@ def _views(session: Session, experiments: Sequence[models.Experiment]) -> list[E
                 training=training,
                 state=aggregate_state([run.state for run in experiment.runs]),
                 runs=[run_view(run, training, latest.get(run.id, {})) for run in experiment.runs],
+                campaign=experiment.campaign,
                 success=success_over_runs([final[run.id] for run in experiment.runs if run.id in final]),
             )
         )

@@ -1,9 +1,6 @@
 """Makes deployment bundles, each in a process of its own: exporting compares with torch, which the server never imports."""
 
-import os
 import shutil
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +8,9 @@ from threading import BoundedSemaphore
 
 from server.checkpoints.service import CheckpointService
 from server.errors import ExportFailedError, ExportTimeoutError
+from server.processes import ProcessFailedError, ProcessTimeoutError, run_module
 from server.services import Services
 
-_ROOT = Path(__file__).resolve().parents[2]
 # Imports take most of the three seconds that an export needs; a machine that is busy training needs longer.
 _TIMEOUT = 120.0
 # An export takes a core and 0.5 GB; who comes third waits.
@@ -47,38 +44,37 @@ class ExportService:
             ExportTimeoutError: it took too long.
         """
         download = self._checkpoints.download(checkpoint_id)
-        directory = Path(tempfile.mkdtemp(prefix="mapless-export-"))
-        try:
-            archive, out = directory / "checkpoint.zip", directory / "bundle.zip"
-            with archive.open("wb") as file:
-                for block in download.blocks:
-                    file.write(block)
-            _run(archive, out)
-        except BaseException:
-            shutil.rmtree(directory, ignore_errors=True)
-            raise
-        return BundleFile(out, f"{download.file_name.removesuffix('.zip')}-bundle.zip")
+        with tempfile.TemporaryDirectory(prefix="mapless-checkpoint-") as scratch:
+            archive = Path(scratch) / "checkpoint.zip"
+            download.save(archive)
+            return bundle_of(archive, f"{download.file_name.removesuffix('.zip')}-bundle.zip")
+
+
+def bundle_of(archive: Path, file_name: str) -> BundleFile:
+    """An archive's deployment bundle, under the name that a browser should give it.
+
+    Raises:
+        ExportFailedError: the archive can't be exported, or the export does not equal the trained policy.
+        ExportTimeoutError: it took too long.
+    """
+    directory = Path(tempfile.mkdtemp(prefix="mapless-export-"))
+    try:
+        out = directory / "bundle.zip"
+        _run(archive, out)
+    except BaseException:
+        shutil.rmtree(directory, ignore_errors=True)
+        raise
+    return BundleFile(out, file_name)
 
 
 def _run(archive: Path, out: Path) -> None:
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
-    command = [sys.executable, "-m", "workers.export", str(archive), "--format", "bundle", "--out", str(out)]
     with _SLOTS:
         try:
-            subprocess.run(
-                command,
-                env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                check=True,
-                timeout=_TIMEOUT,
-            )
-        except subprocess.TimeoutExpired as error:
+            run_module("workers.export", str(archive), "--format", "bundle", "--out", str(out), timeout=_TIMEOUT)
+        except ProcessTimeoutError as error:
             raise ExportTimeoutError(
                 f"Exporting took longer than {_TIMEOUT:.0f} s: the machine is busy; try again, or download the checkpoint "
                 "and run `mapless export` on it elsewhere."
             ) from error
-        except subprocess.CalledProcessError as error:
-            reason = error.stderr.strip().splitlines()[-1:] or [f"exit status {error.returncode}"]
-            raise ExportFailedError(f"The policy was not exported: {reason[0].removeprefix('mapless: ')}") from error
+        except ProcessFailedError as error:
+            raise ExportFailedError(f"The policy was not exported: {error}") from error

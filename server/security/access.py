@@ -2,8 +2,8 @@
 
 - *Host* must be one of ours: a foreign name that resolves to this machine (DNS rebinding) is refused.
 - *Origin*, where a browser sends one with a request that changes something or opens a WebSocket, must be the page's own.
-- Everything under /api and /live needs the login token, as a cookie or as `Authorization: Bearer`; /api/worker needs the
-  workers' token instead, which opens nothing else. The pages themselves, /healthz and the login are open.
+- Everything under /api, /live and /replays needs the login token, as a cookie or as `Authorization: Bearer`; /api/worker
+  needs the workers' token instead, which opens nothing else. The pages themselves, /healthz and the login are open.
 """
 
 import hmac
@@ -25,7 +25,7 @@ from server.settings import Settings
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _LOCAL_NAMES = frozenset({"localhost"})
 _WORKER_PREFIX = "/api/worker/"
-_PROTECTED_PREFIXES = ("/api/", "/live/")
+_PROTECTED_PREFIXES = ("/api/", "/live/", "/replays/")
 _OPEN_PATHS = frozenset({"/api/login"})
 # RFC 6455: the request violates the server's policy; browsers see the handshake refused with 403.
 _POLICY_VIOLATION = 1008

@@ -1,7 +1,11 @@
 """The service at a glance."""
 
 import time
+from collections.abc import Sequence
 
+from sqlalchemy.orm import Session
+
+from server import models
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
@@ -17,10 +21,15 @@ def running_version() -> Version:
     return Version(version=version(), commit=commit())
 
 
+def workers_lately(session: Session) -> Sequence[models.Worker]:
+    """The workers that are there."""
+    return WorkerRepository(session).seen_since(time.time() - _LATELY_SECONDS)
+
+
 def status(services: Services) -> Status:
     """Workers heard of lately, and how many runs wait and go on."""
     with services.database.read() as session:
-        workers = WorkerRepository(session).seen_since(time.time() - _LATELY_SECONDS)
+        workers = workers_lately(session)
         runs = RunRepository(session)
         trained = runs.trained_by([worker.name for worker in workers])
         counts = runs.count_by_state()

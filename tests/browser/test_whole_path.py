@@ -88,6 +88,17 @@ def test_from_the_form_to_the_policy_and_a_comparison(context: BrowserContext, t
     manifest, _ = read_policy(early.value.path())
     assert manifest.network.name == "resblock"
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "completed", timeout=TRAINED)
+
+    # The robots go on without the worker, by the best policy; and every episode behind its figures can be looked at.
+    expect(frame.locator("#display")).to_contain_text("Best policy", timeout=SOON)
+    page.get_by_role("button", name=re.compile("^Replay episode")).first.click()
+    replay = page.frame_locator("[data-testid=replay-frame]")
+    seconds = replay.get_by_label("Seconds", exact=True)
+    expect(seconds).to_be_visible(timeout=SOON)
+    started = seconds.input_value()
+    expect(seconds).not_to_have_value(started, timeout=SOON)
+    page.get_by_role("dialog").locator(".mantine-Modal-close").click()
+    expect(page.get_by_role("dialog")).to_have_count(0)
     best = page.locator("[data-testid=checkpoint][data-best]").get_by_role("link", name=re.compile("Download"))
     with page.expect_download() as last:
         best.click()

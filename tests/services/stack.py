@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import httpx
 import psutil
 
+from workers.config import PpoConfig
+
 ROOT = Path(__file__).parents[2]
 TOKEN = "a-login-token-for-tests"
 WORKER_TOKEN = "a-worker-token-for-tests"
@@ -21,9 +23,9 @@ LEASE_SECONDS = 4
 # Far more than anything here takes; compiling the simulation's kernels anew, on a fresh checkout, takes a minute.
 PATIENCE = 150.0
 # Environment steps between two updates of the default training.
-ROLLOUT = 128 * 32
+ROLLOUT = PpoConfig().robots * PpoConfig().rollout_steps
 # And between two reports, at most: a fifth of a second, on a machine much faster than today's.
-REPORT = 16 * ROLLOUT
+REPORT = 8 * ROLLOUT
 
 T = TypeVar("T")
 
@@ -101,7 +103,7 @@ class Service:
         until(lambda: any(worker["name"].startswith(f"{name}@") for worker in self.api.get("/api/status").json()["workers"]))
         return process
 
-    def launch(self, steps: int, save_every: int = 8_192, seeds: tuple[int, ...] = (0,)) -> list[str]:
+    def launch(self, steps: int, save_every: int = 2 * ROLLOUT, seeds: tuple[int, ...] = (0,)) -> list[str]:
         """Runs of a small training; returns their ids."""
         training = {"steps": steps, "evaluation": {"every_steps": save_every}}
         response = self.api.post("/api/experiments", json={"name": "tiny", "seeds": list(seeds), "training": training})

@@ -33,8 +33,20 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/ComparePage')).ComparePage }),
           },
           {
+            path: 'policies',
+            lazy: async () => ({ Component: (await import('./pages/PoliciesPage')).PoliciesPage }),
+          },
+          {
+            path: 'policies/:name',
+            lazy: async () => ({ Component: (await import('./pages/PolicyPage')).PolicyPage }),
+          },
+          {
             path: 'arenas',
             lazy: async () => ({ Component: (await import('./pages/ArenasPage')).ArenasPage }),
+          },
+          {
+            path: 'reproduction',
+            lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },
           { path: '*', element: <NotFoundPage /> },
         ],

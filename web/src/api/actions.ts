@@ -1,10 +1,10 @@
-/** What a person can do to experiments and runs; each asks for the truth again afterwards and says what went wrong. */
+/** What a person can do to experiments, campaigns and runs; each asks for the truth again afterwards and says what went wrong. */
 import { notifications } from '@mantine/notifications'
 import { useQueryClient } from '@tanstack/react-query'
 import { $api } from './client'
 import { messageOf } from './errors'
 
-/** Mutations of experiments and runs, ready to call. */
+/** Mutations of experiments, campaigns and runs, ready to call. */
 export function useActions() {
   const client = useQueryClient()
   const settle = (what: string) => ({
@@ -32,6 +32,17 @@ export function useActions() {
       'delete',
       '/api/experiments/{experiment_id}',
       settle('delete the training'),
+    ),
+    launchReproduction: $api.useMutation('post', '/api/reproduction', settle('launch the reproduction')),
+    stopReproduction: $api.useMutation(
+      'post',
+      '/api/reproduction/{campaign_id}/stop',
+      settle('cancel the reproduction'),
+    ),
+    resumeReproduction: $api.useMutation(
+      'post',
+      '/api/reproduction/{campaign_id}/resume',
+      settle('go on with the reproduction'),
     ),
     stopRun: $api.useMutation('post', '/api/runs/{run_id}/stop', settle('stop the run')),
     resumeRun: $api.useMutation('post', '/api/runs/{run_id}/resume', settle('resume the run')),

@@ -26,6 +26,8 @@ describe('which questions a change makes old', () => {
     [change('run'), key('/api/runs/{run_id}/events', ofRun), true],
     [change('run', null), key('/api/runs/{run_id}', { path: { run_id: 'any' } }), true],
     [change('metrics'), key('/api/experiments'), true],
+    [change('metrics'), key('/api/reproduction'), false],
+    [change('run'), key('/api/reproduction'), true],
     [change('metrics'), key('/api/experiments/{experiment_id}', { path: { experiment_id: 'exp1' } }), true],
     [change('metrics'), key('/api/experiments/{experiment_id}', { path: { experiment_id: 'exp2' } }), false],
     [change('metrics'), key('/api/compare/curves', compared), true],

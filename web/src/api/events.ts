@@ -24,6 +24,8 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   const ofRun = change.run_id === null || params?.path?.run_id === change.run_id
   const ofExperiment = params?.path?.experiment_id === change.experiment_id
   if (path === '/api/experiments') return true
+  // Thirty runs report several times a second: while they go on, their page asks at its own pace.
+  if (path === '/api/reproduction') return change.kind !== 'metrics'
   if (path === '/api/status') return change.kind !== 'metrics'
   if (path.startsWith('/api/experiments/{experiment_id}')) return ofExperiment
   if (path === '/api/compare') {
@@ -39,7 +41,10 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   return false
 }
 
-/** Collects changes and invalidates what they concern: the first at once, then at most one round every ROUND_MS. */
+/**
+ * Collects changes and invalidates what they concern: the first at once, then at most one round every ROUND_MS. A query with
+ * `meta: { ownPace: true }` asks again by itself.
+ */
 export function createInvalidator(client: QueryClient): { push: (change: Change) => void; stop: () => void } {
   let pending: Change[] = []
   let timer: ReturnType<typeof setTimeout> | undefined
@@ -50,7 +55,8 @@ export function createInvalidator(client: QueryClient): { push: (change: Change)
     pending = []
     timer = setTimeout(flush, ROUND_MS)
     void client.invalidateQueries({
-      predicate: (query: Query) => changes.some((change) => concerns(change, query.queryKey)),
+      predicate: ({ meta, queryKey }: Query) =>
+        meta?.ownPace !== true && changes.some((change) => concerns(change, queryKey)),
     })
   }
   return {

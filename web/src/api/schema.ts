@@ -168,6 +168,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/checkpoints/{checkpoint_id}/replays/{episode}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Checkpoint
+         * @description Drive an episode of a checkpoint's evaluation again: a few seconds for the first one, then at once.
+         */
+        get: operations["replay_checkpoint_api_checkpoints__checkpoint_id__replays__episode__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/compare": {
         parameters: {
             query?: never;
@@ -336,6 +356,214 @@ export interface paths {
          * @description Exchange the token that the server printed at start for a cookie.
          */
         post: operations["login_api_login_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Policies
+         * @description Trained policies that ship with the project, to watch, to drive and to compare with.
+         */
+        get: operations["list_policies_api_policies_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Policy
+         * @description One of them.
+         */
+        get: operations["get_policy_api_policies__name__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}/bundle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Policy Bundle
+         * @description All that it takes to drive a robot with it; compared with torch just now.
+         */
+        get: operations["download_policy_bundle_api_policies__name__bundle_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}/download": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Policy
+         * @description The archive: weights as safetensors, and the manifest.
+         */
+        get: operations["download_policy_api_policies__name__download_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}/live": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Policy Live
+         * @description What the live view of a reference policy shows.
+         */
+        get: operations["get_policy_live_api_policies__name__live_get"];
+        /**
+         * Change Policy Live
+         * @description Change what the live view of a reference policy shows, for everyone who watches it.
+         */
+        put: operations["change_policy_live_api_policies__name__live_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}/suites/{suite}/episodes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Policy Episodes
+         * @description Every episode behind its figures on a suite.
+         */
+        get: operations["list_policy_episodes_api_policies__name__suites__suite__episodes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/policies/{name}/suites/{suite}/replays/{episode}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Policy
+         * @description Drive an episode of a reference policy again: a few seconds for the first one, then at once.
+         */
+        get: operations["replay_policy_api_policies__name__suites__suite__replays__episode__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/reproduction": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Reproduction
+         * @description The paper and ours, side by side.
+         */
+        get: operations["get_reproduction_api_reproduction_get"];
+        put?: never;
+        /**
+         * Launch Reproduction
+         * @description Launch every row of the paper's tables, all seeds, as one campaign.
+         */
+        post: operations["launch_reproduction_api_reproduction_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/reproduction/{campaign_id}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume Reproduction
+         * @description Go on with every run of the campaign that was stopped or has failed.
+         */
+        post: operations["resume_reproduction_api_reproduction__campaign_id__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/reproduction/{campaign_id}/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop Reproduction
+         * @description End every run of the campaign that has not ended.
+         */
+        post: operations["stop_reproduction_api_reproduction__campaign_id__stop_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -575,6 +803,8 @@ export interface components {
          * @description The place in which the robots drive.
          */
         "ArenaConfig-Input": {
+            /** Movers */
+            movers?: components["schemas"]["MoversConfig-Input"];
             /**
              * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -586,6 +816,8 @@ export interface components {
          * @description The place in which the robots drive.
          */
         "ArenaConfig-Output": {
+            /** Movers */
+            movers: components["schemas"]["MoversConfig-Output"];
             /**
              * @description Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -619,6 +851,12 @@ export interface components {
              * @description Between the walls along y, metres.
              */
             height: number;
+            /**
+             * Movers
+             * @description What moves in it.
+             * @default []
+             */
+            movers: (components["schemas"]["Patrol-Input"] | components["schemas"]["Walker-Input"] | components["schemas"]["Pedestrian-Input"])[];
             /**
              * Name
              * @description What people call it.
@@ -661,6 +899,12 @@ export interface components {
              * @description Between the walls along y, metres.
              */
             height: number;
+            /**
+             * Movers
+             * @description What moves in it.
+             * @default []
+             */
+            movers: (components["schemas"]["Patrol-Output"] | components["schemas"]["Walker-Output"] | components["schemas"]["Pedestrian-Output"])[];
             /**
              * Name
              * @description What people call it.
@@ -813,6 +1057,201 @@ export interface components {
             x: number;
             /** Y */
             y: number;
+        };
+        /**
+         * BurgerConfig
+         * @description TurtleBot3 Burger as the paper drives it: at most 0.25 m/s and 1 rad/s.
+         *
+         *     Its data sheet (ROBOTIS e-Manual, *TurtleBot3 Features*) says 138 x 178 mm, 0.22 m/s and 2.84 rad/s; 0.105 m is the
+         *     radius that its navigation package plans with.
+         */
+        "BurgerConfig-Input": {
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.25
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "burger";
+            /**
+             * Radius
+             * @description Of the body, metres.
+             * @default 0.105
+             */
+            radius: number;
+        };
+        /**
+         * BurgerConfig
+         * @description TurtleBot3 Burger as the paper drives it: at most 0.25 m/s and 1 rad/s.
+         *
+         *     Its data sheet (ROBOTIS e-Manual, *TurtleBot3 Features*) says 138 x 178 mm, 0.22 m/s and 2.84 rad/s; 0.105 m is the
+         *     radius that its navigation package plans with.
+         */
+        "BurgerConfig-Output": {
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.25
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "burger";
+            /**
+             * Radius
+             * @description Of the body, metres.
+             * @default 0.105
+             */
+            radius: number;
+        };
+        /**
+         * Campaign
+         * @description A campaign as it stands.
+         */
+        Campaign: {
+            /** Created At */
+            created_at: number;
+            /**
+             * Effort
+             * @description Part of the rows' training steps; below 1 it is a trial.
+             */
+            effort: number;
+            /** Id */
+            id: string;
+            /**
+             * Progress
+             * @description Part of the work that is done, 0 to 1.
+             */
+            progress: number;
+            /**
+             * Seconds Left
+             * @description Null unless workers are at it.
+             */
+            seconds_left: number | null;
+            /** Seeds */
+            seeds: number;
+            /** State */
+            state: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed";
+        };
+        /**
+         * CampaignCreate
+         * @description A campaign to launch.
+         */
+        CampaignCreate: {
+            /**
+             * Effort
+             * @description Part of the rows' training steps; below 1 it is a trial.
+             * @default 1
+             */
+            effort: number;
+            /**
+             * Seeds
+             * @description Of each row; claims need five.
+             * @default 5
+             */
+            seeds: number;
+        };
+        /**
+         * CampaignRow
+         * @description A row of the paper's tables: its figures, and ours.
+         */
+        CampaignRow: {
+            /**
+             * Experiment Id
+             * @description Null where nothing was launched, or it was deleted.
+             */
+            experiment_id: string | null;
+            /** Id */
+            id: string;
+            /** Method */
+            method: string;
+            /** @description Over the seeds that are done; null before the first. */
+            ours: components["schemas"]["RowSpread"] | null;
+            paper: components["schemas"]["TableRow"];
+            /**
+             * Runs
+             * @description By seed.
+             */
+            runs: components["schemas"]["CampaignRun"][];
+        };
+        /**
+         * CampaignRun
+         * @description A row trained with one seed.
+         */
+        CampaignRun: {
+            /**
+             * Error
+             * @description Why it failed; null unless it did.
+             */
+            error: string | null;
+            /** Id */
+            id: string;
+            /** @description By the drives at its end; null before. */
+            measured: components["schemas"]["TableRow"] | null;
+            /**
+             * Progress
+             * @description Part of its steps that is done, 0 to 1.
+             */
+            progress: number;
+            /** Seed */
+            seed: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "queued" | "running" | "stopping" | "stopped" | "completed" | "failed";
+        };
+        /**
+         * CampaignSummary
+         * @description A campaign in the list of all.
+         */
+        CampaignSummary: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
         };
         /**
          * Checkpoint
@@ -1251,6 +1690,24 @@ export interface components {
          */
         "EvaluationConfig-Input": {
             /**
+             * Steps of a drive
+             * @description About as many as a table's row holds.
+             * @default 10000
+             */
+            drive_steps: number;
+            /**
+             * Drives
+             * @description Robots that drive from target to target after the training, measured as in the paper's tables.
+             * @default 0
+             */
+            drives: number;
+            /**
+             * Evaluations for each checkpoint
+             * @description Above 1 only every so-manieth evaluation keeps one; the last always does.
+             * @default 1
+             */
+            evaluations_per_checkpoint: number;
+            /**
              * Evaluate and save every
              * @description Environment steps between two evaluations; each keeps a checkpoint.
              * @default 50000
@@ -1262,6 +1719,24 @@ export interface components {
          * @description How often a training is measured on its frozen suite, and how often a checkpoint is kept.
          */
         "EvaluationConfig-Output": {
+            /**
+             * Steps of a drive
+             * @description About as many as a table's row holds.
+             * @default 10000
+             */
+            drive_steps: number;
+            /**
+             * Drives
+             * @description Robots that drive from target to target after the training, measured as in the paper's tables.
+             * @default 0
+             */
+            drives: number;
+            /**
+             * Evaluations for each checkpoint
+             * @description Above 1 only every so-manieth evaluation keeps one; the last always does.
+             * @default 1
+             */
+            evaluations_per_checkpoint: number;
             /**
              * Evaluate and save every
              * @description Environment steps between two evaluations; each keeps a checkpoint.
@@ -1295,6 +1770,11 @@ export interface components {
          * @description One configuration x several seeds.
          */
         Experiment: {
+            /**
+             * Campaign
+             * @description Of the paper's reproduction that it was launched by; null for all others.
+             */
+            campaign: string | null;
             /** Created At */
             created_at: number;
             /** Id */
@@ -1422,6 +1902,8 @@ export interface components {
              * @default 64
              */
             maps: number;
+            /** Movers */
+            movers?: components["schemas"]["MoversConfig-Input"];
             /**
              * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -1451,6 +1933,8 @@ export interface components {
              * @default 64
              */
             maps: number;
+            /** Movers */
+            movers: components["schemas"]["MoversConfig-Output"];
             /**
              * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -1475,6 +1959,8 @@ export interface components {
         "ImportedArenaConfig-Input": {
             /** Geometry */
             arena?: components["schemas"]["ArenaFile-Input"] | null;
+            /** Movers */
+            movers?: components["schemas"]["MoversConfig-Input"];
             /**
              * @description Read from a file; see the gallery. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -1494,6 +1980,8 @@ export interface components {
         "ImportedArenaConfig-Output": {
             /** Geometry */
             arena: components["schemas"]["ArenaFile-Output"] | null;
+            /** Movers */
+            movers: components["schemas"]["MoversConfig-Output"];
             /**
              * @description Read from a file; see the gallery. (enum property replaced by openapi-typescript)
              * @enum {string}
@@ -1505,6 +1993,100 @@ export interface components {
              * @default
              */
             sha256: string;
+        };
+        /**
+         * JackalConfig
+         * @description A robot like Clearpath's Jackal, whose data sheet says 508 x 430 mm and 2 m/s; its controller allows 4 rad/s.
+         */
+        "JackalConfig-Input": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.508
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 4
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 2
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "jackal";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.43
+             */
+            width: number;
+        };
+        /**
+         * JackalConfig
+         * @description A robot like Clearpath's Jackal, whose data sheet says 508 x 430 mm and 2 m/s; its controller allows 4 rad/s.
+         */
+        "JackalConfig-Output": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.508
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 4
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 2
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "jackal";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.43
+             */
+            width: number;
         };
         /**
          * LidarConfig
@@ -1541,6 +2123,12 @@ export interface components {
              * @default 3.5
              */
             range: number;
+            /**
+             * Rate
+             * @description Scans per second; in between the policy sees the last one. 0: a new scan for every action.
+             * @default 0
+             */
+            rate: number;
             /**
              * Rays
              * @description Rays per scan.
@@ -1583,6 +2171,12 @@ export interface components {
              * @default 3.5
              */
             range: number;
+            /**
+             * Rate
+             * @description Scans per second; in between the policy sees the last one. 0: a new scan for every action.
+             * @default 0
+             */
+            rate: number;
             /**
              * Rays
              * @description Rays per scan.
@@ -1666,7 +2260,7 @@ export interface components {
          * @description Whether the live view of a run has anything to show.
          *
          *     Attributes:
-         *         connected: a worker that runs this training is linked to the server.
+         *         connected: a worker that runs this training is linked to the server, or its finished policy drives.
          *         receiving: frames have arrived within the last seconds.
          *         watchers: browsers that watch this run now.
          */
@@ -1747,6 +2341,252 @@ export interface components {
             name: "mlp";
         };
         /**
+         * MoversConfig
+         * @description Movers that are put into every arena of a task.
+         */
+        "MoversConfig-Input": {
+            /**
+             * Moving obstacles
+             * @description In each arena; they never give way to a robot.
+             * @default 0
+             */
+            count: number;
+            /**
+             * Movement
+             * @description Pedestrians walk between places and avoid one another; walkers go straight on until something is in the way; patrols go to and fro on a line.
+             * @default pedestrian
+             * @enum {string}
+             */
+            kind: "patrol" | "walker" | "pedestrian";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * MoversConfig
+         * @description Movers that are put into every arena of a task.
+         */
+        "MoversConfig-Output": {
+            /**
+             * Moving obstacles
+             * @description In each arena; they never give way to a robot.
+             * @default 0
+             */
+            count: number;
+            /**
+             * Movement
+             * @description Pedestrians walk between places and avoid one another; walkers go straight on until something is in the way; patrols go to and fro on a line.
+             * @default pedestrian
+             * @enum {string}
+             */
+            kind: "patrol" | "walker" | "pedestrian";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * OdometryConfig
+         * @description How the pose that the observation is made from drifts away from the true one, from zero at every new target.
+         *
+         *     A random walk, so that the length of a step makes no difference: the variance grows with the way (Thrun, Burgard and
+         *     Fox 2005, section 5.4).
+         */
+        "OdometryConfig-Input": {
+            /**
+             * Drift in distance
+             * @description Standard deviation of the position, metres, after one metre driven.
+             * @default 0
+             */
+            distance_noise: number;
+            /**
+             * Drift in heading
+             * @description Standard deviation of the heading, radians, after one radian turned.
+             * @default 0
+             */
+            heading_noise: number;
+        };
+        /**
+         * OdometryConfig
+         * @description How the pose that the observation is made from drifts away from the true one, from zero at every new target.
+         *
+         *     A random walk, so that the length of a step makes no difference: the variance grows with the way (Thrun, Burgard and
+         *     Fox 2005, section 5.4).
+         */
+        "OdometryConfig-Output": {
+            /**
+             * Drift in distance
+             * @description Standard deviation of the position, metres, after one metre driven.
+             * @default 0
+             */
+            distance_noise: number;
+            /**
+             * Drift in heading
+             * @description Standard deviation of the heading, radians, after one radian turned.
+             * @default 0
+             */
+            heading_noise: number;
+        };
+        /**
+         * PaperFigure
+         * @description Learning curves that the paper draws into one picture: ids of rows.
+         */
+        PaperFigure: {
+            /** Id */
+            id: string;
+            /** Rows */
+            rows: string[];
+            /** Title */
+            title: string;
+        };
+        /**
+         * PaperTable
+         * @description A table of the paper: ids of rows, as labelled there.
+         */
+        PaperTable: {
+            /** Id */
+            id: string;
+            /** Labels */
+            labels: string[];
+            /** Rows */
+            rows: string[];
+            /** Title */
+            title: string;
+        };
+        /**
+         * Patrol
+         * @description Goes round its waypoints in straight lines, from the last one back to the first; it starts anywhere on its way.
+         */
+        "Patrol-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "patrol";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+            /**
+             * Waypoints
+             * @description Two or more; without any it goes to and fro on a line that is drawn when it starts.
+             * @default []
+             */
+            waypoints: components["schemas"]["Waypoint"][];
+        };
+        /**
+         * Patrol
+         * @description Goes round its waypoints in straight lines, from the last one back to the first; it starts anywhere on its way.
+         */
+        "Patrol-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "patrol";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+            /**
+             * Waypoints
+             * @description Two or more; without any it goes to and fro on a line that is drawn when it starts.
+             * @default []
+             */
+            waypoints: components["schemas"]["Waypoint"][];
+        };
+        /**
+         * Pedestrian
+         * @description Walks from place to place and avoids the others.
+         */
+        "Pedestrian-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "pedestrian";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * Pedestrian
+         * @description Walks from place to place and avoids the others.
+         */
+        "Pedestrian-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "pedestrian";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * PolicyEpisodes
+         * @description Every episode of a reference policy on a suite, in the suite's order.
+         */
+        PolicyEpisodes: {
+            /** Episodes */
+            episodes: components["schemas"]["EpisodeResult"][];
+            /** Suite */
+            suite: string;
+            /** Suite Hash */
+            suite_hash: string;
+        };
+        /**
          * PpoConfig
          * @description Proximal Policy Optimization (Schulman et al. 2017) with a Gaussian policy of bounded mean.
          */
@@ -1758,7 +2598,7 @@ export interface components {
             clip_range: number;
             /**
              * Entropy coefficient
-             * @default 0
+             * @default 0.003
              */
             entropy_coefficient: number;
             /**
@@ -1774,7 +2614,7 @@ export interface components {
             gae_lambda: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.995
              */
             gamma: number;
             /**
@@ -1808,7 +2648,7 @@ export interface components {
             max_grad_norm: number;
             /**
              * Minibatch
-             * @default 512
+             * @default 1024
              */
             minibatch_size: number;
             /**
@@ -1821,7 +2661,7 @@ export interface components {
             /**
              * Robots
              * @description Robots that collect experience side by side.
-             * @default 128
+             * @default 256
              */
             robots: number;
             /**
@@ -1849,7 +2689,7 @@ export interface components {
             clip_range: number;
             /**
              * Entropy coefficient
-             * @default 0
+             * @default 0.003
              */
             entropy_coefficient: number;
             /**
@@ -1865,7 +2705,7 @@ export interface components {
             gae_lambda: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.995
              */
             gamma: number;
             /**
@@ -1899,7 +2739,7 @@ export interface components {
             max_grad_norm: number;
             /**
              * Minibatch
-             * @default 512
+             * @default 1024
              */
             minibatch_size: number;
             /**
@@ -1912,7 +2752,7 @@ export interface components {
             /**
              * Robots
              * @description Robots that collect experience side by side.
-             * @default 128
+             * @default 256
              */
             robots: number;
             /**
@@ -1943,6 +2783,330 @@ export interface components {
             /** Title */
             title: string;
             training: components["schemas"]["TrainingConfig-Output"];
+        };
+        /**
+         * RandomisationConfig
+         * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
+         *
+         *     Rays, batches and field of view decide what the numbers of an observation mean, so they cannot be drawn.
+         */
+        "RandomisationConfig-Input": {
+            /**
+             * Command delay
+             * @description Control steps: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            command_delay: number[];
+            /**
+             * Drift in distance
+             * @description Metres after one metre: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            distance_noise: number[];
+            /**
+             * LiDAR dropout
+             * @description Probability: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            dropout: number[];
+            /**
+             * Drift in heading
+             * @description Radians after one: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            heading_noise: number[];
+            /**
+             * Top turning rate
+             * @description Radians per second that a full command reaches: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            max_angular_speed: number[];
+            /**
+             * Top speed
+             * @description Metres per second that a full command reaches: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            max_linear_speed: number[];
+            /**
+             * LiDAR noise
+             * @description Metres: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            noise: number[];
+            /**
+             * LiDAR range
+             * @description Metres beyond which nothing is seen, at most the LiDAR's range: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            range: number[];
+            /**
+             * LiDAR rate
+             * @description Scans per second: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            rate: number[];
+        };
+        /**
+         * RandomisationConfig
+         * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
+         *
+         *     Rays, batches and field of view decide what the numbers of an observation mean, so they cannot be drawn.
+         */
+        "RandomisationConfig-Output": {
+            /**
+             * Command delay
+             * @description Control steps: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            command_delay: number[];
+            /**
+             * Drift in distance
+             * @description Metres after one metre: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            distance_noise: number[];
+            /**
+             * LiDAR dropout
+             * @description Probability: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            dropout: number[];
+            /**
+             * Drift in heading
+             * @description Radians after one: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            heading_noise: number[];
+            /**
+             * Top turning rate
+             * @description Radians per second that a full command reaches: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            max_angular_speed: number[];
+            /**
+             * Top speed
+             * @description Metres per second that a full command reaches: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            max_linear_speed: number[];
+            /**
+             * LiDAR noise
+             * @description Metres: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            noise: number[];
+            /**
+             * LiDAR range
+             * @description Metres beyond which nothing is seen, at most the LiDAR's range: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            range: number[];
+            /**
+             * LiDAR rate
+             * @description Scans per second: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            rate: number[];
+        };
+        /**
+         * RectangularConfig
+         * @description Any robot with a rectangular body.
+         */
+        "RectangularConfig-Input": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.5
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1.5
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.5
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "rectangular";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.4
+             */
+            width: number;
+        };
+        /**
+         * RectangularConfig
+         * @description Any robot with a rectangular body.
+         */
+        "RectangularConfig-Output": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.5
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1.5
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.5
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "rectangular";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.4
+             */
+            width: number;
+        };
+        /**
+         * ReferencePolicy
+         * @description A trained policy that ships with the project.
+         */
+        ReferencePolicy: {
+            /**
+             * Command
+             * @description What made it.
+             */
+            command: string;
+            /** Description */
+            description: string;
+            /**
+             * Name
+             * @description In addresses and on the command line.
+             */
+            name: string;
+            /** Results */
+            results: components["schemas"]["SuiteResult"][];
+            /** Seed */
+            seed: number;
+            /**
+             * Size
+             * @description Bytes of its archive.
+             */
+            size: number;
+            /**
+             * Step
+             * @description Environment steps after which it was kept: the best on the first of its suites.
+             */
+            step: number;
+            /** Title */
+            title: string;
+            training: components["schemas"]["TrainingConfig-Output"];
+        };
+        /**
+         * Replay
+         * @description An episode that was driven once more, ready to be played.
+         */
+        Replay: {
+            /**
+             * Episode
+             * @description Its place in the suite, from 0.
+             */
+            episode: number;
+            /**
+             * Faithful
+             * @description Whether it ended as recorded. Another processor than the one it was recorded on may round otherwise.
+             */
+            faithful: boolean;
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "arrival" | "collision" | "timeout";
+            /**
+             * Page
+             * @description Path of the player; append `light/` or `dark/`, and `?download` to take it away.
+             */
+            page: string;
+            /**
+             * Seconds
+             * @description Of simulated time.
+             */
+            seconds: number;
+            /** Steps */
+            steps: number;
+            /** Suite */
+            suite: string;
+        };
+        /**
+         * Reproduction
+         * @description The paper's tables, figures and claims, and what a campaign says of them.
+         */
+        Reproduction: {
+            /** @description Null before the first. */
+            campaign: components["schemas"]["Campaign"] | null;
+            /**
+             * Campaigns
+             * @description All of them, the newest first.
+             */
+            campaigns: components["schemas"]["CampaignSummary"][];
+            /** Claims */
+            claims: components["schemas"]["Verdict"][];
+            /**
+             * Curve
+             * @description Name of the metric of the learning curves.
+             */
+            curve: string;
+            /** Figures */
+            figures: components["schemas"]["PaperFigure"][];
+            /** Rows */
+            rows: components["schemas"]["CampaignRow"][];
+            /**
+             * Seconds
+             * @description That a full campaign takes with them, or with one where there are none, about.
+             */
+            seconds: number;
+            /** Tables */
+            tables: components["schemas"]["PaperTable"][];
+            /**
+             * Workers
+             * @description That are here.
+             */
+            workers: number;
         };
         /**
          * ResBlockNetwork
@@ -2045,10 +3209,10 @@ export interface components {
             progress: number;
         };
         /**
-         * RobotConfig
-         * @description A differential-drive robot with a disc as its footprint; the default is the TurtleBot3 Burger.
+         * RoundConfig
+         * @description Any robot with a round body.
          */
-        "RobotConfig-Input": {
+        "RoundConfig-Input": {
             /**
              * Angular acceleration
              * @description Radians per second squared, both ways; 0 is unlimited.
@@ -2058,7 +3222,7 @@ export interface components {
             /**
              * Top turning rate
              * @description Radians per second, both ways.
-             * @default 1
+             * @default 1.5
              */
             max_angular_speed: number;
             /**
@@ -2070,21 +3234,26 @@ export interface components {
             /**
              * Top speed
              * @description Metres per second; the robot does not reverse.
-             * @default 0.25
+             * @default 0.5
              */
             max_linear_speed: number;
             /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "round";
+            /**
              * Radius
-             * @description Metres.
-             * @default 0.105
+             * @description Of the body, metres.
+             * @default 0.2
              */
             radius: number;
         };
         /**
-         * RobotConfig
-         * @description A differential-drive robot with a disc as its footprint; the default is the TurtleBot3 Burger.
+         * RoundConfig
+         * @description Any robot with a round body.
          */
-        "RobotConfig-Output": {
+        "RoundConfig-Output": {
             /**
              * Angular acceleration
              * @description Radians per second squared, both ways; 0 is unlimited.
@@ -2094,7 +3263,7 @@ export interface components {
             /**
              * Top turning rate
              * @description Radians per second, both ways.
-             * @default 1
+             * @default 1.5
              */
             max_angular_speed: number;
             /**
@@ -2106,15 +3275,31 @@ export interface components {
             /**
              * Top speed
              * @description Metres per second; the robot does not reverse.
-             * @default 0.25
+             * @default 0.5
              */
             max_linear_speed: number;
             /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "round";
+            /**
              * Radius
-             * @description Metres.
-             * @default 0.105
+             * @description Of the body, metres.
+             * @default 0.2
              */
             radius: number;
+        };
+        /**
+         * RowSpread
+         * @description A table's line over seeds.
+         */
+        RowSpread: {
+            collisions: components["schemas"]["Spread"];
+            episodes: components["schemas"]["Spread"];
+            reward: components["schemas"]["Spread"];
+            steps: components["schemas"]["Spread"];
+            success: components["schemas"]["Spread"];
         };
         /**
          * Run
@@ -2472,6 +3657,18 @@ export interface components {
             values: (number | null)[];
         };
         /**
+         * Spread
+         * @description A mean over seeds with its 95 % interval; `low` and `high` are None with one seed.
+         */
+        Spread: {
+            /** High */
+            high: number | null;
+            /** Low */
+            low: number | null;
+            /** Mean */
+            mean: number;
+        };
+        /**
          * Start
          * @description Where a robot starts; heading in degrees against the x axis, anticlockwise.
          */
@@ -2527,6 +3724,79 @@ export interface components {
             workers: components["schemas"]["WorkerStatus"][];
         };
         /**
+         * SuiteResult
+         * @description A policy on a suite, beside what needs no training.
+         */
+        SuiteResult: {
+            /** Baselines */
+            baselines: components["schemas"]["SuiteRow"][];
+            policy: components["schemas"]["SuiteRow"];
+            /** Suite */
+            suite: string;
+            /**
+             * Suite Hash
+             * @description Only results of the same hash may be compared.
+             */
+            suite_hash: string;
+        };
+        /**
+         * SuiteRow
+         * @description A policy or a baseline on a suite; rates are shares of the episodes.
+         */
+        SuiteRow: {
+            /** Collision */
+            collision: number;
+            /**
+             * Name
+             * @description Of the policy or the baseline.
+             */
+            name: string;
+            /**
+             * Spl
+             * @description Success weighted by path length (Anderson et al. 2018).
+             */
+            spl: number;
+            /**
+             * Steps
+             * @description Control steps to the target, over the episodes that arrived.
+             */
+            steps: number | null;
+            success: components["schemas"]["Estimate"];
+            /** Timeout */
+            timeout: number;
+        };
+        /**
+         * TableRow
+         * @description What a table says of one method, over one drive of about 10,000 steps; None where the paper says nothing.
+         */
+        TableRow: {
+            /**
+             * Collisions
+             * @description Part of them that ended in a collision, 0 to 1.
+             */
+            collisions: number | null;
+            /**
+             * Episodes
+             * @description Target attempts.
+             */
+            episodes: number;
+            /**
+             * Reward
+             * @description Mean per step.
+             */
+            reward: number | null;
+            /**
+             * Steps
+             * @description Per attempt, however it ended.
+             */
+            steps: number;
+            /**
+             * Success
+             * @description Part of them that arrived, 0 to 1.
+             */
+            success: number;
+        };
+        /**
          * Target
          * @description Where it should go.
          */
@@ -2556,11 +3826,23 @@ export interface components {
              */
             collision_distance: number;
             /**
+             * Command delay
+             * @description Control steps between an action and the robot following it.
+             * @default 0
+             */
+            command_delay: number;
+            /**
              * Control period
              * @description Seconds between two actions.
              * @default 0.2
              */
             control_period: number;
+            /**
+             * Stacked frames
+             * @description Observations that the policy sees at once: the newest and those of the steps before it.
+             * @default 1
+             */
+            frames: number;
             /** LiDAR */
             lidar?: components["schemas"]["LidarConfig-Input"];
             /**
@@ -2570,10 +3852,17 @@ export interface components {
              * @enum {string}
              */
             observation: "paper" | "improved";
+            /** Odometry */
+            odometry?: components["schemas"]["OdometryConfig-Input"];
+            /** Domain randomisation */
+            randomisation?: components["schemas"]["RandomisationConfig-Input"];
             /** Reward */
             reward?: components["schemas"]["RewardConfig-Input"];
-            /** Robot */
-            robot?: components["schemas"]["RobotConfig-Input"];
+            /**
+             * Robot
+             * @description Its body and its limits; under Advanced each can be changed.
+             */
+            robot?: components["schemas"]["BurgerConfig-Input"] | components["schemas"]["WaffleConfig-Input"] | components["schemas"]["JackalConfig-Input"] | components["schemas"]["RoundConfig-Input"] | components["schemas"]["RectangularConfig-Input"];
             /**
              * Step limit
              * @description Steps per target before the attempt times out.
@@ -2601,11 +3890,23 @@ export interface components {
              */
             collision_distance: number;
             /**
+             * Command delay
+             * @description Control steps between an action and the robot following it.
+             * @default 0
+             */
+            command_delay: number;
+            /**
              * Control period
              * @description Seconds between two actions.
              * @default 0.2
              */
             control_period: number;
+            /**
+             * Stacked frames
+             * @description Observations that the policy sees at once: the newest and those of the steps before it.
+             * @default 1
+             */
+            frames: number;
             /** LiDAR */
             lidar: components["schemas"]["LidarConfig-Output"];
             /**
@@ -2615,10 +3916,17 @@ export interface components {
              * @enum {string}
              */
             observation: "paper" | "improved";
+            /** Odometry */
+            odometry: components["schemas"]["OdometryConfig-Output"];
+            /** Domain randomisation */
+            randomisation: components["schemas"]["RandomisationConfig-Output"];
             /** Reward */
             reward: components["schemas"]["RewardConfig-Output"];
-            /** Robot */
-            robot: components["schemas"]["RobotConfig-Output"];
+            /**
+             * Robot
+             * @description Its body and its limits; under Advanced each can be changed.
+             */
+            robot: components["schemas"]["BurgerConfig-Output"] | components["schemas"]["WaffleConfig-Output"] | components["schemas"]["JackalConfig-Output"] | components["schemas"]["RoundConfig-Output"] | components["schemas"]["RectangularConfig-Output"];
             /**
              * Step limit
              * @description Steps per target before the attempt times out.
@@ -2906,6 +4214,39 @@ export interface components {
             type: string;
         };
         /**
+         * Verdict
+         * @description A claim, judged.
+         *
+         *     Attributes:
+         *         id, statement, source: of the claim.
+         *         word: holds, does not hold, or can't be told.
+         *         reason: why, with figures, as a sentence.
+         *         evidence: what the paper's own figures can carry, as a sentence; None where it gives none.
+         *         reading: what of our reading may explain a difference; None where nothing is known.
+         *         rows: that were looked at.
+         */
+        Verdict: {
+            /** Evidence */
+            evidence: string | null;
+            /** Id */
+            id: string;
+            /** Reading */
+            reading: string | null;
+            /** Reason */
+            reason: string;
+            /** Rows */
+            rows: string[];
+            /** Source */
+            source: string;
+            /** Statement */
+            statement: string;
+            /**
+             * Word
+             * @enum {string}
+             */
+            word: "holds" | "does not hold" | "can't be told";
+        };
+        /**
          * Version
          * @description What is running.
          */
@@ -2917,6 +4258,156 @@ export interface components {
             commit: string | null;
             /** Version */
             version: string;
+        };
+        /**
+         * WaffleConfig
+         * @description TurtleBot3 Waffle Pi (ROBOTIS e-Manual, *TurtleBot3 Features*): 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         */
+        "WaffleConfig-Input": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.281
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1.82
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.26
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "waffle";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.306
+             */
+            width: number;
+        };
+        /**
+         * WaffleConfig
+         * @description TurtleBot3 Waffle Pi (ROBOTIS e-Manual, *TurtleBot3 Features*): 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         */
+        "WaffleConfig-Output": {
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.281
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways.
+             * @default 1.82
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second; the robot does not reverse.
+             * @default 0.26
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "waffle";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.306
+             */
+            width: number;
+        };
+        /**
+         * Walker
+         * @description Goes straight on until something is in the way, then in another direction.
+         */
+        "Walker-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "walker";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * Walker
+         * @description Goes straight on until something is in the way, then in another direction.
+         */
+        "Walker-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "walker";
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+            /**
+             * Speed
+             * @description Top speed, metres per second.
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * Waypoint
+         * @description A corner of a patrol's way.
+         */
+        Waypoint: {
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
         };
         /**
          * WorkerStatus
@@ -3370,6 +4861,74 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    replay_checkpoint_api_checkpoints__checkpoint_id__replays__episode__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                checkpoint_id: string;
+                episode: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Replay"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -3903,6 +5462,638 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_policies_api_policies_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferencePolicy"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_policy_api_policies__name__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferencePolicy"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    download_policy_bundle_api_policies__name__bundle_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not exported: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_policy_api_policies__name__download_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_policy_live_api_policies__name__live_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveState"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_policy_live_api_policies__name__live_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LiveSettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveState"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_policy_episodes_api_policies__name__suites__suite__episodes_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                suite: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PolicyEpisodes"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    replay_policy_api_policies__name__suites__suite__replays__episode__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                episode: number;
+                name: string;
+                suite: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Replay"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_reproduction_api_reproduction_get: {
+        parameters: {
+            query?: {
+                /** @description Its id; the newest without it. */
+                campaign?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Reproduction"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    launch_reproduction_api_reproduction_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CampaignCreate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Reproduction"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    resume_reproduction_api_reproduction__campaign_id__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                campaign_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Reproduction"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    stop_reproduction_api_reproduction__campaign_id__stop_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                campaign_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Reproduction"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -47,6 +47,17 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
         smoothable: true,
       },
       {
+        title: 'Reward terms',
+        note: 'per step, their sum is the reward',
+        metrics: [
+          { name: 'reward/arrival', label: 'arrival' },
+          { name: 'reward/collision', label: 'collision' },
+          { name: 'reward/progress', label: 'progress' },
+          { name: 'reward/penalty', label: 'penalty' },
+        ],
+        smoothable: true,
+      },
+      {
         title: 'Episode length',
         note: 'steps',
         metrics: [{ name: 'train/episode_length', label: 'training' }],

@@ -77,6 +77,8 @@ test('every metric that a training reports is in some chart', () => {
     'policy/kl',
     'policy/entropy',
     'train/reward',
+    'reward/arrival',
+    'reward/penalty',
     'time/update',
   ])
     expect(shown).toContain(name)

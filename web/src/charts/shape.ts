@@ -19,10 +19,18 @@ export function chartOf(spec: ChartSpec, series: readonly Series[]): ChartData {
 
 /**
  * Experiments together: each seed thin, the mean of the seeds bold, and its interval as a band. The legend counts the
- * seeds: how many stand behind the curve at its fullest.
+ * seeds: how many stand behind the curve at its fullest. `look` names and colours the experiments where their own names
+ * and their order should not.
  */
-export function chartOfCurves(curves: Curves): ChartData {
-  const lines = curves.experiments.flatMap((experiment, color): Line[] => {
+export function chartOfCurves(
+  curves: Curves,
+  look: (experiment: Curves['experiments'][number], index: number) => { name: string; color: number } = (
+    { name },
+    color,
+  ) => ({ name, color }),
+): ChartData {
+  const lines = curves.experiments.flatMap((experiment, index): Line[] => {
+    const { name, color } = look(experiment, index)
     const seeds = Math.max(0, ...experiment.count)
     if (seeds === 0) return []
     const single = seeds === 1
@@ -33,7 +41,7 @@ export function chartOfCurves(curves: Curves): ChartData {
         )
     const mean: Line = {
       key: experiment.id,
-      label: `${experiment.name}, ${plural(seeds, 'seed')}`,
+      label: `${name}, ${plural(seeds, 'seed')}`,
       color,
       values: experiment.mean,
       ...(single ? {} : { band: { low: experiment.low, high: experiment.high } }),

@@ -1,4 +1,4 @@
-/** An arena from above, drawn to scale: walls, obstacles, and its own start and target where it has them. */
+/** An arena from above, drawn to scale: walls, obstacles, and where it has them patrols' rounds, start and target. */
 import type { ArenaGeometry } from '../api/types'
 import classes from './ArenaDrawing.module.css'
 
@@ -14,7 +14,7 @@ const WALL = 0.012
 const ARROW = 0.05
 
 export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
-  const { width, height, circles, boxes, start, target } = geometry
+  const { width, height, circles, boxes, movers, start, target } = geometry
   const unit = Math.max(width, height)
   const wall = unit * WALL
   const arrow = unit * ARROW
@@ -50,6 +50,25 @@ export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
             />
           ))}
         </g>
+        {movers.map((mover, index) =>
+          mover.kind === 'patrol' && mover.waypoints.length > 0 ? (
+            // biome-ignore lint/suspicious/noArrayIndexKey: an arena's movers stay in their order, and two may be alike.
+            <g key={index}>
+              <polygon
+                className={classes.round}
+                points={mover.waypoints.map(({ x, y }) => `${x},${y}`).join(' ')}
+                strokeWidth={wall / 2}
+                strokeDasharray={`${2 * wall} ${1.5 * wall}`}
+              />
+              <circle
+                className={classes.mover}
+                cx={mover.waypoints[0]?.x}
+                cy={mover.waypoints[0]?.y}
+                r={mover.radius}
+              />
+            </g>
+          ) : null,
+        )}
         {start && (
           <path
             className={classes.start}

@@ -7,7 +7,14 @@ import { IconDownload } from './icons'
 import { Message, SuccessEstimate } from './ui'
 import ui from './ui.module.css'
 
-export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpoint[] }) {
+interface CheckpointTableProps {
+  checkpoints: readonly Checkpoint[]
+  /** Whose episodes are shown. */
+  chosen: Checkpoint | undefined
+  onChoose: (checkpoint: Checkpoint) => void
+}
+
+export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTableProps) {
   if (checkpoints.length === 0) {
     return (
       <Message title="No checkpoint yet">
@@ -16,7 +23,7 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={680} mah={420}>
+    <Table.ScrollContainer type="native" minWidth={760} mah={420}>
       <Table highlightOnHover className={classes.table} data-testid="checkpoints">
         <Table.Thead>
           <Table.Tr>
@@ -28,12 +35,17 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
             <Table.Th ta="right">Steps to target</Table.Th>
             <Table.Th ta="right">Size</Table.Th>
             <Table.Th ta="right">Saved</Table.Th>
-            <Table.Th w={250} aria-label="Download" />
+            <Table.Th w={330} aria-label="Episodes and downloads" />
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
           {[...checkpoints].reverse().map((checkpoint) => (
-            <Table.Tr key={checkpoint.id} data-testid="checkpoint" data-best={checkpoint.best || undefined}>
+            <Table.Tr
+              key={checkpoint.id}
+              data-testid="checkpoint"
+              data-best={checkpoint.best || undefined}
+              data-ticked={checkpoint === chosen || undefined}
+            >
               <Table.Td ta="right" fw={550} className={ui.number}>
                 {count(checkpoint.step)}
               </Table.Td>
@@ -60,6 +72,17 @@ export function CheckpointTable({ checkpoints }: { checkpoints: readonly Checkpo
               </Table.Td>
               <Table.Td>
                 <Group gap={6} justify="flex-end" wrap="nowrap">
+                  {checkpoint.evaluation && (
+                    <Button
+                      size="compact-sm"
+                      variant="default"
+                      aria-label={`Episodes of step ${checkpoint.step}`}
+                      aria-pressed={checkpoint === chosen}
+                      onClick={() => onChoose(checkpoint)}
+                    >
+                      Episodes
+                    </Button>
+                  )}
                   <Button
                     component="a"
                     href={`/api/checkpoints/${checkpoint.id}/bundle`}

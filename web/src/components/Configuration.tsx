@@ -2,7 +2,7 @@
 import { Accordion } from '@mantine/core'
 import { $api } from '../api/client'
 import type { TrainingConfig } from '../api/types'
-import { type Field, fieldsOf, grouped } from '../form/layout'
+import { type Field, fieldsOf, grouped, initialOf } from '../form/layout'
 import type { Json, Schema } from '../form/schema'
 import { sameValue, valueAt } from '../form/values'
 import { count, significant, words } from '../lib/format'
@@ -14,7 +14,7 @@ export function settingText(value: unknown): string {
   if (typeof value === 'number') return Number.isInteger(value) ? count(value) : significant(value, 6)
   if (typeof value === 'boolean') return value ? 'yes' : 'no'
   if (typeof value === 'string') return words(value)
-  if (Array.isArray(value)) return value.map(settingText).join(', ')
+  if (Array.isArray(value)) return value.map(settingText).join(', ') || 'none'
   return JSON.stringify(value)
 }
 
@@ -30,7 +30,9 @@ export function Configuration({ training }: { training: TrainingConfig }) {
   const settingOf = (field: Field) =>
     valueAt(values, field.kind === 'union' ? [...field.path, field.tag] : field.path) ?? null
   const defaultOf = (field: Field) =>
-    valueAt(defaults, field.kind === 'union' ? [...field.path, field.tag] : field.path)
+    field.kind === 'union'
+      ? valueAt(defaults, [...field.path, field.tag])
+      : initialOf(field, values, defaults)
   const changed = fields.filter((field) => !sameValue(settingOf(field), defaultOf(field)))
   return (
     <>

@@ -1,4 +1,4 @@
-/** The robots of a run in 3D, as the server's own page in a frame, with what can be chosen about it. */
+/** Robots in 3D, as the server's own page in a frame, with what can be chosen about it: a run's, or a shipped policy's. */
 import {
   ActionIcon,
   Checkbox,
@@ -10,7 +10,7 @@ import {
   Tooltip,
   useComputedColorScheme,
 } from '@mantine/core'
-import { useQueryClient } from '@tanstack/react-query'
+import { type QueryClient, useQuery, useQueryClient } from '@tanstack/react-query'
 import { useEffect, useRef, useState } from 'react'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
@@ -28,14 +28,57 @@ const DESCRIPTIONS: Record<LiveSettings['mode'], string> = {
   training: 'What the training robots do now, time-lapsed.',
 }
 
-export function LiveView({ runId, state }: { runId: string; state: RunState }) {
+interface RunLiveViewProps {
+  runId: string
+  state: RunState
+  /** Whether there is a policy to drive once the training is over; undefined while that is not known. */
+  kept: boolean | undefined
+}
+
+export function RunLiveView({ runId, state, kept }: RunLiveViewProps) {
+  const watching = useWatching()
+  const training = state === 'running' || state === 'stopping'
+  const driven = !training && state !== 'queued' && kept === true
+  const shown = training || driven
+  const { live, change } = useRunLive(runId, shown && watching)
+  const { data: status } = useStatus()
+  return (
+    <LiveView
+      // After a training the frame is another one: whoever sent the pictures before is gone.
+      key={`${driven}`}
+      page={shown && watching ? `/live/${runId}/` : null}
+      overlay={shown ? (live ? null : 'Connecting …') : overlayOf(state, kept, status?.workers.length)}
+      live={shown ? live : undefined}
+      change={change}
+      driven={driven}
+    />
+  )
+}
+
+export function PolicyLiveView({ name }: { name: string }) {
+  const watching = useWatching()
+  const { live, change } = usePolicyLive(name, watching)
+  return (
+    <LiveView
+      page={watching ? `/live/policy-${name}/` : null}
+      overlay={live ? null : 'Connecting …'}
+      live={live}
+      change={change}
+      driven
+    />
+  )
+}
+
+interface LiveViewProps extends LiveControlsProps {
+  /** The page inside the frame, or null while there is none. */
+  page: string | null
+  /** What stands in place of the picture, or null. */
+  overlay: string | null
+}
+
+function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const box = useRef<HTMLDivElement>(null)
-  const watching = useWatching()
-  const active = state === 'running' || state === 'stopping'
-  const { live, change } = useLive(runId, active && watching)
-  const { data: status } = useStatus()
-  const overlay = overlayOf(state, status?.workers.length, live)
   return (
     <div>
       <div
@@ -44,11 +87,11 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
         data-testid="live-view"
         data-receiving={live?.status.receiving ?? false}
       >
-        {active && watching && (
+        {page && (
           <iframe
             key={`${dark}`}
             title="The robots in 3D"
-            src={`/live/${runId}/${dark ? '?darkMode' : ''}`}
+            src={`${page}${dark ? '?darkMode' : ''}`}
             allow="fullscreen"
             data-testid="live-frame"
           />
@@ -58,7 +101,7 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
             {overlay}
           </div>
         )}
-        {active && (
+        {page && (
           <Tooltip label="Full screen">
             <ActionIcon
               className={classes.full}
@@ -71,49 +114,72 @@ export function LiveView({ runId, state }: { runId: string; state: RunState }) {
           </Tooltip>
         )}
       </div>
-      <LiveControls live={live} change={change} disabled={!active} />
+      <LiveControls live={live} change={change} driven={driven} />
     </div>
   )
 }
 
-/** What stands in place of the picture; while the run goes on, the picture itself says what it waits for. */
-function overlayOf(state: RunState, workers: number | undefined, live: LiveState | undefined): string | null {
-  switch (state) {
-    case 'queued':
-      return workers === 0
-        ? 'No worker is there to take this run. Start one (mapless worker), and the robots appear here.'
-        : 'Waiting for a free worker. The robots appear here as soon as one takes this run.'
-    case 'completed':
-      return 'This run is complete; its policy is among the checkpoints below.'
-    case 'stopped':
-      return 'This run was stopped. Resume it to watch it go on.'
-    case 'failed':
-      return 'This run failed; the event log says why.'
-    default:
-      return live ? null : 'Connecting …'
+/** What stands in place of the picture of a run that has nothing to show. */
+function overlayOf(state: RunState, kept: boolean | undefined, workers: number | undefined): string | null {
+  if (state === 'queued') {
+    return workers === 0
+      ? 'No worker is there to take this run. Start one (mapless worker), and the robots appear here.'
+      : 'Waiting for a free worker. The robots appear here as soon as one takes this run.'
   }
+  if (kept === undefined) return null
+  return state === 'failed'
+    ? 'This run failed before it kept a policy; the event log says why.'
+    : 'This run ended before it kept a policy.'
 }
 
-/** The settings and status of a live view; a change shows at once and is sent on. */
-function useLive(runId: string, enabled: boolean) {
+type Change = (some: Partial<LiveSettings>) => void
+
+/** The settings and status of a run's live view; a change shows at once and is sent on. */
+function useRunLive(runId: string, enabled: boolean) {
   const client = useQueryClient()
   const init = { params: { path: { run_id: runId } } }
   const options = $api.queryOptions('get', '/api/runs/{run_id}/live', init)
-  const { data } = $api.useQuery('get', '/api/runs/{run_id}/live', init, {
-    enabled,
-    refetchInterval: (query) => (query.state.data?.status.receiving ? 4_000 : 1_000),
-  })
+  const { data } = useQuery({ ...options, enabled, refetchInterval })
   const put = $api.useMutation('put', '/api/runs/{run_id}/live', {
     onSettled: () => client.invalidateQueries({ queryKey: options.queryKey }),
   })
-  const change = (some: Partial<LiveSettings>) => {
-    if (!data) return
-    const { status, ...settings } = data
-    const next = { ...settings, ...some }
-    client.setQueryData(options.queryKey, { ...next, status })
-    put.mutate({ ...init, body: next })
+  return {
+    live: data,
+    change: changing(client, options.queryKey, data, (body) => put.mutate({ ...init, body })),
   }
-  return { live: data, change }
+}
+
+/** The same of a policy that ships. */
+function usePolicyLive(name: string, enabled: boolean) {
+  const client = useQueryClient()
+  const init = { params: { path: { name } } }
+  const options = $api.queryOptions('get', '/api/policies/{name}/live', init)
+  const { data } = useQuery({ ...options, enabled, refetchInterval })
+  const put = $api.useMutation('put', '/api/policies/{name}/live', {
+    onSettled: () => client.invalidateQueries({ queryKey: options.queryKey }),
+  })
+  return {
+    live: data,
+    change: changing(client, options.queryKey, data, (body) => put.mutate({ ...init, body })),
+  }
+}
+
+const refetchInterval = (query: { state: { data?: LiveState | undefined } }) =>
+  query.state.data?.status.receiving ? 4_000 : 1_000
+
+function changing(
+  client: QueryClient,
+  queryKey: readonly unknown[],
+  live: LiveState | undefined,
+  send: (settings: LiveSettings) => void,
+): Change {
+  return (some) => {
+    if (!live) return
+    const { status, ...settings } = live
+    const next = { ...settings, ...some }
+    client.setQueryData(queryKey, { ...next, status })
+    send(next)
+  }
 }
 
 /** False once the tab has been hidden for a while: then nothing is sent. */
@@ -137,29 +203,32 @@ function useWatching(): boolean {
 
 interface LiveControlsProps {
   live: LiveState | undefined
-  change: (some: Partial<LiveSettings>) => void
-  disabled: boolean
+  change: Change
+  /** Whether a finished policy drives, and no training is there to be shown. */
+  driven: boolean
 }
 
-function LiveControls({ live, change, disabled }: LiveControlsProps) {
-  const off = disabled || !live
-  const mode = live?.mode ?? 'policy'
+function LiveControls({ live, change, driven }: LiveControlsProps) {
+  const off = !live
+  const mode = driven ? 'policy' : (live?.mode ?? 'policy')
   const robots = live?.robots ?? 8
   const follow = live?.follow ?? null
   return (
     <fieldset className={classes.controls} aria-label="Live view" disabled={off}>
       <Group gap="sm" align="flex-end">
-        <SegmentedControl
-          size="xs"
-          aria-label="Show"
-          disabled={off}
-          value={mode}
-          onChange={(next) => change({ mode: next as LiveSettings['mode'] })}
-          data={[
-            { value: 'policy', label: 'Policy' },
-            { value: 'training', label: 'Training' },
-          ]}
-        />
+        {!driven && (
+          <SegmentedControl
+            size="xs"
+            aria-label="Show"
+            disabled={off}
+            value={mode}
+            onChange={(next) => change({ mode: next as LiveSettings['mode'] })}
+            data={[
+              { value: 'policy', label: 'Policy' },
+              { value: 'training', label: 'Training' },
+            ]}
+          />
+        )}
         <SegmentedControl
           size="xs"
           aria-label="Speed"
@@ -208,7 +277,7 @@ function LiveControls({ live, change, disabled }: LiveControlsProps) {
         />
       </Group>
       <Text size="xs" c="dimmed" mt={6}>
-        {DESCRIPTIONS[mode]}
+        {driven ? 'The best policy, after training, in real time or faster.' : DESCRIPTIONS[mode]}
       </Text>
     </fieldset>
   )

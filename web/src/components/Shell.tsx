@@ -44,7 +44,9 @@ export function Shell() {
               New<span className={classes.wide}> training</span>
             </NavLink>
             <NavLink to="/compare">Compare</NavLink>
+            <NavLink to="/policies">Policies</NavLink>
             <NavLink to="/arenas">Arenas</NavLink>
+            <NavLink to="/reproduction">Paper</NavLink>
           </nav>
         )}
         <Group gap={10} ml="auto" wrap="nowrap">

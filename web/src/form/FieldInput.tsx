@@ -3,7 +3,7 @@ import { Anchor, Input, NumberInput, SegmentedControl, Select, Switch, Text, Tex
 import { useState } from 'react'
 import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
-import type { Field } from './layout'
+import { type Field, initialOf } from './layout'
 import { problemOf } from './problems'
 import { type Json, range, type Schema } from './schema'
 import type { Form } from './useForm'
@@ -25,13 +25,12 @@ export const fieldId = (key: string): string => `field-${key.replaceAll('.', '-'
 
 export function FieldInput({ field, form, root, initial }: FieldInputProps) {
   const value = valueAt(form.values, field.path) ?? null
+  const fresh = initialOf(field, form.values, initial)
   const error = problemOf(form.problems, field.key)
   const common = {
     id: fieldId(field.key),
     label: field.label,
-    description: (
-      <Description field={field} value={value} form={form} initial={valueAt(initial, field.path)} />
-    ),
+    description: <Description field={field} value={value} form={form} initial={fresh} />,
     error,
     inputWrapperOrder: ['label', 'input', 'error', 'description'] as (
       | 'label'
@@ -86,7 +85,7 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
         />
       )
     case 'numbers':
-      return <NumbersInput {...common} value={value} onChange={set} />
+      return <NumbersInput {...common} value={value} placeholder={listed(fresh)} onChange={set} />
     case 'text':
       return (
         <TextInput
@@ -124,7 +123,7 @@ function Description({
     typeof initial === 'number'
       ? number(initial)
       : Array.isArray(initial)
-        ? initial.join(', ')
+        ? listed(initial)
         : words(String(initial))
   return (
     <>
@@ -198,7 +197,13 @@ interface NumbersInputProps {
   description: React.ReactNode
   error: string | undefined
   value: Json
+  placeholder: string
   onChange: (value: Json) => void
+}
+
+/** [64, 64] -> "64, 64", and "none" for an empty list. */
+function listed(value: Json | undefined): string {
+  return (Array.isArray(value) && value.join(', ')) || 'none'
 }
 
 /** "64, 64" -> [64, 64]. What is no number is kept as it was typed: the server says what is wrong with it. */
@@ -219,7 +224,6 @@ function NumbersInput({ value, onChange, ...common }: NumbersInputProps) {
       {...common}
       inputWrapperOrder={['label', 'input', 'error', 'description']}
       value={shown}
-      placeholder="64, 64"
       onChange={(event) => {
         setText(event.currentTarget.value)
         onChange(parseNumbers(event.currentTarget.value))

@@ -6,7 +6,7 @@ import { Notice } from '../components/ui'
 import { FieldInput, fieldId } from './FieldInput'
 import classes from './form.module.css'
 import { labelsOf } from './labels'
-import { type Field, grouped } from './layout'
+import { type Field, grouped, initialOf } from './layout'
 import type { Problems } from './problems'
 import type { Json, Schema } from './schema'
 import type { Form } from './useForm'
@@ -40,7 +40,7 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
     if (troubled) setOpen('advanced')
   }, [troubled])
   const changed = fields.filter(
-    (field) => !sameValue(valueAt(form.values, field.path), valueAt(initial, field.path)),
+    (field) => !sameValue(valueAt(form.values, field.path), initialOf(field, form.values, initial)),
   ).length
   return (
     <Accordion variant="contained" className={classes.advanced} value={open} onChange={setOpen}>

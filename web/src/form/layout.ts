@@ -1,7 +1,7 @@
 /** From a schema and the current values to the fields of a form: which there are, and under which heading. */
 import { words } from '../lib/format'
 import { branches, type Json, resolve, type Schema, withoutNull } from './schema'
-import { type Path, pathKey, valueAt } from './values'
+import { type Path, pathKey, sameValue, valueAt } from './values'
 
 /** What a field offers to choose from. */
 interface Option {
@@ -108,6 +108,20 @@ function properties(
     .flatMap(([key, one]) =>
       fieldsAt(one, root, values, { ...place, path: [...place.path, key], trail }, key),
     )
+}
+
+/**
+ * What a field holds in a fresh form: of another kind of object than the fresh form has (another robot, another algorithm) its
+ * own default.
+ */
+export function initialOf(field: Field, values: Json, initial: Json): Json | undefined {
+  const other = field.path.slice(1).some((_, depth) => {
+    const kind = [...field.path.slice(0, depth + 1), 'name']
+    return !sameValue(valueAt(values, kind), valueAt(initial, kind))
+  })
+  return other && field.kind !== 'union'
+    ? (field.schema.default as Json | undefined)
+    : valueAt(initial, field.path)
 }
 
 /** Fields that share their innermost heading, in order of first appearance. */

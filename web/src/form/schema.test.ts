@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { fieldsOf } from './layout'
+import { fieldsOf, initialOf } from './layout'
 import { branches, defaults, type Schema } from './schema'
 
 const ROOT: Schema = {
@@ -46,4 +46,33 @@ test('what a program fills in is no field', () => {
   const keys = (name: string) => fieldsOf(form, form, { arena: { name } }).map(({ key }) => key)
   expect(keys('maze')).toEqual(['arena', 'arena.difficulty'])
   expect(keys('imported')).toEqual(['arena'])
+})
+
+test('a field of another kind than the fresh form has goes back to its own default', () => {
+  const robot = (speed: number, name: string): Schema => ({
+    properties: {
+      name: { const: name, default: name },
+      speed: { type: 'number', default: speed },
+    },
+  })
+  const root: Schema = {
+    $defs: { Small: robot(0.25, 'small'), Large: robot(2, 'large') },
+    properties: {
+      name: { type: 'string' },
+      robot: {
+        discriminator: {
+          propertyName: 'name',
+          mapping: { small: '#/$defs/Small', large: '#/$defs/Large' },
+        },
+        oneOf: [{ $ref: '#/$defs/Small' }, { $ref: '#/$defs/Large' }],
+      },
+    },
+  }
+  const initial = { name: '', robot: { name: 'small', speed: 0.3 } }
+  const fresh = (name: string) => {
+    const values = { name: 'Mine', robot: { name, speed: 1 } }
+    return fieldsOf(root, root, values).map((field) => initialOf(field, values, initial))
+  }
+  expect(fresh('small')).toEqual(['', initial.robot, 0.3])
+  expect(fresh('large')).toEqual(['', initial.robot, 2])
 })

@@ -3,12 +3,13 @@ import type { ArenaConfig, ArenaView } from '../api/types'
 import type { Json } from '../form/schema'
 import { plural, significant } from './format'
 
-/** "10 × 10 m · 17 obstacles · 72 % free". */
+/** "10 × 10 m · 17 obstacles · 2 moving · 72 % free". */
 export function arenaFacts({ geometry, obstacles, free_share }: ArenaView): string {
   const { width, height } = geometry
   return [
     `${significant(width)} × ${significant(height)} m`,
     obstacles === 0 ? 'no obstacles' : plural(obstacles, 'obstacle'),
+    ...(geometry.movers.length > 0 ? [`${geometry.movers.length} moving`] : []),
     `${Math.round(100 * free_share)}\u00a0%\u00a0free`,
   ].join(' · ')
 }

@@ -2,10 +2,15 @@
 import type { Experiment, TrainingConfig } from '../api/types'
 import { words } from './format'
 
-/** "Simple · PPO, MLP · Basic reward". */
+/** What nobody needs to be told: the robot that everybody starts with. */
+const USUAL_ROBOT = 'burger'
+
+/** "Simple, 4 moving · Jackal · PPO, MLP · Basic reward". */
 export function summaryOf(training: TrainingConfig): string {
+  const { arena, robot } = training.task
   return [
-    words(training.task.arena.name),
+    arena.movers.count > 0 ? `${words(arena.name)}, ${arena.movers.count} moving` : words(arena.name),
+    ...(robot.name === USUAL_ROBOT ? [] : [words(robot.name)]),
     algorithmOf(training),
     `${words(training.task.reward.name)} reward`,
   ].join(' · ')

@@ -10,27 +10,29 @@ vi.stubGlobal('EventSource', FakeEventSource)
 
 const HASH = 'a'.repeat(64)
 
+const movers = { count: 0, kind: 'pedestrian', speed: 1, radius: 0.25 } as const
+
 const GALLERY: ArenaSummary[] = [
-  { kind: 'fixed', key: 'simple', title: 'Simple', config: { name: 'simple' }, imported_at: null },
+  { kind: 'fixed', key: 'simple', title: 'Simple', config: { name: 'simple', movers }, imported_at: null },
   {
     kind: 'generated',
     key: 'maze',
     title: 'Maze',
-    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0 },
+    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0, movers },
     imported_at: null,
   },
   {
     kind: 'imported',
     key: HASH,
     title: 'Lab',
-    config: { name: 'imported', sha256: HASH, arena: null },
+    config: { name: 'imported', sha256: HASH, arena: null, movers },
     imported_at: 1,
   },
 ]
 
 const LAB: ArenaView = {
   title: 'Lab',
-  config: { name: 'imported', sha256: HASH, arena: null },
+  config: { name: 'imported', sha256: HASH, arena: null, movers },
   geometry: {
     format: 'mapless-arena/1',
     name: 'Lab',
@@ -38,6 +40,7 @@ const LAB: ArenaView = {
     height: 6,
     circles: [{ x: 1, y: 0.5, radius: 0.3 }],
     boxes: [{ x: -2, y: 0, length: 2, width: 0.5, angle: 30 }],
+    movers: [],
     start: null,
     target: null,
   },
@@ -76,6 +79,23 @@ test('every arena is drawn, to scale, with what it is', async () => {
   expect((await card('Maze')).getByRole('slider')).toHaveAttribute('aria-valuenow', '0.5')
 })
 
+test('what moves is counted, and the rounds of patrols are drawn', async () => {
+  const round = [
+    { x: -3, y: 1 },
+    { x: 3, y: 1 },
+  ]
+  const moving = [
+    { kind: 'patrol' as const, radius: 0.25, speed: 1, waypoints: round },
+    { kind: 'pedestrian' as const, radius: 0.25, speed: 1 },
+  ]
+  start({ [`GET /api/arenas/imported/${HASH}`]: { ...LAB, geometry: { ...LAB.geometry, movers: moving } } })
+  open('/arenas')
+  const lab = await card('Lab')
+  expect(await lab.findByText(/2 obstacles · 2 moving · 82/)).toBeInTheDocument()
+  const drawing = lab.getByRole('img', { name: 'Lab from above' })
+  expect(drawing.querySelector('polygon')).toHaveAttribute('points', '-3,1 3,1')
+})
+
 test('the difficulty is what is drawn, and what the training starts with', async () => {
   const server = start()
   const { router, user } = open('/arenas')
@@ -87,7 +107,7 @@ test('the difficulty is what is drawn, and what the training starts with', async
   await user.click(maze.getByRole('link', { name: 'Train on it' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/new'))
   const chosen = new URLSearchParams(router.state.location.search).get('arena')
-  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1 })
+  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1, movers })
 })
 
 test('the launch form takes the chosen arena, and ignores what is none', async () => {

@@ -74,6 +74,11 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
           <Text size="sm" c="dimmed">
             launched {dateTime(experiment.created_at)}
           </Text>
+          {experiment.campaign && (
+            <Anchor component={Link} to={`/reproduction?campaign=${experiment.campaign}`} size="sm">
+              a row of the paper's tables
+            </Anchor>
+          )}
         </Group>
       }
       actions={

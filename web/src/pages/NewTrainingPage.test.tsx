@@ -1,6 +1,6 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { experiment, form, training } from '../testing/examples'
+import { experiment, form, policy, training } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -148,4 +148,21 @@ test('a server out of reach loses nothing of what was typed', async () => {
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   expect(await screen.findByText('Not launched: The server cannot be reached.')).toBeInTheDocument()
   expect(name).toHaveValue('Maze')
+})
+
+test('a training like a policy that ships starts with its settings and its seed', async () => {
+  const server = start({
+    'GET /api/policies/crowd': { ...policy, training: { ...training, steps: 50_000 } },
+  })
+  const { user } = open('/new?policy=crowd')
+  expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('Like “Crowd”')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toMatchObject({ seeds: [7], training: { steps: 50_000 } })
+})
+
+test('a policy that is not there cannot be started from', async () => {
+  start()
+  open('/new?policy=nobody')
+  expect(await screen.findByText('There is no such policy')).toBeInTheDocument()
 })

@@ -5,7 +5,7 @@ import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
-import type { Experiment, Preset } from '../api/types'
+import type { Experiment, Preset, ReferencePolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
@@ -35,10 +35,19 @@ export function NewTrainingPage() {
     { params: { path: { experiment_id: from ?? '' } } },
     { enabled: from !== null },
   )
+  const like = search.get('policy')
+  const policy = $api.useQuery(
+    'get',
+    '/api/policies/{name}',
+    { params: { path: { name: like ?? '' } } },
+    { enabled: like !== null, staleTime: Number.POSITIVE_INFINITY },
+  )
   const copied = useCopy(original.data)
   const chosen = search.get('arena')
-  const initial = from === null ? withArena(form.data?.defaults, chosen) : copied
-  const error = form.isError ? form.error : from === null ? null : original.error
+  const initial =
+    from !== null ? copied : like !== null ? likePolicy(policy.data) : withArena(form.data?.defaults, chosen)
+  const source = from !== null ? original : like !== null ? policy : null
+  const error = form.isError ? form.error : (source?.error ?? null)
 
   return (
     <Page title="New training">
@@ -46,10 +55,10 @@ export function NewTrainingPage() {
         <Panel>
           <QueryError
             error={error}
-            what={form.isError ? 'form' : 'training'}
+            what={form.isError ? 'form' : like !== null ? 'policy' : 'training'}
             retry={() => {
               void form.refetch()
-              if (from !== null) void original.refetch()
+              if (source) void source.refetch()
             }}
           />
         </Panel>
@@ -63,7 +72,7 @@ export function NewTrainingPage() {
         </Panel>
       ) : (
         <LaunchForm
-          key={from ?? chosen ?? ''}
+          key={from ?? like ?? chosen ?? ''}
           schema={form.data.schema as Schema}
           defaults={form.data.defaults as unknown as Json}
           initial={initial}
@@ -80,6 +89,13 @@ function withArena(defaults: unknown, chosen: string | null): Json | undefined {
   const values = defaults as Json
   const arena = arenaFromSearch(chosen)
   return arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
+}
+
+/** The training that made a shipped policy. */
+function likePolicy(policy: ReferencePolicy | undefined): Json | undefined {
+  if (!policy) return undefined
+  const { title, seed, training } = policy
+  return { name: `Like “${title}”`, seeds: [seed], training: training as unknown as Json }
 }
 
 /** What a duplicate starts with; taken once, since its original may go on while the copy is being edited. */

@@ -1,8 +1,8 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { checkpoints, experiment, live, NOW, runDetail, status } from '../testing/examples'
+import { checkpoints, episodes, experiment, live, NOW, replay, runDetail, status } from '../testing/examples'
 import { open } from '../testing/render'
-import { FakeEventSource, startServer } from '../testing/server'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
 
 vi.stubGlobal('EventSource', FakeEventSource)
 
@@ -17,6 +17,7 @@ const routes = {
     { id: 2, at: NOW - 10, step: 90_000, level: 'warning', message: 'Link lost for 2 s' },
   ],
   'GET /api/runs/run1/live': live,
+  'GET /api/checkpoints/cp2/episodes': episodes,
   'GET /api/experiments/exp1': experiment,
 }
 
@@ -46,6 +47,83 @@ test('its policies, the newest first, the best marked, each to take away', async
   expect(rows[0]).toHaveTextContent('Best')
   expect(rows[0]).toHaveTextContent(/88\.5\s%\s*83\.3–92\.2\s%\s*N = 200/)
   expect(rows[1]).not.toHaveTextContent('Best')
+})
+
+test('the episodes behind its best policy, failures first, by outcome', async () => {
+  startServer(routes)
+  const { user } = open('/runs/run1')
+  const list = await screen.findByTestId('episodes')
+  expect(screen.getByRole('heading', { name: /Episodes of step 100\s000 on simple-200/ })).toBeInTheDocument()
+  const shown = () => within(list).getAllByTestId('episode')
+  // Within an outcome, the smallest clearance comes first.
+  expect(shown().map((row) => within(row).getAllByRole('cell')[0]?.textContent)).toEqual([
+    '2',
+    '5',
+    '3',
+    '4',
+    '1',
+  ])
+  expect(shown()[4]).toHaveTextContent(/Arrival\s*90\s*4\.4 m\s*1\.10 ×\s*0\.50 m/)
+  // How far it would have been says nothing about an attempt that failed.
+  expect(shown()[0]).toHaveTextContent(/Collision\s*12\s*0\.6 m\s*–/)
+  await user.click(within(list).getByRole('radio', { name: 'Collisions 2' }))
+  expect(shown().map((row) => row.dataset.outcome)).toEqual(['collision', 'collision'])
+})
+
+test('an episode is replayed; its address can be passed on', async () => {
+  startServer({ ...routes, 'GET /api/checkpoints/cp2/replays/1': replay })
+  const { user, router } = open('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
+  expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
+    'src',
+    '/replays/checkpoints/cp2/1/light/',
+  )
+  expect(router.state.location.search).toBe('?episode=1')
+  const dialog = screen.getByRole('dialog', { name: 'Episode 2' })
+  expect(dialog).toHaveTextContent('12 steps, 2.4 s, on simple-200')
+  expect(within(dialog).queryByRole('alert')).not.toBeInTheDocument()
+  expect(within(dialog).getByRole('link', { name: 'Download' })).toHaveAttribute(
+    'href',
+    '/replays/checkpoints/cp2/1/light/?download',
+  )
+  await user.keyboard('{Escape}')
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(router.state.location.search).toBe('')
+})
+
+test('one goes on from one failure to the next without closing the replay', async () => {
+  startServer({
+    ...routes,
+    'GET /api/checkpoints/cp2/replays/1': replay,
+    'GET /api/checkpoints/cp2/replays/4': { ...replay, episode: 4, page: '/replays/checkpoints/cp2/4/' },
+  })
+  const { user, router } = open('/runs/run1?episode=1')
+  await screen.findByTestId('episodes')
+  const next = await screen.findByRole('button', { name: 'Next' })
+  await waitFor(() => expect(next).toBeEnabled())
+  expect(screen.getByRole('button', { name: 'Previous' })).toBeDisabled()
+  await user.click(next)
+  await waitFor(() =>
+    expect(screen.getByTitle('The episode in 3D')).toHaveAttribute(
+      'src',
+      '/replays/checkpoints/cp2/4/light/',
+    ),
+  )
+  expect(router.state.location.search).toBe('?episode=4')
+  expect(screen.getByRole('button', { name: 'Previous' })).toBeEnabled()
+})
+
+test('a replay that ended otherwise says so, and one that cannot be made says why', async () => {
+  const server = startServer({
+    ...routes,
+    'GET /api/checkpoints/cp2/replays/1': { ...replay, faithful: false },
+  })
+  const { router } = open('/runs/run1?step=100000&episode=1')
+  expect(await screen.findByText(/ended otherwise than recorded/)).toBeInTheDocument()
+  server.routes['GET /api/checkpoints/cp2/replays/2'] = refusal(500, 'The suite has changed.')
+  await router.navigate('/runs/run1?episode=2')
+  expect(await screen.findByText('The suite has changed.')).toBeInTheDocument()
+  expect(screen.getByRole('button', { name: 'Try again' })).toBeInTheDocument()
 })
 
 test('what is wrong, with its evidence and what to try', async () => {
@@ -110,16 +188,34 @@ test('a choice about the view shows at once and is sent with the others', async 
 })
 
 test.each([
-  ['queued', 'Waiting for a free worker'],
-  ['completed', 'This run is complete'],
-  ['stopped', 'This run was stopped'],
-  ['failed', 'This run failed'],
-] as const)('a %s run has no robots to show, and says so', async (state, text) => {
-  startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, state } })
+  ['queued', checkpoints, 'Waiting for a free worker'],
+  ['completed', [], 'ended before it kept a policy'],
+  ['stopped', [], 'ended before it kept a policy'],
+  ['failed', [], 'failed before it kept a policy'],
+] as const)('a %s run has no robots to show, and says so', async (state, kept, text) => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1': { ...runDetail, state },
+    'GET /api/runs/run1/checkpoints': [...kept],
+  })
   open('/runs/run1')
   expect(await screen.findByTestId('live-overlay')).toHaveTextContent(text)
   expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
 })
+
+test.each(['completed', 'stopped', 'failed'] as const)(
+  'the best policy of a %s run drives',
+  async (state) => {
+    startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, state } })
+    open('/runs/run1')
+    expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/run1/')
+    const controls = screen.getByRole('group', { name: 'Live view' })
+    expect(controls).toHaveTextContent('The best policy, after training')
+    // There are no training robots any more to choose.
+    expect(within(controls).queryByRole('radio', { name: 'Training' })).not.toBeInTheDocument()
+    await waitFor(() => expect(within(controls).getByRole('radio', { name: '10×' })).toBeEnabled())
+  },
+)
 
 test('a queued run that nobody will take says so', async () => {
   startServer({

@@ -1,27 +1,28 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
 import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useMemo } from 'react'
+import { useMemo, useRef } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
 import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
-import type { RunDetail, Series } from '../api/types'
+import type { Checkpoint, RunDetail, Series } from '../api/types'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
 import { chartOf } from '../charts/shape'
+import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
 import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
-import { LiveView } from '../components/LiveView'
+import { RunLiveView } from '../components/LiveView'
 import { canResume, canStop } from '../components/states'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
-import { useTitle } from '../lib/hooks'
+import { useNumberInAddress, useTitle } from '../lib/hooks'
 import classes from './RunPage.module.css'
 
 const POINTS = 600
@@ -63,6 +64,13 @@ function LoadedRun({ run }: { run: RunDetail }) {
   )
   const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', init)
   const events = $api.useQuery('get', '/api/runs/{run_id}/events', init)
+  const [step, setStep] = useNumberInAddress('step')
+  const episodes = useRef<HTMLDivElement>(null)
+  const chosen = chosenOf(checkpoints.data ?? [], step)
+  const choose = (checkpoint: Checkpoint) => {
+    setStep(checkpoint.step)
+    episodes.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
+  }
   const series = metrics.data?.series ?? []
   const waiting =
     run.state === 'queued' ? 'Curves start with the training' : metrics.isPending ? '' : 'No value yet'
@@ -100,7 +108,11 @@ function LoadedRun({ run }: { run: RunDetail }) {
         <Diagnoses runId={run.id} state={run.state} />
         <div className={classes.stage}>
           <Panel flush>
-            <LiveView runId={run.id} state={run.state} />
+            <RunLiveView
+              runId={run.id}
+              state={run.state}
+              kept={checkpoints.data && checkpoints.data.length > 0}
+            />
           </Panel>
           <Panel data-testid="main-curves">
             <Stack gap="md">
@@ -112,13 +124,20 @@ function LoadedRun({ run }: { run: RunDetail }) {
         </div>
         <Panel title="Checkpoints" flush>
           {checkpoints.data ? (
-            <CheckpointTable checkpoints={checkpoints.data} />
+            <CheckpointTable checkpoints={checkpoints.data} chosen={chosen} onChoose={choose} />
           ) : checkpoints.error ? (
             <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
           ) : (
             <Skeleton height={120} m="md" w="auto" />
           )}
         </Panel>
+        {chosen?.evaluation && (
+          <div ref={episodes} className={classes.episodes}>
+            <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>
+              <CheckpointEpisodes key={chosen.id} checkpoint={chosen} />
+            </Panel>
+          </div>
+        )}
         <Panel title="Curves">
           <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
             <Tabs.List mb="md" className={classes.tabs}>
@@ -150,6 +169,14 @@ function LoadedRun({ run }: { run: RunDetail }) {
         </Panel>
       </Stack>
     </Page>
+  )
+}
+
+/** The checkpoint in the address, else the best one. */
+function chosenOf(checkpoints: readonly Checkpoint[], step: number | null): Checkpoint | undefined {
+  return (
+    checkpoints.find((checkpoint) => checkpoint.step === step && checkpoint.evaluation) ??
+    checkpoints.find((checkpoint) => checkpoint.best)
   )
 }
 

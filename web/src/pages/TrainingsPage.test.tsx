@@ -6,7 +6,16 @@ import { FakeEventSource, refusal, startServer } from '../testing/server'
 
 vi.stubGlobal('EventSource', FakeEventSource)
 
-const other = { ...experiment, id: 'exp2', name: 'Maze', state: 'failed' as const, success: null }
+const movers = { count: 4, kind: 'pedestrian' as const, speed: 1, radius: 0.25 }
+const task = { ...experiment.training.task, arena: { name: 'complex' as const, movers } }
+const other = {
+  ...experiment,
+  id: 'exp2',
+  name: 'Maze',
+  state: 'failed' as const,
+  success: null,
+  training: { ...experiment.training, task },
+}
 const two = { items: [experiment, other], total: 2 }
 
 test('each training with its state, what it trains, and its success with interval and N', async () => {
@@ -20,6 +29,7 @@ test('each training with its state, what it trains, and its success with interva
   expect(first).toHaveTextContent('PPO, MLP')
   expect(first).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%\s*N = 2/)
   expect(rows[1]).toHaveTextContent('Failed')
+  expect(rows[1]).toHaveTextContent('Complex, 4 moving · PPO, MLP')
   expect(document.title).toBe('Trainings – Mapless')
 })
 

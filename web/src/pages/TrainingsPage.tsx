@@ -61,9 +61,14 @@ export function TrainingsPage() {
             icon={<IconRobot size={44} stroke={1.2} />}
             title="Nothing trained yet"
             actions={
-              <Button component={Link} to="/new">
-                Launch your first training
-              </Button>
+              <Group gap="xs" justify="center">
+                <Button component={Link} to="/new">
+                  Launch your first training
+                </Button>
+                <Button variant="default" component={Link} to="/reproduction">
+                  Reproduce the paper
+                </Button>
+              </Group>
             }
           >
             The defaults train a robot to find its way in a simple arena within half a minute, and you can

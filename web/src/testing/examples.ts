@@ -4,8 +4,12 @@ import type {
   Checkpoint,
   Comparison,
   Curves,
+  Episodes,
   Experiment,
   LiveState,
+  ReferencePolicy,
+  Replay,
+  Reproduction,
   Run,
   RunDetail,
   Status,
@@ -48,11 +52,12 @@ const network = { name: 'mlp' as const, hidden_sizes: [64, 64], activation: 'rel
 /** A training as the form's schema below describes it, with enough of the rest for lists and headings. */
 export const training = {
   task: {
-    arena: { name: 'simple' },
+    robot: { name: 'burger' },
+    arena: { name: 'simple', movers: { count: 0, kind: 'pedestrian', speed: 1, radius: 0.25 } },
     observation: 'improved',
     reward: { name: 'basic', arrival: 120 },
   },
-  algorithm: { name: 'ppo', network, learning_rate: 0.001, robots: 128 },
+  algorithm: { name: 'ppo', network, learning_rate: 0.001, robots: 256 },
   steps: 300_000,
 } as unknown as Experiment['training']
 
@@ -62,6 +67,7 @@ export const experiment: Experiment = {
   created_at: NOW - 7200,
   training,
   state: 'running',
+  campaign: null,
   runs: [
     run,
     {
@@ -116,6 +122,70 @@ export const checkpoints: Checkpoint[] = [
     },
   },
 ]
+
+export const episodes: Episodes = {
+  checkpoint_id: 'cp2',
+  suite: 'simple-200',
+  suite_hash: 'c0ffee',
+  episodes: [
+    ['arrival', 90, 4.4, 4, 0.5],
+    ['collision', 12, 0.6, 3, 0],
+    ['timeout', 500, 20, 3, 0.2],
+    ['arrival', 120, 5, 5, 0.1],
+    ['collision', 30, 1.4, 3, 0.05],
+  ].map(([outcome, steps, path_length, shortest_path, min_clearance]) => ({
+    outcome,
+    steps,
+    reward: 1,
+    path_length,
+    shortest_path,
+    min_clearance,
+  })) as Episodes['episodes'],
+}
+
+export const replay: Replay = {
+  episode: 1,
+  suite: 'simple-200',
+  outcome: 'collision',
+  steps: 12,
+  seconds: 2.4,
+  faithful: true,
+  page: '/replays/checkpoints/cp2/1/',
+}
+
+const row = (name: string, value: number, episodes = 200) => ({
+  name,
+  success: { value, low: value - 0.01, high: value, seeds: 1, episodes },
+  collision: 1 - value,
+  timeout: 0,
+  spl: 0.9 * value,
+  steps: 92.4,
+})
+
+export const policy: ReferencePolicy = {
+  name: 'crowd',
+  title: 'Crowd',
+  description: 'Drives between 17 obstacles.',
+  command: 'python -m workers.reference.build crowd',
+  training,
+  seed: 7,
+  step: 250_000,
+  size: 27_530,
+  results: [
+    {
+      suite: 'simple-200',
+      suite_hash: 'c0ffee',
+      policy: row('Crowd', 0.99),
+      baselines: [row('go-to-goal', 0.5), row('dynamic window', 0.98)],
+    },
+    {
+      suite: 'clutter-500',
+      suite_hash: 'beef',
+      policy: row('Crowd', 0.95, 500),
+      baselines: [row('go-to-goal', 0.25, 500), row('dynamic window', 0.998, 500)],
+    },
+  ],
+}
 
 export const curves: Curves = {
   name: 'eval/success_rate',
@@ -284,7 +354,7 @@ export const form = {
             maximum: 0.1,
             ...ADVANCED,
           },
-          robots: { type: 'integer', title: 'Robots', default: 128, minimum: 1, maximum: 4096, ...ADVANCED },
+          robots: { type: 'integer', title: 'Robots', default: 256, minimum: 1, maximum: 4096, ...ADVANCED },
         },
       },
       Ddpg: {
@@ -316,3 +386,94 @@ export const form = {
     },
   ],
 } as unknown as components['schemas']['TrainingForm']
+
+const paperRow = { collisions: null, reward: 9.07, episodes: 87, success: 0.678, steps: 114.9 }
+const spread = (mean: number) => ({ mean, low: mean - 0.01, high: mean + 0.01 })
+const campaignRun = {
+  id: 'run1',
+  seed: 0,
+  state: 'completed' as const,
+  progress: 1,
+  error: null,
+  measured: { reward: 14.2, episodes: 91, success: 0.83, collisions: 0.13, steps: 109.5 },
+}
+
+/** A campaign of one table with two rows: one seed done, one running; one failed, one queued. */
+export const reproduction: Reproduction = {
+  campaign: {
+    id: 'camp1',
+    created_at: NOW - 600,
+    state: 'running',
+    seeds: 2,
+    effort: 1,
+    progress: 0.43,
+    seconds_left: 400,
+  },
+  campaigns: [{ id: 'camp1', created_at: NOW - 600 }],
+  workers: 2,
+  seconds: 930,
+  curve: 'train/return',
+  tables: [
+    {
+      id: 'complex-basic',
+      title: 'Complex arena, basic reward',
+      rows: ['complex-ddpg', 'complex-resblock'],
+      labels: ['DDPG', 'ResBlock PPO'],
+    },
+  ],
+  figures: [
+    { id: 'complex-basic', title: 'Complex arena, basic reward', rows: ['complex-ddpg', 'complex-resblock'] },
+  ],
+  rows: [
+    {
+      id: 'complex-ddpg',
+      method: 'DDPG',
+      paper: { ...paperRow, reward: 11.23, success: 0.937 },
+      ours: null,
+      experiment_id: 'exp2',
+      runs: [
+        { ...campaignRun, id: 'run3', state: 'failed', measured: null, error: 'out of memory' },
+        { ...campaignRun, id: 'run4', seed: 1, state: 'queued', progress: 0, measured: null },
+      ],
+    },
+    {
+      id: 'complex-resblock',
+      method: 'ResBlock PPO',
+      paper: paperRow,
+      ours: {
+        reward: spread(14.2),
+        episodes: spread(91),
+        success: spread(0.83),
+        collisions: spread(0.13),
+        steps: spread(109.5),
+      },
+      experiment_id: 'exp1',
+      runs: [
+        campaignRun,
+        { ...campaignRun, id: 'run2', seed: 1, state: 'running', progress: 0.55, measured: null },
+      ],
+    },
+  ],
+  claims: [
+    {
+      id: 'complex-success',
+      statement: 'In the complex arena DDPG arrives more often.',
+      source: 'Results, table 2',
+      word: 'holds',
+      reason: '9.6 points more, 95 % interval [+6.6, +12.6], all of it in favour of the claim.',
+      evidence: 'The paper: 59 of 63 against 59 of 87.',
+      reading: null,
+      rows: ['complex-ddpg', 'complex-resblock'],
+    },
+    {
+      id: 'adapts',
+      statement: 'It adapts swiftly.',
+      source: 'Results',
+      word: "can't be told",
+      reason: 'Nothing changes in either arena.',
+      evidence: null,
+      reading: null,
+      rows: [],
+    },
+  ],
+}

@@ -1,0 +1,53 @@
+/** The episodes of a checkpoint's evaluation; which of them is replayed stands in the address, to be passed on. */
+import { $api } from '../api/client'
+import type { Checkpoint } from '../api/types'
+import { byInterest } from '../lib/episodes'
+import { useNumberInAddress } from '../lib/hooks'
+import { EpisodesQuery } from './Episodes'
+import { ReplayDialog } from './Replay'
+
+/** Nothing of an evaluation ever changes. */
+const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
+
+export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
+  const [episode, setEpisode] = useNumberInAddress('episode')
+  const path = { checkpoint_id: checkpoint.id }
+  const episodes = $api.useQuery(
+    'get',
+    '/api/checkpoints/{checkpoint_id}/episodes',
+    { params: { path } },
+    FOR_GOOD,
+  )
+  return (
+    <>
+      <EpisodesQuery query={episodes} onReplay={setEpisode} />
+      {episode !== null && (
+        <CheckpointReplay
+          path={path}
+          episode={episode}
+          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          onReplay={setEpisode}
+          onClose={() => setEpisode(null)}
+        />
+      )}
+    </>
+  )
+}
+
+interface CheckpointReplayProps {
+  path: { checkpoint_id: string }
+  episode: number
+  order: readonly number[]
+  onReplay: (episode: number) => void
+  onClose: () => void
+}
+
+function CheckpointReplay({ path, ...dialog }: CheckpointReplayProps) {
+  const replay = $api.useQuery(
+    'get',
+    '/api/checkpoints/{checkpoint_id}/replays/{episode}',
+    { params: { path: { ...path, episode: dialog.episode } } },
+    { ...FOR_GOOD, retry: false },
+  )
+  return <ReplayDialog query={replay} {...dialog} />
+}

@@ -1,0 +1,49 @@
+/** What can be done with a shipped policy: take it away, or train one like it. */
+import { Button, Menu } from '@mantine/core'
+import { Link } from 'react-router'
+import type { ReferencePolicy } from '../api/types'
+import { fileSize } from '../lib/format'
+import { IconCopy, IconDownload } from './icons'
+
+interface PolicyActionsProps {
+  policy: ReferencePolicy
+  size?: 'xs' | 'sm'
+}
+
+export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
+  const path = `/api/policies/${policy.name}`
+  return (
+    <>
+      <Menu width={250}>
+        <Menu.Target>
+          <Button
+            variant="default"
+            size={size}
+            leftSection={<IconDownload size={15} />}
+            aria-label={`Download ${policy.title}`}
+          >
+            Download
+          </Button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Menu.Item component="a" href={`${path}/download`} download>
+            Checkpoint, {fileSize(policy.size)}
+          </Menu.Item>
+          <Menu.Item component="a" href={`${path}/bundle`} download>
+            Robot bundle: ONNX and ROS 2
+          </Menu.Item>
+        </Menu.Dropdown>
+      </Menu>
+      <Button
+        component={Link}
+        to={`/new?policy=${policy.name}`}
+        variant="default"
+        size={size}
+        leftSection={<IconCopy size={15} />}
+        aria-label={`Train one like ${policy.title}`}
+      >
+        Train one like it
+      </Button>
+    </>
+  )
+}

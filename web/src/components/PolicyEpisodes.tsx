@@ -1,0 +1,65 @@
+/** The episodes of a shipped policy on one of its suites; which is replayed stands in the address. */
+import { SegmentedControl } from '@mantine/core'
+import { useState } from 'react'
+import { $api } from '../api/client'
+import type { ReferencePolicy } from '../api/types'
+import { byInterest } from '../lib/episodes'
+import { useNumberInAddress } from '../lib/hooks'
+import { EpisodesQuery } from './Episodes'
+import { ReplayDialog } from './Replay'
+import { Panel } from './ui'
+
+const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
+
+export function PolicyEpisodes({ policy }: { policy: ReferencePolicy }) {
+  const suites = policy.results.map((result) => result.suite)
+  const [suite, setSuite] = useState(suites[0] ?? '')
+  const [episode, setEpisode] = useNumberInAddress('episode')
+  const path = { name: policy.name, suite }
+  const episodes = $api.useQuery(
+    'get',
+    '/api/policies/{name}/suites/{suite}/episodes',
+    { params: { path } },
+    FOR_GOOD,
+  )
+  return (
+    <Panel
+      title={`Episodes on ${suite}`}
+      flush
+      actions={
+        suites.length > 1 && (
+          <SegmentedControl size="xs" aria-label="Suite" value={suite} onChange={setSuite} data={suites} />
+        )
+      }
+    >
+      <EpisodesQuery key={suite} query={episodes} onReplay={setEpisode} />
+      {episode !== null && (
+        <PolicyReplay
+          path={path}
+          episode={episode}
+          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          onReplay={setEpisode}
+          onClose={() => setEpisode(null)}
+        />
+      )}
+    </Panel>
+  )
+}
+
+interface PolicyReplayProps {
+  path: { name: string; suite: string }
+  episode: number
+  order: readonly number[]
+  onReplay: (episode: number) => void
+  onClose: () => void
+}
+
+function PolicyReplay({ path, ...dialog }: PolicyReplayProps) {
+  const replay = $api.useQuery(
+    'get',
+    '/api/policies/{name}/suites/{suite}/replays/{episode}',
+    { params: { path: { ...path, episode: dialog.episode } } },
+    { ...FOR_GOOD, retry: false },
+  )
+  return <ReplayDialog query={replay} {...dialog} />
+}

@@ -1,0 +1,45 @@
+/** The paper's claims, each with one of three words, the figures behind it, and what the paper's own can carry. */
+import { Text } from '@mantine/core'
+import type { Verdict } from '../../api/types'
+import { Panel } from '../ui'
+import ui from '../ui.module.css'
+import classes from './reproduction.module.css'
+
+const WORDS = ['holds', 'does not hold', "can't be told"] as const
+
+export function Claims({ claims }: { claims: readonly Verdict[] }) {
+  const told = WORDS.map((word) => `${claims.filter((claim) => claim.word === word).length} ${plural(word)}`)
+  return (
+    <Panel
+      title="The paper's claims"
+      actions={
+        <Text size="xs" c="dimmed" data-testid="told">
+          {told.join(' · ')}
+        </Text>
+      }
+    >
+      <ul className={classes.claims}>
+        {claims.map((claim) => (
+          <li key={claim.id} data-testid="claim" data-word={claim.word}>
+            <span className={classes.word} data-word={claim.word}>
+              {claim.word}
+            </span>
+            <div>
+              <div className={classes.statement}>{claim.statement}</div>
+              <div>{claim.reason}</div>
+              <div className={ui.quiet}>{[claim.evidence, claim.reading].filter(Boolean).join(' ')}</div>
+              <div className={`${ui.quiet} ${classes.source}`}>{claim.source}</div>
+            </div>
+          </li>
+        ))}
+      </ul>
+      <Text size="xs" c="dimmed" mt="md" maw="100ch">
+        A comparison is judged by the difference of two means over seeds and its 95 % interval (Welch's t),
+        from five seeds on. With so many comparisons about one interval in twenty misses the truth.
+      </Text>
+    </Panel>
+  )
+}
+
+const plural = (word: Verdict['word']): string =>
+  ({ holds: 'hold', 'does not hold': 'do not hold', "can't be told": "can't be told" })[word]

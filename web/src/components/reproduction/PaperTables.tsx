@@ -1,0 +1,126 @@
+/** The paper's tables with ours below each of its lines: means with 95 % intervals, and every seed. */
+import { Anchor, Table } from '@mantine/core'
+import { Link } from 'react-router'
+import type { CampaignRow, PaperTable, Reproduction, Spread } from '../../api/types'
+import { percent, plural } from '../../lib/format'
+import table from '../ExperimentTable.module.css'
+import { Panel } from '../ui'
+import ui from '../ui.module.css'
+import classes from './reproduction.module.css'
+import { SeedStrip } from './SeedStrip'
+
+const DASH = '–'
+const MINUS = '\u2212'
+
+export function PaperTables({ reproduction }: { reproduction: Reproduction }) {
+  const rows = new Map(reproduction.rows.map((row) => [row.id, row]))
+  return reproduction.tables.map((one) => <OneTable key={one.id} table={one} rows={rows} />)
+}
+
+function OneTable({ table: paper, rows }: { table: PaperTable; rows: ReadonlyMap<string, CampaignRow> }) {
+  return (
+    <Panel title={paper.title} flush data-testid="paper-table">
+      <Table.ScrollContainer type="native" minWidth={1040}>
+        <Table layout="fixed" className={`${table.table} ${classes.table}`}>
+          <Table.Thead>
+            <Table.Tr>
+              <Table.Th>Method</Table.Th>
+              <Table.Th w={110} aria-label="Whose" />
+              <Table.Th ta="right" w={125}>
+                Avg. reward
+              </Table.Th>
+              <Table.Th ta="right" w={100}>
+                Episodes
+              </Table.Th>
+              <Table.Th ta="right" w={145}>
+                Success
+              </Table.Th>
+              <Table.Th ta="right" w={140}>
+                Steps per episode
+              </Table.Th>
+              <Table.Th ta="right" w={135}>
+                Collisions
+              </Table.Th>
+              <Table.Th w={240}>Success of each seed</Table.Th>
+            </Table.Tr>
+          </Table.Thead>
+          <Table.Tbody>
+            {paper.rows.map((id, index) => {
+              const row = rows.get(id)
+              return row && <Lines key={id} row={row} label={paper.labels[index] ?? row.method} />
+            })}
+          </Table.Tbody>
+        </Table>
+      </Table.ScrollContainer>
+    </Panel>
+  )
+}
+
+function Lines({ row, label }: { row: CampaignRow; label: string }) {
+  const { paper, ours } = row
+  const done = row.runs.filter((run) => run.measured !== null).length
+  return (
+    <>
+      <Table.Tr className={classes.paper} data-testid="paper-row">
+        <Table.Td rowSpan={2} className={classes.method}>
+          {row.experiment_id ? (
+            <Anchor component={Link} to={`/experiments/${row.experiment_id}`} inherit>
+              {label}
+            </Anchor>
+          ) : (
+            label
+          )}
+        </Table.Td>
+        <Table.Td>paper</Table.Td>
+        <Figure text={paper.reward === null ? DASH : paper.reward.toFixed(2)} />
+        <Figure text={paper.episodes.toFixed(0)} />
+        <Figure text={percent(paper.success)} />
+        <Figure text={paper.steps.toFixed(1)} />
+        <Figure text={DASH} />
+        <Table.Td rowSpan={2}>
+          <SeedStrip row={row} />
+        </Table.Td>
+      </Table.Tr>
+      <Table.Tr className={classes.ours} data-testid="our-row">
+        <Table.Td className={`${ui.quiet} ${ui.number}`}>
+          {done > 0 ? `ours, ${plural(done, 'seed')}` : 'ours'}
+        </Table.Td>
+        <Measured spread={ours?.reward} write={(value) => decimal(value, 2)} />
+        <Measured spread={ours?.episodes} write={(value) => decimal(value, 0)} />
+        <Measured spread={ours?.success} write={percent} />
+        <Measured spread={ours?.steps} write={(value) => decimal(value, 1)} />
+        <Measured spread={ours?.collisions} write={percent} />
+      </Table.Tr>
+    </>
+  )
+}
+
+const decimal = (value: number, digits: number) => value.toFixed(digits).replace('-', MINUS)
+
+function Figure({ text }: { text: string }) {
+  return (
+    <Table.Td ta="right" className={ui.number}>
+      {text}
+    </Table.Td>
+  )
+}
+
+function Measured({
+  spread,
+  write,
+}: {
+  spread: Spread | null | undefined
+  write: (value: number) => string
+}) {
+  if (!spread) return <Figure text={DASH} />
+  return (
+    <Table.Td ta="right" className={ui.number}>
+      <strong>{write(spread.mean)}</strong>
+      {spread.low !== null && spread.high !== null && (
+        <div className={`${ui.quiet} ${classes.interval}`} title="95 % interval over seeds">
+          {write(spread.low)} to {write(spread.high)}
+        </div>
+      )}
+    </Table.Td>
+  )
+}

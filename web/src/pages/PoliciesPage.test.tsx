@@ -1,0 +1,99 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import { episodes, form, live, policy, replay } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const { checkpoint_id: _, ...policyEpisodes } = episodes
+
+const routes = {
+  'GET /api/policies': [policy],
+  'GET /api/policies/crowd': policy,
+  'GET /api/policies/crowd/live': live,
+  'GET /api/policies/crowd/suites/simple-200/episodes': policyEpisodes,
+  'GET /api/policies/crowd/suites/clutter-500/episodes': { ...policyEpisodes, suite: 'clutter-500' },
+  'GET /api/training/form': form,
+}
+
+test('every policy with its figures, and what can be done with it', async () => {
+  startServer(routes)
+  const { user } = open('/policies')
+  const card = await screen.findByTestId('policy')
+  expect(card).toHaveTextContent('Drives between 17 obstacles.')
+  expect(card).toHaveTextContent(/simple-200\s*99\.0\s%.*N = 200\s*dynamic window, untrained: 98\.0\s%/)
+  expect(card).toHaveTextContent(/clutter-500\s*95\.0\s%.*N = 500\s*dynamic window, untrained: 99\.8\s%/)
+  expect(within(card).getByRole('link', { name: 'Watch Crowd' })).toHaveAttribute('href', '/policies/crowd')
+  expect(within(card).getByRole('link', { name: 'Train one like Crowd' })).toHaveAttribute(
+    'href',
+    '/new?policy=crowd',
+  )
+  await user.click(within(card).getByRole('button', { name: 'Download Crowd' }))
+  const menu = await screen.findByRole('menu')
+  expect(
+    within(menu)
+      .getAllByRole('menuitem')
+      .map((item) => item.getAttribute('href')),
+  ).toEqual(['/api/policies/crowd/download', '/api/policies/crowd/bundle'])
+})
+
+test('a list that does not come says so', async () => {
+  startServer({ 'GET /api/policies': refusal(500, 'The disk is full.') })
+  open('/policies')
+  expect(await screen.findByText('The disk is full.')).toBeInTheDocument()
+})
+
+test('a policy drives at once, beside how it was made', async () => {
+  const server = startServer({ ...routes, 'PUT /api/policies/crowd/live': live })
+  const { user } = open('/policies/crowd')
+  expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/policy-crowd/')
+  expect(screen.getByText('python -m workers.reference.build crowd')).toBeInTheDocument()
+  expect(screen.getByText(/Step 250\s000 of 300\s000, the best on simple-200/)).toBeInTheDocument()
+  const controls = screen.getByRole('group', { name: 'Live view' })
+  await waitFor(() => expect(within(controls).getByRole('radio', { name: '5×' })).toBeEnabled())
+  await user.click(within(controls).getByRole('radio', { name: '5×' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('PUT /api/policies/crowd/live'))
+  expect(server.changes[0]?.body).toMatchObject({ speed: 5 })
+})
+
+test('its figures stand beside the baselines, suite by suite', async () => {
+  startServer(routes)
+  open('/policies/crowd')
+  const table = await screen.findByTestId('policy-results')
+  const rows = within(table).getAllByRole('row').slice(1)
+  expect(rows.map((row) => row.textContent?.replace(/\d.*/, ''))).toEqual([
+    'simple-',
+    'Go-to-goal',
+    'Dynamic window',
+    'clutter-',
+    'Go-to-goal',
+    'Dynamic window',
+  ])
+  expect(rows[3]).toHaveTextContent(/95\.0\s%.*5\.0\s%0\s%0\.8592\.4/)
+})
+
+test('every episode of every suite can be replayed', async () => {
+  startServer({
+    ...routes,
+    'GET /api/policies/crowd/suites/clutter-500/replays/1': {
+      ...replay,
+      suite: 'clutter-500',
+      page: '/replays/policies/crowd/clutter-500/1/',
+    },
+  })
+  const { user } = open('/policies/crowd')
+  await screen.findByRole('heading', { name: 'Episodes on simple-200' })
+  await user.click(screen.getByRole('radio', { name: 'clutter-500' }))
+  await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
+  expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
+    'src',
+    '/replays/policies/crowd/clutter-500/1/light/',
+  )
+})
+
+test('a policy that is not there', async () => {
+  startServer({})
+  open('/policies/nobody')
+  expect(await screen.findByText('There is no such policy')).toBeInTheDocument()
+})

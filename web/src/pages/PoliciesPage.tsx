@@ -1,0 +1,99 @@
+/** The policies that ship with Mapless: a good robot to watch before training one. */
+import { Button, Skeleton, Text } from '@mantine/core'
+import { Link } from 'react-router'
+import { $api } from '../api/client'
+import type { ReferencePolicy } from '../api/types'
+import { ArenaPicture } from '../components/ArenaPicture'
+import { IconPlayerPlay } from '../components/icons'
+import { PolicyActions } from '../components/PolicyActions'
+import { Page, Panel, QueryError, SuccessEstimate } from '../components/ui'
+import ui from '../components/ui.module.css'
+import { summaryOf } from '../lib/experiments'
+import { percent } from '../lib/format'
+import { useTitle } from '../lib/hooks'
+import classes from './PoliciesPage.module.css'
+
+export function PoliciesPage() {
+  useTitle('Policies')
+  const { data, error, refetch } = $api.useQuery('get', '/api/policies', undefined, {
+    staleTime: Number.POSITIVE_INFINITY,
+  })
+  return (
+    <Page
+      title="Policies"
+      below={
+        <Text size="sm" c="dimmed" mt={4}>
+          Trained policies that come with Mapless: to watch, to take away, to start from.
+        </Text>
+      }
+    >
+      {error && !data ? (
+        <Panel>
+          <QueryError error={error} what="list of policies" retry={refetch} />
+        </Panel>
+      ) : (
+        <ul className={classes.list} aria-busy={!data}>
+          {data
+            ? data.map((policy) => <PolicyCard key={policy.name} policy={policy} />)
+            : [0, 1].map((key) => <Skeleton key={key} height={240} />)}
+        </ul>
+      )}
+    </Page>
+  )
+}
+
+function PolicyCard({ policy }: { policy: ReferencePolicy }) {
+  const page = `/policies/${policy.name}`
+  return (
+    <li className={classes.card} data-testid="policy">
+      <div className={classes.picture}>
+        <ArenaPicture arena={policy.training.task.arena} />
+      </div>
+      <div className={classes.text}>
+        <h2 className={classes.title}>
+          <Link to={page}>{policy.title}</Link>
+        </h2>
+        <Text size="xs" c="dimmed">
+          {summaryOf(policy.training)}
+        </Text>
+        <Text size="sm">{policy.description}</Text>
+      </div>
+      <dl className={classes.figures}>
+        {policy.results.map(({ suite, policy: row, baselines }) => (
+          <Result key={suite} suite={suite} row={row} baseline={baselines.at(-1)} />
+        ))}
+      </dl>
+      <div className={classes.actions}>
+        <Button
+          component={Link}
+          to={page}
+          size="xs"
+          leftSection={<IconPlayerPlay size={14} />}
+          aria-label={`Watch ${policy.title}`}
+        >
+          Watch
+        </Button>
+        <PolicyActions policy={policy} size="xs" />
+      </div>
+    </li>
+  )
+}
+
+type Row = ReferencePolicy['results'][number]['policy']
+
+/** A suite's line: the policy, and the best of what needs no training. */
+function Result({ suite, row, baseline }: { suite: string; row: Row; baseline: Row | undefined }) {
+  return (
+    <>
+      <dt>{suite}</dt>
+      <dd>
+        <SuccessEstimate estimate={row.success} episodes />
+        {baseline && (
+          <Text size="xs" className={ui.quiet}>
+            {baseline.name}, untrained: {percent(baseline.success.value)}
+          </Text>
+        )}
+      </dd>
+    </>
+  )
+}

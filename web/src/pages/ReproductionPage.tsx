@@ -1,0 +1,194 @@
+/** The paper reproduced: one button, its tables beside ours, its figures, and a sentence for each of its claims. */
+import { Button, Group, Select, Skeleton, Stack, Text } from '@mantine/core'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useSearchParams } from 'react-router'
+import { useActions } from '../api/actions'
+import { $api } from '../api/client'
+import { isRefusal } from '../api/errors'
+import type { Reproduction } from '../api/types'
+import { IconPlayerPlay, IconPlayerStop, IconRocket } from '../components/icons'
+import { CampaignState } from '../components/reproduction/CampaignState'
+import { Claims } from '../components/reproduction/Claims'
+import { PaperFigures } from '../components/reproduction/PaperFigures'
+import { PaperTables } from '../components/reproduction/PaperTables'
+import { canResume, isActive } from '../components/states'
+import { Message, Page, Panel, QueryError } from '../components/ui'
+import { age, dateTime, duration, plural } from '../lib/format'
+import { useNow, useTitle } from '../lib/hooks'
+
+const SEEDS = 5
+/** Between two looks at a campaign that goes on. */
+const EVERY_MS = 5_000
+/** A trial shows within a minute or two that everything works; its figures mean nothing. */
+const TRIAL = { seeds: 1, effort: 0.01 }
+
+export function ReproductionPage() {
+  useTitle('Reproduce the paper')
+  const [search, setSearch] = useSearchParams()
+  const campaign = search.get('campaign')
+  const { data, error, refetch } = $api.useQuery(
+    'get',
+    '/api/reproduction',
+    { params: { query: campaign ? { campaign } : {} } },
+    {
+      placeholderData: keepPreviousData,
+      refetchInterval: ({ state }) =>
+        state.data?.campaign && isActive(state.data.campaign.state) ? EVERY_MS : false,
+    },
+  )
+  const showNewest = () => setSearch({}, { replace: true })
+  return (
+    <Page
+      title="Reproduce the paper"
+      below={
+        <Text size="sm" c="dimmed" mt={4} maw="78ch">
+          Taheri, Hosseini, Nekoui:{' '}
+          <cite>Deep Reinforcement Learning with Enhanced PPO for Safe Mobile Robot Navigation</cite>
+        </Text>
+      }
+      actions={
+        data?.campaign && (
+          <Group gap="xs">
+            <CampaignChoice
+              reproduction={data}
+              onChoose={(id) => setSearch({ campaign: id }, { replace: true })}
+            />
+            <CampaignActions reproduction={data} onLaunched={showNewest} />
+          </Group>
+        )
+      }
+    >
+      {error && (!data || isRefusal(error)) ? (
+        <Panel>
+          <QueryError error={error} what="reproduction" retry={refetch} />
+        </Panel>
+      ) : data ? (
+        <Stack gap="md">
+          {data.campaign ? (
+            <CampaignState campaign={data.campaign} rows={data.rows} />
+          ) : (
+            <Invitation reproduction={data} />
+          )}
+          <PaperTables reproduction={data} />
+          {data.campaign && <PaperFigures reproduction={data} />}
+          <Claims claims={data.claims} />
+        </Stack>
+      ) : (
+        <Stack gap="md" aria-busy="true" aria-label="Loading the reproduction">
+          {[110, 260, 260].map((height, index) => (
+            // biome-ignore lint/suspicious/noArrayIndexKey: placeholders have no other identity.
+            <Skeleton key={index} height={height} radius={8} />
+          ))}
+        </Stack>
+      )}
+    </Page>
+  )
+}
+
+function Invitation({ reproduction: { seconds, workers, rows } }: { reproduction: Reproduction }) {
+  const { launchReproduction } = useActions()
+  return (
+    <Panel data-testid="invitation">
+      <Message
+        icon={<IconRocket size={44} stroke={1.2} />}
+        title="Not reproduced here yet"
+        actions={
+          <Group gap="xs" justify="center">
+            <Button
+              loading={launchReproduction.isPending}
+              onClick={() => launchReproduction.mutate({ body: { seeds: SEEDS, effort: 1 } })}
+            >
+              Reproduce the paper
+            </Button>
+            <Button
+              variant="default"
+              disabled={launchReproduction.isPending}
+              onClick={() => launchReproduction.mutate({ body: TRIAL })}
+            >
+              Try it out first
+            </Button>
+          </Group>
+        }
+      >
+        Trains every row of the paper's three tables with {plural(SEEDS, 'seed')}: {rows.length * SEEDS}{' '}
+        trainings, about {duration(Math.round(seconds / 60) * 60)} with{' '}
+        {plural(Math.max(1, workers), 'worker')}. It goes on after a restart, and you can watch every robot
+        meanwhile. Trying it out takes one seed and 1 % of the steps.
+      </Message>
+    </Panel>
+  )
+}
+
+function CampaignActions({
+  reproduction: { campaign, rows },
+  onLaunched,
+}: {
+  reproduction: Reproduction
+  onLaunched: () => void
+}) {
+  const actions = useActions()
+  if (!campaign) return null
+  const states = rows.flatMap((row) => row.runs.map((run) => run.state))
+  const of = { params: { path: { campaign_id: campaign.id } } }
+  if (isActive(campaign.state)) {
+    return (
+      <Button
+        variant="default"
+        leftSection={<IconPlayerStop size={16} />}
+        disabled={campaign.state === 'stopping'}
+        loading={actions.stopReproduction.isPending}
+        onClick={() => actions.stopReproduction.mutate(of)}
+      >
+        Cancel all
+      </Button>
+    )
+  }
+  return (
+    <>
+      {canResume(states) && (
+        <Button
+          variant="default"
+          leftSection={<IconPlayerPlay size={16} />}
+          loading={actions.resumeReproduction.isPending}
+          onClick={() => actions.resumeReproduction.mutate(of)}
+        >
+          Go on
+        </Button>
+      )}
+      <Button
+        leftSection={<IconRocket size={16} />}
+        loading={actions.launchReproduction.isPending}
+        onClick={() =>
+          actions.launchReproduction.mutate({ body: { seeds: SEEDS, effort: 1 } }, { onSuccess: onLaunched })
+        }
+      >
+        {campaign.effort < 1 ? 'Reproduce the paper' : 'Reproduce again'}
+      </Button>
+    </>
+  )
+}
+
+function CampaignChoice({
+  reproduction: { campaign, campaigns },
+  onChoose,
+}: {
+  reproduction: Reproduction
+  onChoose: (id: string) => void
+}) {
+  const now = useNow()
+  if (!campaign || campaigns.length < 2) return null
+  return (
+    <Select
+      aria-label="Campaign"
+      allowDeselect={false}
+      w={210}
+      data={campaigns.map(({ id, created_at }, index) => ({
+        value: id,
+        label: `${index === 0 ? 'Newest' : 'Earlier'}: ${age(created_at, now)}`,
+      }))}
+      title={dateTime(campaign.created_at)}
+      value={campaign.id}
+      onChange={(id) => id && onChoose(id)}
+    />
+  )
+}
