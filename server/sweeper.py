@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from server.doorbell import CeleryDoorbell, prepare_broker
@@ -68,7 +69,12 @@ class Sweeper:
             idle = WorkerRepository(session).idle_by_queue(now - _HEARTBEATS * HEARTBEAT_SECONDS)
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
-            queue = queue_of(TrainingConfig.model_validate(run.experiment.training))
+            try:
+                queue = queue_of(TrainingConfig.model_validate(run.experiment.training))
+            except ValidationError:
+                if everybody:
+                    logger.warning("run %s waits with settings that this version does not know", run.id)
+                continue
             quiet_since = max(run.queued_at, self._rung_at.get(run.id, 0.0))
             overdue = now - quiet_since >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)
             if everybody or overdue:

@@ -16,6 +16,7 @@ from server.errors import NotFoundError
 from server.services import Services
 from sim.arenas import build_arenas
 from sim.config import ImportedArenaConfig
+from tests.server.harness import WORKER_TOKEN
 from workers.config import TrainingConfig
 
 LAB = """
@@ -144,6 +145,22 @@ def test_a_file_that_was_changed_is_another_place_and_not_shown(tmp_path: Path, 
     with pytest.raises(NotFoundError):
         store.get(document)
     assert store.all() == []
+
+
+def test_a_run_whose_arena_is_gone_fails_with_that_reason_when_it_is_claimed(client: TestClient, services: Services) -> None:
+    config = upload(client, keep=True).json()["config"]
+    run_id = launch(client, config).json()["runs"][0]["id"]
+    # Behind the service's back, which deletes no arena that a training uses.
+    (services.settings.arenas_dir / f"{config['sha256']}.json").unlink()
+    claimed = client.post(
+        f"/api/worker/runs/{run_id}/claim",
+        json={"worker": "w", "published_attempt": 0},
+        headers={"Authorization": f"Bearer {WORKER_TOKEN}"},
+    )
+    assert claimed.status_code == 409
+    run = client.get(f"/api/runs/{run_id}").json()
+    assert run["state"] == "failed"
+    assert run["error"].startswith("The arena is gone: ")
 
 
 def with_lab(store: ArenaStore) -> str:

@@ -1,5 +1,6 @@
 """Runs are not forgotten: leases that run out, messages that got lost, and servers that were away."""
 
+import asyncio
 import time
 
 import pytest
@@ -10,7 +11,7 @@ from server.app import create_services
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.settings import Settings
-from server.sweeper import RING_AGAIN_SECONDS, Sweeper
+from server.sweeper import RING_AGAIN_SECONDS, Sweeper, dispatch
 from server.worker_api.service import WorkerService
 from workers.config import TrainingConfig
 from workers.protocol import ClaimRequest, Heartbeat, Queue
@@ -183,3 +184,38 @@ def test_each_queue_is_rung_for_its_own_workers(services: Services, sweeper: Swe
     see_worker(services, "w", "gpu")
     sweeper.sweep(now)
     assert bell.rings == [("on-gpu", 0, "gpu")]
+
+
+def test_a_run_with_settings_of_another_version_keeps_no_other_from_being_rung(
+    services: Services, sweeper: Sweeper, bell: Bell, now: float
+) -> None:
+    add_run(services, "odd", now - 100)
+    with services.database.write() as session:
+        RunRepository(session).get("odd").experiment.training = {"algorithm": "of another time"}
+    add_run(services, "waits", now - 50)
+    sweeper.sweep(now)
+    assert bell.heard() == ["waits"]
+
+
+def test_a_sweep_that_breaks_is_not_the_last(settings: Settings) -> None:
+    services = create_services(settings.model_copy(update={"lease_seconds": 0.5}))
+    now = time.time()
+    add_run(services, "waits", now)
+    add_run(services, "silent", now)
+    claim(services, "silent")
+
+    class BrokenBell(Bell):
+        def ring(self, run_id: str, attempt: int, queue: Queue) -> None:
+            super().ring(run_id, attempt, queue)
+            raise RuntimeError("what nobody has thought of")
+
+    async def sweeping() -> None:
+        async with dispatch(services):
+            services.doorbell = bell = BrokenBell()
+            deadline = time.monotonic() + 20
+            while run_of(services, "silent").state == "running":
+                assert time.monotonic() < deadline
+                await asyncio.sleep(0.05)
+            assert "waits" in bell.heard()
+
+    asyncio.run(sweeping())

@@ -99,6 +99,24 @@ def test_a_second_interrupt_ends_everything_at_once(up: Up) -> None:
     assert not server.is_running()
 
 
+def test_closing_the_terminal_stops_everything_in_order(tmp_path: Path) -> None:
+    terminal, inside = os.openpty()
+    shell = f"exec {sys.executable} -m server up --workers 0 --port 0 --data-dir {tmp_path} <>{os.ttyname(inside)} >&0 2>&0"
+    # A session without a terminal takes the first one that it opens for its own, and is hung up on when that is closed.
+    up = subprocess.Popen(["sh", "-c", shell], cwd=ROOT, env=environment(), start_new_session=True)
+    try:
+        with os.fdopen(terminal, "rb", buffering=0) as screen:
+            while b"token=" not in screen.readline():
+                assert up.poll() is None
+            (server,) = psutil.Process(up.pid).children()
+            os.close(inside)
+        assert up.wait(10) == 0
+        assert not server.is_running()
+    finally:
+        up.kill()
+        up.wait()
+
+
 def test_a_server_does_not_outlive_its_supervisor(up: Up) -> None:
     up.url()
     server = up.server()
