@@ -8,7 +8,7 @@ from sim.kernels.records import DELAY, QUANTITIES
 
 
 def quantity_spans(task: TaskConfig) -> NDArray[np.float64]:
-    """Lowest and highest value of each of `QUANTITIES` in a task, (9, 2); equal where nothing is drawn.
+    """Lowest and highest value of each of `QUANTITIES` in a task, (10, 2); equal where nothing is drawn.
 
     A delay is drawn as a real number and rounded down, so its span ends one higher.
     """
@@ -22,6 +22,7 @@ def quantity_spans(task: TaskConfig) -> NDArray[np.float64]:
         "command_delay": task.command_delay,
         "max_linear_speed": task.robot.max_linear_speed,
         "max_angular_speed": task.robot.max_angular_speed,
+        "field_of_view": task.lidar.field_of_view,
     }
     spans = np.array([getattr(task.randomisation, name) or (fixed[name],) * 2 for name in QUANTITIES], dtype=np.float64)
     if task.randomisation.command_delay:

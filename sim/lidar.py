@@ -1,7 +1,7 @@
 """Where the rays of a scan point."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.config import LidarConfig
 
@@ -14,3 +14,12 @@ def ray_angles(lidar: LidarConfig) -> NDArray[np.float64]:
     """
     half = np.radians(lidar.field_of_view) / 2.0
     return np.linspace(-half, half, lidar.rays, endpoint=lidar.field_of_view < 360.0)
+
+
+def drawn_ray_angles(lidar: LidarConfig, fields_of_view: ArrayLike) -> NDArray[np.float64]:
+    """The same for scanners that cover other fields of view (n,), degrees, with the same rays: (n, rays) radians.
+
+    The angles between their rays are as much larger or smaller as their fields (`sim.config.RandomisationConfig`).
+    """
+    spread = np.asarray(fields_of_view, dtype=np.float64) / lidar.field_of_view
+    return np.multiply.outer(spread, ray_angles(lidar))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sim.arenas import Arena
 from sim.config import TaskConfig
 from sim.footprint import rectangle_clearance
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles
 from sim.observations import near_distance
 from sim.physics import add_arena, robot_body
 
@@ -58,10 +58,16 @@ class ReferenceWorld:
         arena: where it drives.
         pose: x, y, heading at the start, metres and radians.
         target: x, y, metres.
+        field_of_view: degrees that the rays cover where it is not the LiDAR's (`sim.config.RandomisationConfig`).
     """
 
     def __init__(
-        self, task: TaskConfig, arena: Arena, pose: tuple[float, float, float], target: tuple[float, float]
+        self,
+        task: TaskConfig,
+        arena: Arena,
+        pose: tuple[float, float, float],
+        target: tuple[float, float],
+        field_of_view: float | None = None,
     ) -> None:
         self.task = task
         self.arena = arena
@@ -78,7 +84,7 @@ class ReferenceWorld:
         self.steps = 0
         self.velocities = (0.0, 0.0)
         self.distance = math.dist(pose[:2], target)
-        self._angles = ray_angles(task.lidar).tolist()
+        self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
 
     def scan(self) -> NDArray[np.float64]:
         """(rays,) metres, by Chipmunk's ray queries."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.geometry import box_distance
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles
 from sim.world import World
 
 LONG_SIDE = 480
@@ -58,7 +58,7 @@ def render_robot(world: World, index: int) -> NDArray[np.uint8]:
     x, y, heading = robots.poses[index].astype(np.float64)
 
     ranges = robots.ranges[index].astype(np.float64)
-    directions = heading + ray_angles(world.task.lidar)
+    directions = heading + drawn_ray_angles(world.task.lidar, world.fields_of_view[index])
     along = np.arange(0.0, world.task.lidar.range, 1.0 / scale)
     seen = along[None, :] < ranges[:, None]
     px = (x + along * np.cos(directions)[:, None])[seen]

@@ -9,11 +9,18 @@ from sim.arenas import Arena
 from sim.config import AnyRobotConfig, LidarConfig
 from sim.kernels.footprint import rectangle_clearances
 from sim.kernels.sensing import clearance_points, scan_poses
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles
 from sim.shapes import pack_shapes
 
 
-def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None, *, movers: ArrayLike = ()) -> NDArray[np.float32]:
+def scan(
+    arena: Arena,
+    poses: ArrayLike,
+    lidar: LidarConfig | None = None,
+    *,
+    movers: ArrayLike = (),
+    fields_of_view: ArrayLike | None = None,
+) -> NDArray[np.float32]:
     """Ranges from poses.
 
     Args:
@@ -21,6 +28,7 @@ def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None, *, mo
         poses: (N, 3) x, y in metres, heading in radians.
         lidar: the scanner, by default the default one.
         movers: (K, 3) x, y, radius of what moves in it at that moment.
+        fields_of_view: (N,) degrees that the rays cover from each pose, by default the scanner's.
 
     Returns:
         (N, rays) metres, at most the LiDAR's range; 0 from inside an obstacle.
@@ -29,7 +37,8 @@ def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None, *, mo
     discs = np.asarray(movers, dtype=np.float64).reshape(-1, 3)
     scene = replace(arena, circles=np.vstack([arena.circles, discs])) if len(discs) else arena
     where = np.ascontiguousarray(poses, dtype=np.float32).reshape(-1, 3)
-    angles = ray_angles(lidar)
+    fields = np.array([lidar.field_of_view]) if fields_of_view is None else np.asarray(fields_of_view, dtype=np.float64)
+    angles = drawn_ray_angles(lidar, fields)
     ranges = np.empty((len(where), lidar.rays), dtype=np.float32)
     scan_poses(
         where,
@@ -38,7 +47,7 @@ def scan(arena: Arena, poses: ArrayLike, lidar: LidarConfig | None = None, *, mo
         np.cos(angles).astype(np.float32),
         np.sin(angles).astype(np.float32),
         np.float32(lidar.range),
-        np.int32(lidar.field_of_view <= 180.0),
+        np.int32(fields.max(initial=0.0) <= 180.0),
         ranges,
     )
     return ranges

@@ -101,11 +101,14 @@ def _span(title: str, what: str) -> Any:
 class RandomisationConfig(Frozen):
     """What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
 
-    Rays, batches and field of view decide what the numbers of an observation mean, so they cannot be drawn.
+    Rays and batches decide how many numbers an observation has, so they cannot be drawn.
     """
 
     range: tuple[Annotated[float, Field(gt=0.2, le=30.0)], ...] = _span(
         "LiDAR range", "Metres beyond which nothing is seen, at most the LiDAR's range"
+    )
+    field_of_view: tuple[Annotated[float, Field(gt=0.0, le=360.0)], ...] = _span(
+        "LiDAR field of view", "Degrees that the rays truly cover, while the policy takes them for those of the LiDAR"
     )
     rate: tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...] = _span("LiDAR rate", "Scans per second")
     noise: tuple[Annotated[float, Field(ge=0.0, le=0.5)], ...] = _span("LiDAR noise", "Metres")

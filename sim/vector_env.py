@@ -104,6 +104,8 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """(N, 2) metres."""
         self.ranges = robots.ranges
         """(N, rays) metres: the raw scan at `poses`."""
+        self.fields_of_view = self._world.fields_of_view
+        """(N,) degrees that each robot's rays cover in this episode, from which their angles follow (`sim.lidar`)."""
         self.outcomes = robots.outcomes
         """(N,) how the attempt that ended in this step ended: 1 arrival, 2 collision, 3 time-out; 0 where none did."""
         self.final_observations = robots.final_observations

@@ -14,6 +14,7 @@ from sim.errors import PlacementError
 from sim.footprint import rectangle_clearance
 from sim.kernels.bundles import REWARD_TERMS, Geometry, Robots
 from sim.kernels.commands import write_commands
+from sim.kernels.disturbances import rays_ahead
 from sim.kernels.random import seed_streams
 from sim.kernels.records import (
     ALIGNMENT,
@@ -21,6 +22,7 @@ from sim.kernels.records import (
     CLEARANCE,
     DISTANCE_NOISE,
     DROPOUT,
+    FIELD_OF_VIEW,
     HEADING_NOISE,
     IMPROVED,
     MAX_ANGULAR,
@@ -33,7 +35,7 @@ from sim.kernels.records import (
     ROBOT,
 )
 from sim.kernels.step import reset_robots, step_robots
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles, ray_angles
 from sim.movers import Movers
 from sim.observations import near_distance, observation_size
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
@@ -41,9 +43,6 @@ from sim.shapes import pack_shapes
 
 SPAWN_MARGIN = 0.2
 """Metres that starts and targets keep from obstacles beyond what a robot needs to pass: 0.4 m in all by default."""
-
-AHEAD = math.radians(30.0)
-"""Rays within this angle of the heading tell how free the way ahead is (the `clearance` reward)."""
 
 _OBSERVATIONS = {"paper": PAPER, "improved": IMPROVED}
 _REWARDS = {"basic": BASIC, "clearance": CLEARANCE, "alignment": ALIGNMENT}
@@ -73,10 +72,6 @@ def _path_samples(task: TaskConfig) -> int:
 
 def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
     """A task as the kernels read it: (1,) of `sim.kernels.records.PARAMETERS`."""
-    angles = ray_angles(task.lidar)
-    ahead = np.flatnonzero(np.abs(angles) <= AHEAD + 1e-9)
-    if not len(ahead):  # a scanner so coarse that no ray points ahead: the middle ones
-        ahead = np.flatnonzero(np.abs(angles) <= np.abs(angles).min() + 1e-9)
     parameters = np.zeros(1, dtype=PARAMETERS)
     spans = quantity_spans(task)
     half_length, half_width = task.robot.half_extents or (0.0, 0.0)
@@ -91,7 +86,8 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "half_length": half_length,
         "half_width": half_width,
         "range": task.lidar.range,
-        "looks_ahead": task.lidar.field_of_view <= 180.0,
+        "field_of_view": task.lidar.field_of_view,
+        "looks_ahead": spans[FIELD_OF_VIEW, 1] <= 180.0,
         "batches": task.lidar.batches,
         "rays_per_batch": task.lidar.rays // task.lidar.batches,
         "observation": _OBSERVATIONS[task.observation],
@@ -102,8 +98,6 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "collision_reward": task.reward.collision,
         "progress": task.reward.progress,
         "penalty": task.reward.penalty,
-        "ahead_first": ahead[0],
-        "ahead_last": ahead[-1] + 1,
         "arrival_distance": task.arrival_distance,
         "collision_distance": task.collision_distance,
         "step_limit": task.step_limit,
@@ -151,7 +145,6 @@ class World:
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
         self.movers = Movers(self.arenas, origins, task.control_period, alike=not respawn)
         bounds, circles, boxes = pack_shapes(self.arenas)
-        angles = ray_angles(task.lidar)
         self.geometry = Geometry(
             bounds=bounds,
             circles=circles,
@@ -161,8 +154,7 @@ class World:
             start_offsets=np.cumsum([0, *(len(space.starts) for space in spaces)], dtype=np.int32),
             target_offsets=np.cumsum([0, *(len(space.targets) for space in spaces)], dtype=np.int32),
             origins=origins,
-            ray_cos=np.cos(angles).astype(np.float32),
-            ray_sin=np.sin(angles).astype(np.float32),
+            ray_angles=ray_angles(task.lidar),
             ray_x=np.empty(task.lidar.rays, dtype=np.float32),
             ray_y=np.empty(task.lidar.rays, dtype=np.float32),
             discs=self.movers.discs,
@@ -170,6 +162,8 @@ class World:
         numbers = observation_size(task)
         spans = quantity_spans(task)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
+        fields = np.full(robots if task.randomisation.field_of_view else 1, spans[FIELD_OF_VIEW, 0])
+        angles = drawn_ray_angles(task.lidar, fields)
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
             poses=np.zeros((robots, 3), dtype=np.float32),
@@ -183,6 +177,9 @@ class World:
             truncations=np.zeros(robots, dtype=np.bool_),
             outcomes=np.zeros(robots, dtype=np.uint8),
             drawn=np.tile(spans[:, 0], (robots, 1)),
+            ray_cos=np.cos(angles).astype(np.float32),
+            ray_sin=np.sin(angles).astype(np.float32),
+            ahead=np.array([rays_ahead(row, 1.0) for row in angles], dtype=np.int32),
             drift=np.zeros((robots if drifts else 0, 3)),
             pending=np.zeros((robots, longest_delay(task), 2), dtype=np.float32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.rays), dtype=np.float32),
@@ -292,6 +289,12 @@ class World:
         space.step(self.task.control_period)
         step_robots(space.state, self.robots, self.geometry, self._parameters)
 
+    @property
+    def fields_of_view(self) -> NDArray[np.float64]:
+        """(N,) degrees that each robot's rays cover in this episode."""
+        fields: NDArray[np.float64] = self.robots.drawn[:, FIELD_OF_VIEW]
+        return fields
+
     def tiles(self) -> NDArray[np.int32]:
         """(N,) which copy of an arena each robot is in: a row of the movers' discs; modulo the arenas it is the arena."""
         records = self.robots.records
@@ -305,7 +308,9 @@ class World:
     def _state(self) -> dict[str, NDArray[np.generic]]:
         """The arrays that the future depends on; those that have nothing to say in this task are left out."""
         state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in ROBOT.names or ()}
-        constant = {"records"} if self.task.randomisation != RandomisationConfig() else {"records", "drawn"}
+        drawn = self.task.randomisation
+        constant = {"records"} if drawn != RandomisationConfig() else {"records", "drawn"}
+        constant |= set() if drawn.field_of_view else {"ray_cos", "ray_sin", "ahead"}
         arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
         state |= {name: array for name, array in arrays.items() if array.size and name not in constant}
         state["bodies"] = self._space.state

@@ -12,7 +12,7 @@ ViewMode = Literal["training", "policy"]
 
 # version, mode, movers, robots, rays, arena, step, seconds of simulated time, seconds of simulated time per wall second
 _HEADER = struct.Struct("<BBBHHHQdf")
-_VERSION = 3
+_VERSION = 4
 _MODES: tuple[ViewMode, ...] = ("training", "policy")
 
 
@@ -32,6 +32,7 @@ class Frame:
         poses: (robots, 3) float32: x, y, heading.
         targets: (robots, 2) float32.
         ranges: (robots, rays) float32, at most the LiDAR's range.
+        fields_of_view: (robots,) float32, degrees that the rays of each cover, which may be drawn.
         rewards: (robots,) float32, reward since the last target.
         outcomes: (robots,) uint8: how the attempt that ended last ended (0 none yet, 1 arrival, 2 collision, 3 time-out).
         arena: which arena of the task's pool all of this is in.
@@ -45,6 +46,7 @@ class Frame:
     poses: NDArray[np.float32]
     targets: NDArray[np.float32]
     ranges: NDArray[np.float32]
+    fields_of_view: NDArray[np.float32]
     rewards: NDArray[np.float32]
     outcomes: NDArray[np.uint8]
     arena: int = 0
@@ -55,10 +57,8 @@ class Frame:
         robots, rays = self.ranges.shape
         mode, movers = _MODES.index(self.mode), len(self.movers)
         header = _HEADER.pack(_VERSION, mode, movers, robots, rays, self.arena, self.step, self.sim_time, self.speed)
-        floats = np.concatenate(
-            [np.ravel(a).astype("<f4") for a in (self.poses, self.targets, self.ranges, self.rewards, self.movers)],
-            dtype="<f4",
-        )
+        arrays = (self.poses, self.targets, self.ranges, self.fields_of_view, self.rewards, self.movers)
+        floats = np.concatenate([np.ravel(array).astype("<f4") for array in arrays], dtype="<f4")
         return header + floats.tobytes() + self.outcomes.astype(np.uint8).tobytes()
 
     @classmethod
@@ -73,7 +73,7 @@ class Frame:
         version, mode, movers, robots, rays, arena, step, sim_time, speed = _HEADER.unpack_from(data)
         if version != _VERSION or mode >= len(_MODES):
             raise FrameError(f"frame version {version}, mode {mode}: not known here")
-        sizes = (3 * robots, 2 * robots, rays * robots, robots, 3 * movers)
+        sizes = (3 * robots, 2 * robots, rays * robots, robots, robots, 3 * movers)
         if len(data) != _HEADER.size + 4 * sum(sizes) + robots:
             raise FrameError("length does not match the header")
         floats = np.frombuffer(data, "<f4", sum(sizes), _HEADER.size)
@@ -82,7 +82,7 @@ class Frame:
         outcomes = np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes))
         if (outcomes > 3).any():
             raise FrameError("an outcome that nobody knows")
-        poses, targets, ranges, rewards, discs = np.split(floats, np.cumsum(sizes)[:-1])
+        poses, targets, ranges, fields, rewards, discs = np.split(floats, np.cumsum(sizes)[:-1])
         if (discs[2::3] <= 0.0).any():
             raise FrameError("a mover without a size")
         return cls(
@@ -93,6 +93,7 @@ class Frame:
             poses=poses.reshape(robots, 3),
             targets=targets.reshape(robots, 2),
             ranges=ranges.reshape(robots, rays),
+            fields_of_view=fields,
             rewards=rewards,
             outcomes=outcomes,
             arena=arena,

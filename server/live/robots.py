@@ -9,7 +9,7 @@ from server.live.continuity import continues, ended
 from server.live.themes import OUTCOMES, Colours, linear, robot_colours
 from server.live.trails import Trails, trail_colours
 from sim.config import AnyRobotConfig, TaskConfig
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles
 from workers.frames import Frame
 
 _FLOOR_HEIGHT = 0.02
@@ -50,8 +50,7 @@ class RobotNodes:
         still = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (robots, 1))
         nowhere = np.zeros((robots, 3), np.float32)
 
-        self._range = task.lidar.range
-        self._bearings = ray_angles(task.lidar)
+        self._lidar = task.lidar
         self._rays_visible = True
         self._ends = np.empty((robots, rays, 2, 3), np.float32)
         # Rays at the scanner's true height would hide the robots: they are drawn on the floor.
@@ -208,14 +207,14 @@ class RobotNodes:
                 node.remove()
 
     def _draw_rays(self, frame: Frame) -> None:
-        angles = frame.poses[:, 2:3] + self._bearings
+        angles = frame.poses[:, 2:3] + drawn_ray_angles(self._lidar, frame.fields_of_view)
         self._ends[:, :, 0, :2] = frame.poses[:, None, :2]
         self._ends[:, :, 1, 0] = frame.poses[:, 0:1] + frame.ranges * np.cos(angles)
         self._ends[:, :, 1, 1] = frame.poses[:, 1:2] + frame.ranges * np.sin(angles)
         self._ray_lines.points = self._ends.reshape(-1, 2, 3)
         # The points stand a little before the surface that was met, or it would hide half of each. A ray that meets
         # nothing puts its point inside the robot, where nobody sees it: the count stays the same.
-        length = np.where(frame.ranges < self._range - 1e-3, frame.ranges - _HIT_OFFSET, 0.0)
+        length = np.where(frame.ranges < self._lidar.range - 1e-3, frame.ranges - _HIT_OFFSET, 0.0)
         hits = self._ends[:, :, 0].copy()
         hits[..., 0] += length * np.cos(angles)
         hits[..., 1] += length * np.sin(angles)

@@ -1,5 +1,7 @@
 """An episode as a recording for viser's own player: robot, rays and trail over time, and where it ended."""
 
+from itertools import pairwise
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -46,12 +48,12 @@ def film(track: Track, result: EpisodeResult, task: TaskConfig, theme: Theme) ->
         _draw_path(server.scene, track.poses, theme)
         duration = (len(track.poses) - 1) * task.control_period
         times = np.linspace(0.0, duration, min(_MAX_FRAMES, round(duration * _FRAMES_PER_SECOND)) + 1)
-        poses, ranges, movers = _between(track, times / task.control_period)
-        scene.update(_frame(track, poses[0], ranges[0], movers[0], 0.0), 0.0)
+        frames = _frames(track, times, task.control_period)
+        scene.update(frames[0], 0.0)
         serializer = server.get_scene_serializer()
-        for index in range(1, len(times)):
-            serializer.insert_sleep(float(times[index] - times[index - 1]))
-            scene.update(_frame(track, poses[index], ranges[index], movers[index], float(times[index])), float(times[index]))
+        for before, frame in pairwise(frames):
+            serializer.insert_sleep(frame.sim_time - before.sim_time)
+            scene.update(frame, frame.sim_time)
         _mark_end(server.scene, track.poses[-1], result)
         serializer.insert_sleep(_LAST_PICTURE_SECONDS)
         return serializer.serialize()
@@ -59,39 +61,35 @@ def film(track: Track, result: EpisodeResult, task: TaskConfig, theme: Theme) ->
         stop_viser(server)
 
 
-def _between(
-    track: Track, moments: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Poses (n, 3), ranges (n, rays) and movers (n, movers, 3) at moments between the recorded ones, counted in steps."""
+def _frames(track: Track, times: NDArray[np.float64], period: float) -> list[Frame]:
+    """What to draw at each of these times, seconds: between two recorded moments, which are `period` apart."""
+    moments = times / period
     before = np.minimum(moments.astype(np.int64), len(track.poses) - 1)
     after = np.minimum(before + 1, len(track.poses) - 1)
     share = (moments - before)[:, None]
     change = track.poses[after] - track.poses[before]
     change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    poses = (track.poses[before] + share * change).astype(np.float32)
     jump = track.ranges[after] - track.ranges[before]
     sweep = np.where(np.abs(jump) < _SAME_THING, share * jump, np.where(share < 0.5, 0.0, jump))
-    return (
-        (track.poses[before] + share * change).astype(np.float32),
-        (track.ranges[before] + sweep).astype(np.float32),
-        (track.movers[before] + share[:, None] * (track.movers[after] - track.movers[before])).astype(np.float32),
-    )
-
-
-def _frame(
-    track: Track, pose: NDArray[np.float32], ranges: NDArray[np.float32], movers: NDArray[np.float32], seconds: float
-) -> Frame:
-    return Frame(
-        mode="policy",
-        step=0,
-        sim_time=seconds,
-        speed=1.0,
-        poses=pose[None],
-        targets=track.target[None],
-        ranges=ranges[None],
-        rewards=np.zeros(1, np.float32),
-        outcomes=np.zeros(1, np.uint8),
-        movers=movers,
-    )
+    ranges = (track.ranges[before] + sweep).astype(np.float32)
+    movers = track.movers[before] + share[:, None] * (track.movers[after] - track.movers[before])
+    return [
+        Frame(
+            mode="policy",
+            step=0,
+            sim_time=float(seconds),
+            speed=1.0,
+            poses=poses[index : index + 1],
+            targets=track.target[None],
+            ranges=ranges[index : index + 1],
+            fields_of_view=track.fields_of_view[before[index], None],
+            rewards=np.zeros(1, np.float32),
+            outcomes=np.zeros(1, np.uint8),
+            movers=movers[index].astype(np.float32),
+        )
+        for index, seconds in enumerate(times)
+    ]
 
 
 def _draw_path(scene: viser.SceneApi, poses: NDArray[np.float32], theme: Theme) -> None:

@@ -20,7 +20,7 @@ class Geometry(NamedTuple):
         starts, targets: (cells, 2) lower left corners of the free cells of all arenas, one after another.
         start_offsets, target_offsets: (M + 1,) where each arena's cells begin.
         origins: (tiles, 2) float64, centre of each tile in the Space.
-        ray_cos, ray_sin: (rays,) directions of the rays against the heading.
+        ray_angles: (rays,) float64 where the rays point that the policy believes in, radians against the heading.
         ray_x, ray_y: (rays,) scratch for those of one robot's rays in its arena.
         discs: (tiles, K, 5) movers as they are now, see `DISC_COLUMNS`.
     """
@@ -33,8 +33,7 @@ class Geometry(NamedTuple):
     start_offsets: Integers
     target_offsets: Integers
     origins: Doubles
-    ray_cos: Floats
-    ray_sin: Floats
+    ray_angles: Doubles
     ray_x: Floats
     ray_y: Floats
     discs: Floats
@@ -75,7 +74,9 @@ class Robots(NamedTuple):
         terms: (N, 4) the reward's terms, in the order of `REWARD_TERMS`.
         terminations, truncations: (N,) bool.
         outcomes: (N,) how the attempt that ended in this step ended; 0 where none did.
-        drawn: (N, 9) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
+        drawn: (N, 10) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
+        ray_cos, ray_sin: (N, rays) directions of each robot's rays against its heading; (1, rays) where all are alike.
+        ahead: (N, 2) first, and one past the last, of the rays that tell how free the way ahead is; (1, 2) likewise.
         drift: (N, 3) how far the believed pose is from the true one; (0, 3) where it never is.
         pending: (N, delay, 2) actions that wait to be followed, the next one first; none where nothing is delayed.
         held_ranges: (N, rays) the last scan; (0, rays) where every step has a new one.
@@ -94,6 +95,9 @@ class Robots(NamedTuple):
     truncations: NDArray[np.bool_]
     outcomes: NDArray[np.uint8]
     drawn: Doubles
+    ray_cos: Floats
+    ray_sin: Floats
+    ahead: Integers
     drift: Doubles
     pending: Floats
     held_ranges: Floats

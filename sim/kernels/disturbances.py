@@ -6,19 +6,54 @@ import numba as nb
 import numpy as np
 
 from sim.kernels.random import normal, uniform
-from sim.kernels.records import DISTANCE_NOISE, DROPOUT, HEADING_NOISE, NOISE, RANGE, RATE
+from sim.kernels.records import DISTANCE_NOISE, DROPOUT, FIELD_OF_VIEW, HEADING_NOISE, NOISE, RANGE, RATE
 
 ZERO = np.float32(0.0)
 
+AHEAD = math.radians(30.0)
+"""Rays within this angle of the heading tell how free the way ahead is (the `clearance` reward)."""
+
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def begin_episode(i, robots, p):
+def rays_ahead(angles, spread):
+    """Which of the rays at `spread` times these angles, radians in order, point ahead: the first, and one past the last.
+
+    Of a scanner so coarse that none does, those nearest to the heading.
+    """
+    nearest = abs(angles[0])
+    for angle in angles:
+        nearest = min(nearest, abs(angle))
+    within = max(AHEAD, spread * nearest) + 1e-9
+    first = 0
+    while spread * abs(angles[first]) > within:
+        first += 1
+    last = first + 1
+    while last < angles.shape[0] and spread * abs(angles[last]) <= within:
+        last += 1
+    return first, last
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _spread_rays(i, robots, geometry, p):
+    """Let robot i's rays cover the field of view that it has drawn."""
+    spread = robots.drawn[i, FIELD_OF_VIEW] / p.field_of_view
+    for k in range(geometry.ray_angles.shape[0]):
+        angle = spread * geometry.ray_angles[k]
+        robots.ray_cos[i, k] = np.float32(math.cos(angle))
+        robots.ray_sin[i, k] = np.float32(math.sin(angle))
+    robots.ahead[i, 0], robots.ahead[i, 1] = rays_ahead(geometry.ray_angles, spread)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def begin_episode(i, robots, geometry, p):
     """Draw what robot i is like in this episode; its pose is known, no action waits, and the next scan is new."""
     for k in range(robots.drawn.shape[1]):
         low = p.spans[k, 0]
         high = p.spans[k, 1]
         if low < high:
             robots.drawn[i, k] = low + (high - low) * uniform(robots.records, i)
+    if p.spans[FIELD_OF_VIEW, 0] < p.spans[FIELD_OF_VIEW, 1]:
+        _spread_rays(i, robots, geometry, p)
     find_itself(i, robots)
     if robots.pending.shape[1]:
         robots.pending[i] = ZERO

@@ -21,10 +21,11 @@ QUANTITIES = (
     "command_delay",
     "max_linear_speed",
     "max_angular_speed",
+    "field_of_view",
 )
 """Columns of `Robots.drawn`: what may differ from robot to robot, see `sim.config.RandomisationConfig`."""
 
-RANGE, NOISE, DROPOUT, RATE, DISTANCE_NOISE, HEADING_NOISE, DELAY, MAX_LINEAR, MAX_ANGULAR = range(9)
+RANGE, NOISE, DROPOUT, RATE, DISTANCE_NOISE, HEADING_NOISE, DELAY, MAX_LINEAR, MAX_ANGULAR, FIELD_OF_VIEW = range(10)
 
 PARAMETERS = np.dtype(
     [
@@ -38,7 +39,8 @@ PARAMETERS = np.dtype(
         ("half_length", "f4"),  # m, of a rectangular robot; 0 for a round one
         ("half_width", "f4"),
         ("range", "f4"),  # m, of the LiDAR
-        ("looks_ahead", "i4"),  # 1 when the field of view is within the front half plane
+        ("field_of_view", "f8"),  # degrees, of the LiDAR that the policy believes in
+        ("looks_ahead", "i4"),  # 1 when every field of view that is drawn is within the front half plane
         ("batches", "i4"),
         ("rays_per_batch", "i4"),
         ("observation", "i4"),
@@ -49,8 +51,6 @@ PARAMETERS = np.dtype(
         ("collision_reward", "f4"),
         ("progress", "f4"),  # reward per metre
         ("penalty", "f4"),  # reward, the advanced ones' c_p
-        ("ahead_first", "i4"),  # rays whose minimum is the free distance ahead: first, and one past the last
-        ("ahead_last", "i4"),
         ("arrival_distance", "f4"),  # m
         ("collision_distance", "f4"),  # m
         ("step_limit", "i4"),

@@ -183,7 +183,7 @@ def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
     clearance = FAR
     if discs.shape[1] == 0:
         return clearance
-    # Along the heading, and at most as long as 1: what is behind it is behind the heading too.
+    # The middle of the field of view, at most as long as 1: what is behind it is out of sight of rays that look ahead.
     middle = dx.shape[0] // 2
     ahead_x = np.float32(0.5) * (dx[middle] + dx[dx.shape[0] - 1 - middle])
     ahead_y = np.float32(0.5) * (dy[middle] + dy[dx.shape[0] - 1 - middle])
@@ -203,13 +203,17 @@ def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def scan_poses(poses, maps, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges):
-    """Fill `ranges` (n, rays) with the scans from `poses` (n, 3), each in the arena that `maps` (n,) names."""
-    dx = np.empty(ray_cos.shape[0], np.float32)
-    dy = np.empty(ray_cos.shape[0], np.float32)
+    """Fill `ranges` (n, rays) with the scans from `poses` (n, 3), each in the arena that `maps` (n,) names.
+
+    `ray_cos` and `ray_sin` are (n, rays), or (1, rays) where all scanners are alike.
+    """
+    dx = np.empty(ray_cos.shape[1], np.float32)
+    dy = np.empty(ray_cos.shape[1], np.float32)
     for i in range(poses.shape[0]):
+        own = min(i, ray_cos.shape[0] - 1)
         sense(
-            poses[i, 0], poses[i, 1], poses[i, 2], maps[i], bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead,
-            ranges, i, dx, dy,
+            poses[i, 0], poses[i, 1], poses[i, 2], maps[i], bounds, circles, boxes, ray_cos[own], ray_sin[own],
+            limit, looks_ahead, ranges, i, dx, dy,
         )  # fmt: skip
 
 

@@ -160,11 +160,17 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
             robots.records[i].distance = _distance_to_target(i, robots)
         _forget_attempt(robots.records[i])
         _nothing_happened(i, robots)
-        begin_episode(i, robots, p)
+        begin_episode(i, robots, geometry, p)
         _sense(i, robots, geometry, p)
         if p.perceives:
             perceive(i, robots, p)
         observe_first(i, robots, geometry, p)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _scanner_of(i, robots):
+    """Row of `ray_cos`, `ray_sin` and `ahead` that is robot i's: the only one where all scanners are alike."""
+    return i if robots.ahead.shape[0] > 1 else 0
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -174,8 +180,9 @@ def _sense(i, robots, geometry, p):
     y = robots.poses[i, 1]
     heading = robots.poses[i, 2]
     index = robots.records[i].map
+    own = _scanner_of(i, robots)
     clearance = sense(
-        x, y, heading, index, geometry.bounds, geometry.circles, geometry.boxes, geometry.ray_cos, geometry.ray_sin,
+        x, y, heading, index, geometry.bounds, geometry.circles, geometry.boxes, robots.ray_cos[own], robots.ray_sin[own],
         p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y,
     )  # fmt: skip
     tile = robots.records[i].replica * p.replica_stride + index
@@ -233,7 +240,8 @@ def _reward(i, outcome, before, robots, p):
             terms[i, 2] = gained * np.float32(2.0**ratio)
             safety = ZERO
             if p.reward == CLEARANCE:
-                safety = nearest_of(robots.ranges, i, p.ahead_first, p.ahead_last) / p.range
+                own = _scanner_of(i, robots)
+                safety = nearest_of(robots.ranges, i, robots.ahead[own, 0], robots.ahead[own, 1]) / p.range
             elif p.reward == ALIGNMENT:
                 dx = robots.targets[i, 0] - robots.poses[i, 0]
                 dy = robots.targets[i, 1] - robots.poses[i, 1]
@@ -320,7 +328,7 @@ def step_robots(state, robots, geometry, parameters):
                 robots.final_observations[i, k] = robots.observations[i, k]
             _draw_start(i, robots, geometry, p, state)
             _draw_target(i, robots, geometry, p)
-            begin_episode(i, robots, p)
+            begin_episode(i, robots, geometry, p)
             _sense(i, robots, geometry, p)
             if p.perceives:
                 perceive(i, robots, p)

@@ -21,8 +21,10 @@ from starlette.websockets import WebSocketDisconnect
 from server.live.bridge import may_pass
 from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
+from server.live.quiet import start_viser, stop_viser
+from server.live.robots import RobotNodes
 from server.live.settings import LiveSettings
-from server.live.themes import Theme
+from server.live.themes import COLOURS, Theme
 from server.live.view import LiveView
 from server.services import Services
 from sim.arenas import build_arena
@@ -55,6 +57,7 @@ def make_frame(number: int = 0, robots: int = 2, outcome: int = 0) -> Frame:
         poses=np.tile(np.array([0.01 * number, 1.0, 0.5], np.float32), (robots, 1)),
         targets=np.full((robots, 2), float(outcome), np.float32),
         ranges=np.full((robots, 30), 2.0, np.float32),
+        fields_of_view=np.full(robots, 180.0, np.float32),
         rewards=np.full(robots, 12.0, np.float32),
         outcomes=np.full(robots, outcome, np.uint8),
     )
@@ -225,6 +228,24 @@ async def _play(view: LiveView) -> bool:
             return True
         await asyncio.sleep(0.05)
     return False
+
+
+def test_rays_are_drawn_where_each_robots_own_scanner_has_them() -> None:
+    frame = dataclasses.replace(
+        make_frame(robots=2),
+        poses=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, np.pi / 2]], np.float32),
+        fields_of_view=np.array([90.0, 180.0], np.float32),
+    )
+    server = start_viser()
+    try:
+        nodes = RobotNodes(server, "/robots", TaskConfig(), COLOURS["light"], frame)
+        nodes.update(frame, 0.0)
+        ends = nodes._ray_lines.points.reshape(2, 30, 2, 3)[:, [0, -1], 1, :2]
+    finally:
+        stop_viser(server)
+    # All 2 m long: 45 degrees to either side of one robot, and a right angle to either side of the other.
+    root = np.sqrt(2.0)
+    np.testing.assert_allclose(ends, [[[root, -root], [root, root]], [[3.0, 0.0], [-1.0, 0.0]]], atol=1e-6)
 
 
 def test_a_scene_follows_the_training_into_another_arena() -> None:

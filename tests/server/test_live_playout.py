@@ -20,6 +20,7 @@ def frame(number: int, robots: int = 1, mode: ViewMode = "policy") -> Frame:
         poses=np.zeros((robots, 3), np.float32),
         targets=np.zeros((robots, 2), np.float32),
         ranges=np.ones((robots, 4), np.float32),
+        fields_of_view=np.full(robots, 180.0, np.float32),
         rewards=np.zeros(robots, np.float32),
         outcomes=np.zeros(robots, np.uint8),
     )

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from sim.arenas import Arena, free_distance
-from sim.config import ObservationName, RewardConfig, TaskConfig
+from sim.config import ObservationName, RandomisationConfig, RewardConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.kernels.records import ARRIVAL, COLLISION, NONE, TIMEOUT
 from sim.reference import ReferenceWorld, exact_arc
@@ -24,14 +24,18 @@ OUTCOMES = {NONE: "none", ARRIVAL: "arrival", COLLISION: "collision", TIMEOUT: "
     st.integers(0, 2**32 - 1),
     st.sampled_from(["paper", "improved"]),
     st.sampled_from(["basic", "clearance", "alignment"]),
+    st.sampled_from([(), (120.0, 240.0)]),
 )
-def test_observations_rewards_and_outcomes_agree(arena: Arena, seed: int, observation: ObservationName, reward: str) -> None:
+def test_observations_rewards_and_outcomes_agree(
+    arena: Arena, seed: int, observation: ObservationName, reward: str, fields_of_view: tuple[float, ...]
+) -> None:
     rng = np.random.default_rng(seed)
     task = TaskConfig(
         observation=observation,
         reward=RewardConfig.model_validate({"name": reward}),
         step_limit=int(rng.integers(10, 60)),
         collision_distance=float(rng.choice([0.0, 0.2])),
+        randomisation=RandomisationConfig(field_of_view=fields_of_view),
     )
     try:
         world = World(task, (arena,), 1, seed=seed)
@@ -39,7 +43,7 @@ def test_observations_rewards_and_outcomes_agree(arena: Arena, seed: int, observ
         assume(False)
     world.reset()
     pose, target = world.robots.poses[0].astype(float), world.robots.targets[0].astype(float)
-    plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]))
+    plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]), world.fields_of_view[0])
     actions = np.repeat(rng.uniform([0.3, -1.0], 1.0, (10, 2)), 6, axis=0).astype(np.float32)
     for linear, angular in actions.tolist():
         expected = plain.step(linear, angular)

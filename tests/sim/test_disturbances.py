@@ -14,6 +14,7 @@ from sim.config import (
     ObservationName,
     OdometryConfig,
     RandomisationConfig,
+    RewardConfig,
     TaskConfig,
 )
 from sim.kernels.records import QUANTITIES
@@ -186,6 +187,7 @@ EVERYTHING = TaskConfig(
         command_delay=(0, 3),
         max_linear_speed=(0.2, 0.3),
         max_angular_speed=(0.8, 1.2),
+        field_of_view=(140.0, 200.0),
     ),
 )
 
@@ -212,12 +214,15 @@ def test_every_quantity_is_drawn_uniformly_and_anew_for_every_episode() -> None:
 
 
 def test_what_is_drawn_is_what_a_robot_has() -> None:
-    spans = RandomisationConfig(max_linear_speed=(0.1, 0.25), command_delay=(1, 1), range=(0.5, 3.0))
+    spans = RandomisationConfig(
+        max_linear_speed=(0.1, 0.25), command_delay=(1, 1), range=(0.5, 3.0), field_of_view=(100.0, 240.0)
+    )
     task = TaskConfig(arena=COMPLEX, randomisation=spans)
     envs = NavigationVectorEnv(task, 500, seed=0)
     envs.reset()
     drawn = envs._world.robots.drawn
-    true = scan(envs.arenas[0], envs.poses, task.lidar)
+    assert envs.fields_of_view == pytest.approx(drawn[:, QUANTITIES.index("field_of_view")])
+    true = scan(envs.arenas[0], envs.poses, task.lidar, fields_of_view=envs.fields_of_view)
     own = drawn[:, QUANTITIES.index("range"), None].astype(np.float32)
     assert np.allclose(envs.ranges, np.where(true < own, true, 3.5), atol=1e-6)
     before = envs.poses.copy()
@@ -226,6 +231,17 @@ def test_what_is_drawn_is_what_a_robot_has() -> None:
     driven = np.hypot(*(envs.poses - before)[envs.outcomes == 0, :2].T)
     speed = drawn[envs.outcomes == 0, QUANTITIES.index("max_linear_speed")]
     assert driven == pytest.approx(0.2 * speed, abs=1e-5)  # the first of two commands
+
+
+def test_a_field_of_view_that_is_always_the_same_is_that_of_such_a_scanner() -> None:
+    reward = RewardConfig(name="clearance")
+    drawn = TaskConfig(arena=COMPLEX, reward=reward, randomisation=RandomisationConfig(field_of_view=(90.0, 90.0)))
+    narrow = TaskConfig(arena=COMPLEX, reward=reward, lidar=LidarConfig(field_of_view=90.0))
+    ours, theirs = (NavigationVectorEnv(task, 100, seed=2) for task in (drawn, narrow))
+    assert np.array_equal(ours.reset()[0], theirs.reset()[0])
+    for action in np.random.default_rng(0).uniform([0.0, -1.0], 1.0, (50, 100, 2)).astype(np.float32):
+        for one, other in zip(ours.step(action)[:4], theirs.step(action)[:4], strict=True):
+            assert np.array_equal(one, other)
 
 
 def test_everything_at_once_goes_on_from_a_state_and_does_not_depend_on_who_drives_beside() -> None:
@@ -246,7 +262,7 @@ def test_everything_at_once_goes_on_from_a_state_and_does_not_depend_on_who_driv
 
 def test_what_nobody_asked_for_is_in_no_state() -> None:
     names = NavigationVectorEnv(TaskConfig(), 2, seed=0).get_state().keys()
-    assert not names & {"drawn", "drift", "pending", "held_ranges", "scan_ages"}
+    assert not names & {"drawn", "ray_cos", "ahead", "drift", "pending", "held_ranges", "scan_ages"}
 
 
 @pytest.mark.parametrize(
@@ -257,6 +273,7 @@ def test_what_nobody_asked_for_is_in_no_state() -> None:
         ({"noise": [0.0, 0.7]}, "less than or equal to 0.5"),
         ({"range": [1.0, 4.0]}, "beyond the LiDAR's range of 3.5 m"),
         ({"command_delay": [0, 6]}, "less than or equal to 5"),
+        ({"field_of_view": [340.0, 361.0]}, "less than or equal to 360"),
     ],
 )
 def test_spans_that_make_no_sense_are_refused(randomisation: dict[str, list[float]], reason: str) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.baselines import go_to_goal
-from sim.config import ArenaConfig, JackalConfig, LidarConfig, TaskConfig
+from sim.config import ArenaConfig, JackalConfig, LidarConfig, RandomisationConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
 from sim.mover_config import MoverKind, MoversConfig
@@ -124,7 +124,14 @@ def test_a_mover_without_room_stays_out() -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_rays_and_collisions_are_those_of_chipmunk(seed: int) -> None:
     arena = crowded_arena(seed)
-    task = TaskConfig(collision_distance=0.0, lidar=LidarConfig(field_of_view=(180.0, 360.0)[seed % 2]), step_limit=10_000)
+    # The last of these scanners says that it sees all round, and looks ahead only.
+    field, drawn = ((180.0, ()), (360.0, ()), (360.0, (120.0, 180.0)))[seed % 3]
+    task = TaskConfig(
+        collision_distance=0.0,
+        lidar=LidarConfig(field_of_view=field),
+        randomisation=RandomisationConfig(field_of_view=drawn),
+        step_limit=10_000,
+    )
     try:
         world = World(task, (arena,), 20, seed=seed)
     except ArenaError:
@@ -141,8 +148,9 @@ def test_rays_and_collisions_are_those_of_chipmunk(seed: int) -> None:
         now = dataclasses.replace(arena, circles=np.vstack([arena.circles, discs[:, :3]]), movers=())
         going = robots.outcomes == 0
         poses = robots.poses[going].astype(np.float64)
-        suspects = np.abs(robots.ranges[going] - chipmunk_scan(now, poses, task.lidar)) > TOLERANCE
-        assert not suspects.any() or not (suspects & ~grazing(now, poses, task.lidar)).any()
+        fields = world.fields_of_view[going]
+        suspects = np.abs(robots.ranges[going] - chipmunk_scan(now, poses, task.lidar, fields)) > TOLERANCE
+        assert not suspects.any() or not (suspects & ~grazing(now, poses, task.lidar, fields)).any()
         # In one step a robot comes 0.05 m far, and a mover 0.3 m: both are looked at on their way.
         nearest = np.full(20, np.inf)
         for part in np.linspace(0.0, 1.0, 26):

@@ -7,11 +7,11 @@ import pymunk
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.config import LidarConfig
-from sim.lidar import ray_angles
+from sim.lidar import drawn_ray_angles, ray_angles
 from sim.physics import add_arena
 from sim.scan import clearances, scan
 from tests.sim.scenes import arenas
@@ -20,12 +20,15 @@ TOLERANCE = 1e-4
 GRAZE = 5e-6  # a float32's rounding at 6 m is 5e-7, in the heading 2e-7
 
 
-def chipmunk_scan(arena: Arena, poses: NDArray[np.float64], lidar: LidarConfig) -> NDArray[np.float64]:
+def chipmunk_scan(
+    arena: Arena, poses: NDArray[np.float64], lidar: LidarConfig, fields_of_view: ArrayLike = ()
+) -> NDArray[np.float64]:
+    fields = np.broadcast_to(np.asarray(fields_of_view) if np.size(fields_of_view) else lidar.field_of_view, len(poses))
     space = pymunk.Space()
     add_arena(space, arena, 0.0, 0.0)
     ranges = np.full((len(poses), lidar.rays), lidar.range)
-    for i, (x, y, heading) in enumerate(poses):
-        for k, angle in enumerate(heading + ray_angles(lidar)):
+    for i, ((x, y, heading), angles) in enumerate(zip(poses, drawn_ray_angles(lidar, fields), strict=True)):
+        for k, angle in enumerate(heading + angles):
             end = (x + lidar.range * math.cos(angle), y + lidar.range * math.sin(angle))
             hit = space.segment_query_first((x, y), end, 0.0, pymunk.ShapeFilter())
             if hit is not None:
@@ -44,9 +47,12 @@ def random_poses(arena: Arena, seed: int, count: int) -> NDArray[np.float64]:
     return np.column_stack([position, heading])
 
 
-def grazing(arena: Arena, poses: NDArray[np.float64], lidar: LidarConfig) -> NDArray[np.bool_]:
+def grazing(
+    arena: Arena, poses: NDArray[np.float64], lidar: LidarConfig, fields_of_view: ArrayLike = ()
+) -> NDArray[np.bool_]:
     """Rays whose true length jumps when the pose moves by rounding: no answer is right for them."""
-    lengths = [chipmunk_scan(arena, poses + shift, lidar) for shift in np.vstack([np.eye(3), -np.eye(3)]) * GRAZE]
+    shifts = np.vstack([np.eye(3), -np.eye(3)]) * GRAZE
+    lengths = [chipmunk_scan(arena, poses + shift, lidar, fields_of_view) for shift in shifts]
     jumps: NDArray[np.bool_] = np.ptp(lengths, axis=0) > TOLERANCE / 2
     return jumps
 
@@ -101,3 +107,12 @@ def test_a_full_circle_has_no_ray_twice() -> None:
     angles = ray_angles(LidarConfig(rays=4, batches=4, field_of_view=360.0))
     assert angles == pytest.approx([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
     assert ray_angles(LidarConfig(rays=3, batches=3))[[0, -1]] == pytest.approx([-np.pi / 2, np.pi / 2])
+
+
+def test_a_drawn_field_of_view_spreads_the_same_rays() -> None:
+    angles = drawn_ray_angles(LidarConfig(rays=5, batches=5), [90.0, 180.0, 200.0])
+    assert np.degrees(angles) == pytest.approx(np.array([45.0, 90.0, 100.0])[:, None] * [-1.0, -0.5, 0.0, 0.5, 1.0])
+    # A full circle that is a little short begins and ends short.
+    assert np.degrees(drawn_ray_angles(LidarConfig(rays=4, batches=4, field_of_view=360.0), [342.0]))[0] == pytest.approx(
+        [-171.0, -85.5, 0.0, 85.5]
+    )

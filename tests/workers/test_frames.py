@@ -29,6 +29,7 @@ def frames(draw: st.DrawFn) -> Frame:
         poses=draw(floats(robots, 3)),
         targets=draw(floats(robots, 2)),
         ranges=draw(floats(robots, rays)),
+        fields_of_view=draw(floats(robots)),
         rewards=draw(floats(robots)),
         outcomes=draw(hnp.arrays(np.uint8, (robots,), elements=st.integers(0, 3))),
         arena=draw(st.integers(0, 65_535)),
@@ -45,6 +46,7 @@ def one_robot() -> Frame:
         poses=np.array([[1.0, 2.0, 0.5]], np.float32),
         targets=np.array([[3.0, 4.0]], np.float32),
         ranges=np.array([[0.5, 3.5]], np.float32),
+        fields_of_view=np.array([180.0], np.float32),
         rewards=np.array([-7.0], np.float32),
         outcomes=np.array([2], np.uint8),
     )
@@ -64,10 +66,11 @@ def test_a_frame_of_64_robots_takes_ten_kilobytes() -> None:
         poses=np.zeros((robots, 3), np.float32),
         targets=np.zeros((robots, 2), np.float32),
         ranges=np.zeros((robots, rays), np.float32),
+        fields_of_view=np.zeros(robots, np.float32),
         rewards=np.zeros(robots, np.float32),
         outcomes=np.zeros(robots, np.uint8),
     )
-    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1) + 1) == 9309
+    assert len(frame.encode()) == HEADER_BYTES + 64 * (4 * (3 + 2 + 30 + 1 + 1) + 1) == 9565
 
 
 @given(frames(), st.data())

@@ -118,15 +118,18 @@ def test_a_showcase_does_not_jump_where_robots_drive_otherwise_than_commanded() 
         update={
             "robot": BurgerConfig(max_linear_acceleration=0.2),
             "command_delay": 2,
-            "randomisation": RandomisationConfig(max_linear_speed=(0.1, 0.2)),
+            "randomisation": RandomisationConfig(max_linear_speed=(0.1, 0.2), field_of_view=(90.0, 240.0)),
         }
     )
     showcase = Showcase(task, 20)
+    arena = build_arenas(task.arena)[0]
     steps = []
     last: Frame | None = None
     for _ in range(90):
         showcase.advance(curve_left, 1 / 30)
         frame = showcase.frame(step=7, speed=1.0)
+        seen = scan(arena, frame.poses, task.lidar, fields_of_view=frame.fields_of_view)
+        np.testing.assert_allclose(frame.ranges, seen, atol=1e-5)
         if last is not None:
             same_attempt = (frame.targets == last.targets).all(axis=1)
             steps.append(np.hypot(*(frame.poses[:, :2] - last.poses[:, :2]).T)[same_attempt])

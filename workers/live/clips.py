@@ -87,6 +87,7 @@ class ClipRecorder:
             poses=env.poses[shown],
             targets=env.targets[shown],
             ranges=env.ranges[shown],
+            fields_of_view=env.fields_of_view[shown].astype(np.float32),
             rewards=np.where(env.outcomes[shown] > 0, 0.0, env.attempt_rewards[shown]).astype(np.float32),
             outcomes=self._outcomes[shown],
             arena=self._place % len(env.arenas),

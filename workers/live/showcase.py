@@ -101,7 +101,8 @@ class Showcase:
             speed=speed,
             poses=poses,
             targets=self._targets,
-            ranges=scan(self._env.arenas[0], poses, self._lidar, movers=movers),
+            ranges=scan(self._env.arenas[0], poses, self._lidar, movers=movers, fields_of_view=self._fields),
+            fields_of_view=self._fields,
             rewards=self._rewards,
             outcomes=self._outcomes,
             movers=movers,
@@ -123,6 +124,7 @@ class Showcase:
         env = self._env
         self._poses = env.poses.copy()
         self._targets = env.targets.copy()
+        self._fields = env.fields_of_view.astype(np.float32)
         # A reward that belongs to an attempt that has just ended is history.
         self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()

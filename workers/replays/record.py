@@ -31,6 +31,7 @@ class _Moments:
         self._scenarios: list[NDArray[np.int64]] = []
         self._poses: list[NDArray[np.float32]] = []
         self._ranges: list[NDArray[np.float16]] = []
+        self._fields: list[NDArray[np.float32]] = []
         self._movers: list[NDArray[np.float32]] = []
 
     def __call__(self, under_way: NDArray[np.int64], world: World) -> None:
@@ -46,18 +47,22 @@ class _Moments:
         self._scenarios.append(under_way.copy())
         self._poses.append(poses)
         self._ranges.append(ranges)
+        self._fields.append(world.fields_of_view[under_way].astype(np.float32))
         self._movers.append(movers)
 
     def movers(self) -> NDArray[np.float32]:
         """(T, A, K, 3) x, y, radius in every arena at every moment."""
         return np.stack(self._movers)
 
-    def by_scenario(self, scenarios: int) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float16]]:
-        """Offsets (S + 1,), poses (M, 3) and ranges (M, rays), one episode after another."""
+    def by_scenario(
+        self, scenarios: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float16], NDArray[np.float32]]:
+        """Offsets (S + 1,), poses (M, 3), ranges (M, rays) and fields of view (M,), one episode after another."""
         scenario = np.concatenate(self._scenarios)
         order = np.argsort(scenario, kind="stable")
         offsets = np.concatenate([[0], np.cumsum(np.bincount(scenario, minlength=scenarios))])
-        return offsets, np.concatenate(self._poses)[order], np.concatenate(self._ranges)[order]
+        poses, ranges = np.concatenate(self._poses)[order], np.concatenate(self._ranges)[order]
+        return offsets, poses, ranges, np.concatenate(self._fields)[order]
 
 
 def record(archive: Path, suite_name: str | None = None) -> Recording:
@@ -83,7 +88,7 @@ def record(archive: Path, suite_name: str | None = None) -> Recording:
         table = run_suite(torch_policy(policy.network, policy.weights), task, suite, moments)
     finally:
         torch.set_flush_denormal(False)
-    offsets, poses, ranges = moments.by_scenario(len(suite))
+    offsets, poses, ranges, fields = moments.by_scenario(len(suite))
     return Recording(
         evaluation=to_result(table, suite),
         arenas=tuple(to_document(arena) for arena in suite.arenas),
@@ -92,5 +97,6 @@ def record(archive: Path, suite_name: str | None = None) -> Recording:
         offsets=offsets,
         poses=poses,
         ranges=ranges,
+        fields_of_view=fields,
         movers=moments.movers(),
     )

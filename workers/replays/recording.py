@@ -24,6 +24,7 @@ class Track:
         arena: where.
         poses: (n + 1, 3) float32: x, y, heading.
         ranges: (n + 1, rays) float32, metres.
+        fields_of_view: (n + 1,) float32, degrees that the rays cover.
         target: (2,) float32.
         movers: (n + 1, movers, 3) float32: x, y, radius.
     """
@@ -31,6 +32,7 @@ class Track:
     arena: ArenaFile
     poses: NDArray[np.float32]
     ranges: NDArray[np.float32]
+    fields_of_view: NDArray[np.float32]
     target: NDArray[np.float32]
     movers: NDArray[np.float32]
 
@@ -47,6 +49,7 @@ class Recording:
         offsets: (S + 1,) where the moments of each episode begin, and the last one ends.
         poses: (M, 3) float32.
         ranges: (M, rays) float16: fine enough to draw.
+        fields_of_view: (M,) float32.
         movers: (T, A, K, 3) float32 x, y, radius of what moves in each of the A arenas, from the first moment of all
             episodes to the last of the longest; a radius below zero is none.
     """
@@ -58,6 +61,7 @@ class Recording:
     offsets: NDArray[np.int64]
     poses: NDArray[np.float32]
     ranges: NDArray[np.float16]
+    fields_of_view: NDArray[np.float32]
     movers: NDArray[np.float32]
 
     def track(self, episode: int) -> Track:
@@ -74,6 +78,7 @@ class Recording:
             arena=self.arenas[self.arena_indices[episode]],
             poses=self.poses[moments],
             ranges=self.ranges[moments].astype(np.float32),
+            fields_of_view=self.fields_of_view[moments],
             target=self.targets[episode],
             movers=discs[:, discs[0, :, 2] > 0.0],
         )
@@ -91,6 +96,7 @@ class Recording:
                 offsets=self.offsets,
                 poses=self.poses,
                 ranges=self.ranges,
+                fields_of_view=self.fields_of_view,
                 movers=self.movers,
             )
         torn.replace(path)

@@ -2788,7 +2788,7 @@ export interface components {
          * RandomisationConfig
          * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
          *
-         *     Rays, batches and field of view decide what the numbers of an observation mean, so they cannot be drawn.
+         *     Rays and batches decide how many numbers an observation has, so they cannot be drawn.
          */
         "RandomisationConfig-Input": {
             /**
@@ -2809,6 +2809,12 @@ export interface components {
              * @default []
              */
             dropout: number[];
+            /**
+             * LiDAR field of view
+             * @description Degrees that the rays truly cover, while the policy takes them for those of the LiDAR: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            field_of_view: number[];
             /**
              * Drift in heading
              * @description Radians after one: lowest and highest; empty keeps the value above.
@@ -2850,7 +2856,7 @@ export interface components {
          * RandomisationConfig
          * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
          *
-         *     Rays, batches and field of view decide what the numbers of an observation mean, so they cannot be drawn.
+         *     Rays and batches decide how many numbers an observation has, so they cannot be drawn.
          */
         "RandomisationConfig-Output": {
             /**
@@ -2871,6 +2877,12 @@ export interface components {
              * @default []
              */
             dropout: number[];
+            /**
+             * LiDAR field of view
+             * @description Degrees that the rays truly cover, while the policy takes them for those of the LiDAR: lowest and highest; empty keeps the value above.
+             * @default []
+             */
+            field_of_view: number[];
             /**
              * Drift in heading
              * @description Radians after one: lowest and highest; empty keeps the value above.
