@@ -124,8 +124,12 @@ def build(config: TrainingConfig, seed: int) -> BaseAlgorithm:
             },
             **common,
         )
+    # One rate for actor and critics, and no logit penalty: what it offers.
+    critic_rate = algorithm.critic_learning_rate
     replay: dict[str, Any] = {
-        "learning_rate": algorithm.critic_learning_rate,
+        "learning_rate": (
+            (lambda left: critic_rate * left) if algorithm.learning_rate_schedule == "linear" else critic_rate
+        ),
         "buffer_size": algorithm.replay_size,
         "learning_starts": algorithm.warmup_steps,
         "batch_size": algorithm.batch_size,
@@ -146,6 +150,7 @@ def build(config: TrainingConfig, seed: int) -> BaseAlgorithm:
                 **replay,
             )
         case DdpgConfig() | Td3Config():
+            # Its noise does not decay: about the mean of ours.
             noise = NormalActionNoise(np.zeros(2), np.full(2, 0.5 * algorithm.exploration_noise))
             if isinstance(algorithm, DdpgConfig):
                 return DDPG("MlpPolicy", environment, action_noise=noise, **replay)

@@ -1,14 +1,17 @@
 """CPU-seconds of training until a policy reaches 95 % and 99 % on the complex arena, ours and Stable-Baselines3's.
 
 Each algorithm trains with its default configuration, on one thread; Stable-Baselines3 gets the same environment, networks
-and hyperparameters. After every 50,000 steps the deterministic policy drives 1,000 episodes that no training sees; that
-time does not count. The median over the seeds counts, a seed that never arrives as infinite.
+and hyperparameters. Every so many steps the deterministic policy drives 1,000 episodes that no training sees; that time
+does not count. A level is reached at the first look that shows it. The median over the seeds counts, a seed that never
+arrives as infinite.
 
-    python -m benchmarks.time_to_success [--check] [--algorithms ppo ddpg td3 sac] [--seeds 5]
+    python -m benchmarks.time_to_success [--check] [--algorithms ppo ddpg td3 sac] [--seeds 5] [--sb3-seeds 3]
 
+A line of JSON follows each training, so that an interrupted run keeps what it has.
 Target: PPO to 99 % within 30 CPU-seconds.
 """
 
+import json
 import math
 import statistics
 import tempfile
@@ -17,15 +20,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
+from benchmarks.attempts import first_attempts
 from benchmarks.report import finish, parser
 from benchmarks.stable_baselines import build, policy_of
 from benchmarks.training_throughput import NEVER, Silent
 from sim.config import ArenaConfig, TaskConfig
-from sim.vector_env import NavigationVectorEnv
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.live.viewing import PolicyFunction, Unwatched
 from workers.policy import torch_policy
@@ -33,22 +35,11 @@ from workers.trainer import REPORT_INTERVAL, Training
 
 TASK = TaskConfig(arena=ArenaConfig(name="complex"))
 STEPS = {"ppo": 1_000_000, "ddpg": 300_000, "td3": 300_000, "sac": 200_000}
+# A second or two of training each.
+EVALUATE_EVERY = {"ppo": 50_000, "ddpg": 20_000, "td3": 20_000, "sac": 20_000}
 LEVELS = (0.95, 0.99)
-EVALUATE_EVERY = 50_000
-EPISODES = 1_000
-EVALUATION_SEED = 123
+EPISODES_SEED = 123
 PPO_TARGET_SECONDS = 30.0
-
-
-def success_rate(policy: PolicyFunction) -> float:
-    """Arrivals among the first attempts of 1,000 robots."""
-    env = NavigationVectorEnv(TASK, EPISODES, seed=EVALUATION_SEED, copy=False)
-    observations, _ = env.reset(seed=EVALUATION_SEED)
-    outcomes = np.zeros(EPISODES, np.uint8)
-    while not outcomes.all():
-        observations, *_ = env.step(policy(observations))
-        outcomes = np.where(outcomes, outcomes, env.outcomes)
-    return float((outcomes == 1).mean())
 
 
 def configuration(algorithm: str) -> TrainingConfig:
@@ -64,37 +55,39 @@ def configuration(algorithm: str) -> TrainingConfig:
 
 
 class Clock:
-    """CPU-seconds to each level of success, measured between evaluations only."""
+    """CPU-seconds to each level of success, measured between looks only."""
 
-    def __init__(self) -> None:
+    def __init__(self, every: int) -> None:
         self.reached = dict.fromkeys(LEVELS, math.inf)
-        self._spent = 0.0
+        self.looks: list[float] = []
+        self._every = self._next = every
+        self.spent = 0.0
         self._started = time.process_time()
-        self._next = EVALUATE_EVERY
 
     def look(self, step: int, policy: Callable[[], PolicyFunction]) -> bool:
-        """Evaluates where it is due; whether every level is reached."""
+        """Looks where it is due; whether every level is reached."""
         if step < self._next:
             return False
-        self._next += EVALUATE_EVERY
-        self._spent += time.process_time() - self._started
-        success = success_rate(policy())
+        self._next += self._every
+        self.spent += time.process_time() - self._started
+        success = first_attempts(policy(), TASK, EPISODES_SEED).success
+        self.looks.append(success)
         for level, seconds in self.reached.items():
             if success >= level and math.isinf(seconds):
-                self.reached[level] = self._spent
+                self.reached[level] = self.spent
         self._started = time.process_time()
         return not any(map(math.isinf, self.reached.values()))
 
 
-def ours(config: TrainingConfig, seed: int) -> dict[float, float]:
+def ours(config: TrainingConfig, seed: int) -> Clock:
     """Our training, by the stages of its own loop."""
     with tempfile.TemporaryDirectory() as directory:
         training = Training(config, seed, Silent(), Path(directory), Unwatched(), REPORT_INTERVAL)
-        clock = Clock()
+        clock = Clock(EVALUATE_EVERY[config.algorithm.name])
         for _ in _updates(training):
             if clock.look(training.step, lambda: training.policy(torch_policy)):
                 break
-    return clock.reached
+    return clock
 
 
 def _updates(training: Training) -> Iterator[None]:
@@ -115,12 +108,38 @@ class Look(BaseCallback):
         return not self._clock.look(self.num_timesteps, lambda: policy_of(self.model))
 
 
-def theirs(config: TrainingConfig, seed: int) -> dict[float, float]:
+def theirs(config: TrainingConfig, seed: int) -> Clock:
     """Stable-Baselines3's training."""
     model = build(config, seed)
-    clock = Clock()
+    clock = Clock(EVALUATE_EVERY[config.algorithm.name])
     model.learn(config.steps, callback=Look(clock))
-    return clock.reached
+    return clock
+
+
+def race(algorithm: str, who: str, seeds: int) -> dict[str, Any]:
+    """Figures of one contender: median and slowest time to each level, and how many seeds never got there."""
+    config = configuration(algorithm)
+    train = ours if who == "ours" else theirs
+    clocks = []
+    for seed in range(seeds):
+        clock = train(config, seed)
+        clocks.append(clock)
+        reached = {f"to_{round(100 * level)}": _finite(seconds) for level, seconds in clock.reached.items()}
+        line = {"algorithm": algorithm, "who": who, "seed": seed, "looks": clock.looks, "cpu_seconds": round(clock.spent, 1)}
+        print(json.dumps(line | reached), flush=True)
+    figures: dict[str, Any] = {f"{algorithm}_{who}_seeds": seeds}
+    for level in LEVELS:
+        times = [clock.reached[level] for clock in clocks]
+        name = f"{algorithm}_{who}_seconds_to_{round(100 * level)}"
+        figures[name] = _finite(statistics.median(times))
+        figures[f"{name}_slowest"] = _finite(max(times))
+        figures[f"{name}_never"] = sum(map(math.isinf, times))
+    return figures
+
+
+def _finite(seconds: float) -> float | None:
+    """For JSON, which has no infinity."""
+    return round(seconds, 1) if math.isfinite(seconds) else None
 
 
 def main() -> None:
@@ -128,23 +147,17 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("--algorithms", nargs="*", default=["ppo"], choices=list(STEPS))
     options.add_argument("--seeds", type=int, default=5)
-    options.add_argument("--without-sb3", action="store_true", help="only ours")
+    options.add_argument("--sb3-seeds", type=int, help="of Stable-Baselines3, 0 for only ours; as many as ours if left out")
     arguments = options.parse_args()
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
-    figures: dict[str, Any] = {"seeds": arguments.seeds}
+    sb3_seeds = arguments.seeds if arguments.sb3_seeds is None else arguments.sb3_seeds
+    figures: dict[str, Any] = {}
     for algorithm in arguments.algorithms:
-        config = configuration(algorithm)
-        for who, run in (("ours", ours), ("sb3", theirs)):
-            if who == "sb3" and arguments.without_sb3:
-                continue
-            runs = [run(config, seed) for seed in range(arguments.seeds)]
-            for level in LEVELS:
-                median = statistics.median(reached[level] for reached in runs)
-                name = f"{algorithm}_{who}_seconds_to_{round(100 * level)}"
-                figures[name] = round(median, 1) if math.isfinite(median) else None
-            print(algorithm, who, runs)
-    targets = {"ppo_ours_seconds_to_99": PPO_TARGET_SECONDS} if "ppo" in arguments.algorithms else {}
+        for who, seeds in (("ours", arguments.seeds), ("sb3", sb3_seeds)):
+            if seeds:
+                figures |= race(algorithm, who, seeds)
+    targets = {"ppo_ours_seconds_to_99": PPO_TARGET_SECONDS} if "ppo_ours_seeds" in figures else {}
     finish("time_to_success", figures, at_most=targets, check=arguments.check)
 
 

@@ -124,6 +124,9 @@ class OffPolicyConfig(Frozen):
     )
     actor_learning_rate: float = Field(3e-4, gt=0.0, le=0.1, title="Actor learning rate", json_schema_extra=ADVANCED)
     critic_learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Critic learning rate", json_schema_extra=ADVANCED)
+    learning_rate_schedule: Literal["linear", "constant"] = Field(
+        "constant", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
+    )
     gamma: float = Field(0.99, gt=0.0, lt=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
     tau: float = Field(
         0.01,
@@ -150,6 +153,14 @@ class _DeterministicConfig(OffPolicyConfig):
         json_schema_extra=ADVANCED,
     )
     final_exploration_noise: float = Field(0.05, ge=0.0, le=2.0, title="Exploration noise, last", json_schema_extra=ADVANCED)
+    logit_penalty: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        title="Logit penalty",
+        description="Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.",
+        json_schema_extra=ADVANCED,
+    )
 
 
 class DdpgConfig(_DeterministicConfig):

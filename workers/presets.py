@@ -3,7 +3,15 @@
 from pydantic import Field
 
 from sim.config import ArenaConfig, Frozen, TaskConfig
-from workers.config import EvaluationConfig, Network, PpoConfig, ResBlockNetwork, TrainingConfig
+from workers.config import (
+    DdpgConfig,
+    EvaluationConfig,
+    MlpNetwork,
+    Network,
+    PpoConfig,
+    ResBlockNetwork,
+    TrainingConfig,
+)
 
 
 class Preset(Frozen):
@@ -25,6 +33,27 @@ def paper_ppo(network: Network) -> PpoConfig:
         learning_rate_schedule="constant",
         gamma=0.99,
         entropy_coefficient=0.0,
+    )
+
+
+def paper_ddpg() -> DdpgConfig:
+    """DDPG as in our reproduction's tables: the paper gives none of its settings, so nothing here follows the defaults."""
+    return DdpgConfig(
+        network=MlpNetwork(hidden_sizes=(128, 128)),
+        robots=64,
+        updates_per_step=4,
+        batch_size=256,
+        replay_size=200_000,
+        warmup_steps=10_000,
+        actor_learning_rate=3e-4,
+        critic_learning_rate=1e-3,
+        learning_rate_schedule="constant",
+        gamma=0.99,
+        tau=0.01,
+        reward_scale=0.01,
+        exploration_noise=0.5,
+        final_exploration_noise=0.05,
+        logit_penalty=0.0,
     )
 
 

@@ -103,8 +103,8 @@ def test_healthy_default_trainings_are_left_alone(seed: int, tmp_path: Path) -> 
             10_000,
             {"algorithm": {**SMALL_PPO, "initial_std_linear": 0.011, "initial_std_angular": 0.011}},
         ),
-        ("actions_saturate", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1}}),
-        ("spins", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1}}),
+        ("actions_saturate", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1, "logit_penalty": 0.0}}),
+        ("spins", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1, "logit_penalty": 0.0}}),
         (
             "success_stuck",
             40_000,

@@ -106,12 +106,29 @@ def test_target_networks_move_by_tau() -> None:
     assert torch.equal(target.values, torch.full_like(target.values, 1.5))
 
 
+def test_the_penalty_moves_an_actor_that_its_critic_cannot_move() -> None:
+    # Logits of 30: sigmoid and tanh are 1 and their slopes 0. Adam's first step goes the learning rate's length.
+    for penalty, expected in ((0.0, 30.0), (1e-3, 29.9)):
+        ddpg = build_ddpg(DdpgConfig(network=SMALL, actor_learning_rate=0.1, logit_penalty=penalty), 3, 0, CPU)
+        set_constant(ddpg.actor.network, 30.0)
+        ddpg.learn(one_batch())
+        assert ddpg.actor.network.head.bias.tolist() == pytest.approx([expected, expected])
+
+
+def test_learning_rates_fall_linearly() -> None:
+    config = DdpgConfig(network=SMALL, actor_learning_rate=0.01, critic_learning_rate=0.02, learning_rate_schedule="linear")
+    ddpg = build_ddpg(config, 3, 0, CPU)
+    assert ddpg.update(0.75)["optim/learning_rate"] == pytest.approx(0.0025)
+    assert ddpg.actor_optimizer.learning_rate == pytest.approx(0.0025)
+    assert ddpg.critic_optimizer.learning_rate == pytest.approx(0.005)
+
+
 @pytest.mark.parametrize("network", [MlpNetwork(), ResBlockNetwork()], ids=repr)
 def test_written_out_gradients_equal_autograd(network: Network) -> None:
     td3 = build_td3(Td3Config(network=network, batch_size=32), 16, 0, CPU)
     actor, critics = td3.actor_optimizer, td3.critic_optimizer
-    reference = AutogradActorCritic(td3.actor, td3.critics, actor, critics)
-    written = WrittenActorCritic(td3.actor, td3.critics, 32)
+    reference = AutogradActorCritic(td3.actor, td3.critics, actor, critics, logit_penalty=0.01)
+    written = WrittenActorCritic(td3.actor, td3.critics, 32, logit_penalty=0.01)
     with torch.no_grad():
         td3.actor.network.head.weight.mul_(10.0)
     batch = Transitions(torch.randn(32, 16), torch.rand(32, 2), torch.rand(32, 1), torch.ones(32, 1), torch.randn(32, 16))

@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.config import TaskConfig
+from workers.config import DdpgConfig
 from workers.drives import drive
+from workers.presets import paper_ddpg
 from workers.reproduction.claims import CLAIMS, Claim, Comparison, Safety
 from workers.reproduction.curves import band, binned
 from workers.reproduction.drawing import draw_curves
@@ -67,6 +69,11 @@ def test_every_comparison_is_one_that_the_papers_own_figures_make() -> None:
 def test_all_methods_of_a_figure_get_the_same_steps() -> None:
     for figure in FIGURES:
         assert {ROW_BY_ID[row].training.steps for row in figure.rows} == {STEPS}
+
+
+def test_the_papers_ddpg_does_not_follow_the_forms_defaults() -> None:
+    assert paper_ddpg().model_fields_set | {"name"} == set(DdpgConfig.model_fields)
+    assert ROW_BY_ID["simple-basic-ddpg"].training.algorithm == paper_ddpg()
 
 
 def test_a_trial_has_a_part_of_the_steps_and_as_many_evaluations() -> None:

@@ -1,7 +1,10 @@
 """The gradients of DDPG's and TD3's losses: by autograd, which reads as the papers do, and written out, which is faster.
 
 critics  L = sum_i 1/N sum (y - Q_i(s, a))^2
-actor    J = -1/N sum Q_1(s, mu(s))
+actor    J = 1/N sum (-Q_1(s, mu(s)) + penalty |z|^2), where mu(s) squashes the logits z of the actor's network
+
+The penalty keeps sigmoid and tanh from their flat ends. There their slope is zero, so no critic, however right, moves the
+actor any more: see docs/recipes.md, 'Why DDPG failed'.
 """
 
 from collections.abc import Sequence
@@ -23,7 +26,7 @@ class ActorCriticGradients(Protocol):
         """Overwrites the critics' gradients, given targets (n, 1); returns the loss."""
 
     def actor(self, observations: Tensor) -> Tensor:
-        """Overwrites the actor's gradients, given observations (n, size); returns the loss."""
+        """Overwrites the actor's gradients, given observations (n, size); returns the loss without its penalty."""
 
 
 def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Tensor:
@@ -41,8 +44,9 @@ class AutogradActorCritic:
         critics: Sequence[Body],
         actor_parameters: FlatParameters,
         critic_parameters: FlatParameters,
+        logit_penalty: float,
     ) -> None:
-        self._actor, self._critics = actor, critics
+        self._actor, self._critics, self._penalty = actor, critics, logit_penalty
         self._actor_parameters, self._critic_parameters = actor_parameters, critic_parameters
 
     @torch.enable_grad()
@@ -56,15 +60,17 @@ class AutogradActorCritic:
     @torch.enable_grad()
     def actor(self, observations: Tensor) -> Tensor:
         """See `ActorCriticGradients.actor`."""
-        loss = -action_value(self._critics[0], observations, self._actor(observations)).mean()
-        self._actor_parameters.differentiate(loss)
-        return loss.detach()
+        logits = self._actor.network(observations)
+        value = action_value(self._critics[0], observations, bound_actions(logits)).mean()
+        self._actor_parameters.differentiate(self._penalty * logits.square().sum(dim=1).mean() - value)
+        return -value.detach()
 
 
 class WrittenActorCritic:
     """The same gradients without autograd; a test compares them with `AutogradActorCritic`'s."""
 
-    def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int) -> None:
+    def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int, logit_penalty: float) -> None:
+        self._penalty = logit_penalty
         self._actor = backward_of(actor.network, batch_size)
         self._critics = [backward_of(critic, batch_size) for critic in critics]
 
@@ -83,12 +89,15 @@ class WrittenActorCritic:
     def actor(self, observations: Tensor) -> Tensor:
         """See `ActorCriticGradients.actor`."""
         rows, size = observations.shape
-        actions = bound_actions(self._actor.forward(observations))
+        logits = self._actor.forward(observations)
+        actions = bound_actions(logits)
         values = self._critics[0].forward(torch.cat((observations, actions), dim=1))
         by_actions = self._critics[0].input_gradient(torch.full_like(values, -1.0 / rows))[:, size:]
         # Through sigmoid (s (1 - s)) and tanh (1 - t^2).
         by_logits = by_actions.contiguous()
         by_logits[:, 0].mul_(actions[:, 0] * (1.0 - actions[:, 0]))
         by_logits[:, 1].mul_(1.0 - actions[:, 1].square())
+        if self._penalty:
+            by_logits.add_(logits, alpha=2.0 * self._penalty / rows)
         self._actor.backward(by_logits)
         return -values.mean()

@@ -45,7 +45,7 @@ class NoisyPolicy(OffPolicyAlgorithm):
             observation_size=actor.observation_size,
             generator=generator,
         )
-        self.gradients: ActorCriticGradients = WrittenActorCritic(actor, critics, config.batch_size)
+        self.gradients: ActorCriticGradients = WrittenActorCritic(actor, critics, config.batch_size, config.logit_penalty)
         self._noise = config.exploration_noise
         self._half_range = ACTION_HALF_RANGE.to(generator.device)
 
@@ -62,11 +62,7 @@ class NoisyPolicy(OffPolicyAlgorithm):
         """See `OffPolicyAlgorithm.set_progress`."""
         first, last = self.config.exploration_noise, self.config.final_exploration_noise
         self._noise = first + (last - first) * progress
-        return {
-            "policy/std_linear": 0.5 * self._noise,
-            "policy/std_angular": self._noise,
-            "optim/learning_rate": self.config.actor_learning_rate,
-        }
+        return {"policy/std_linear": 0.5 * self._noise, "policy/std_angular": self._noise}
 
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`."""

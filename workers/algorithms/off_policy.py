@@ -42,6 +42,7 @@ class OffPolicyAlgorithm(ABC):
         self.robots = config.robots
         self._shared = config
         self._online, self._targets = online, targets
+        self._learning_rates = {name: adam.learning_rate for name, adam in online.items()}
         self._generator = generator
         self._device = generator.device
         self._replay = ReplayBuffer(config.replay_size, config.robots, observation_size, self._device)
@@ -60,7 +61,7 @@ class OffPolicyAlgorithm(ABC):
 
     @abstractmethod
     def set_progress(self, progress: float) -> dict[str, float]:
-        """Moves the schedules to a part of the training, 0 to 1; what to report of them."""
+        """Moves an algorithm's own schedules to a part of the training, 0 to 1; what to report of them."""
 
     @property
     def warming_up(self) -> bool:
@@ -102,8 +103,7 @@ class OffPolicyAlgorithm(ABC):
 
     def update(self, progress: float) -> dict[str, float]:
         """See `Algorithm.update`."""
-        self._progress = progress
-        schedules = self.set_progress(progress)
+        schedules = self._schedule(progress)
         if self.warming_up:
             return schedules
         totals: dict[str, Tensor] = {}
@@ -113,6 +113,13 @@ class OffPolicyAlgorithm(ABC):
                 totals[name] = totals[name] + value if name in totals else value
                 counts[name] = counts.get(name, 0) + 1
         return schedules | {name: total.item() / counts[name] for name, total in totals.items()}
+
+    def _schedule(self, progress: float) -> dict[str, float]:
+        self._progress = progress
+        left = 1.0 - progress if self._shared.learning_rate_schedule == "linear" else 1.0
+        for name, adam in self._online.items():
+            adam.learning_rate = left * self._learning_rates[name]
+        return {"optim/learning_rate": left * self._shared.actor_learning_rate, **self.set_progress(progress)}
 
     def follow(self, target: str, online: str) -> None:
         """Moves a target network a little towards its original: target += tau (online - target)."""
@@ -145,8 +152,8 @@ class OffPolicyAlgorithm(ABC):
         """See `Algorithm.load_state`."""
         self._replay.load_state(without_prefix("replay", state))
         self._generator.set_state(torch.from_numpy(np.array(state["generator"], np.uint8)))
-        self._steps, self._progress = int(state["steps"]), float(state["progress"])
-        self.set_progress(self._progress)
+        self._steps = int(state["steps"])
+        self._schedule(float(state["progress"]))
         for name, adam in self._online.items():
             adam.load_state(without_prefix(name, state))
         for name, target in self._targets.items():

@@ -118,8 +118,8 @@ class Sac(OffPolicyAlgorithm):
         }
 
     def set_progress(self, progress: float) -> dict[str, float]:
-        """See `OffPolicyAlgorithm.set_progress`: nothing here has a schedule."""
-        return {"optim/learning_rate": self.config.actor_learning_rate}
+        """See `OffPolicyAlgorithm.set_progress`: the temperature sees to exploration."""
+        return {}
 
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`: without the head's rows that make the deviation."""

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from sim.config import ArenaConfig, Frozen, RewardConfig, TaskConfig
 from workers.config import (
     Algorithm,
-    DdpgConfig,
     EvaluationConfig,
     MlpNetwork,
     ResBlockNetwork,
     TrainingConfig,
 )
-from workers.presets import paper_ppo
+from workers.presets import paper_ddpg, paper_ppo
 from workers.reproduction.table import TableRow
 
 STEPS = 600_000
@@ -48,7 +47,7 @@ class Row(Frozen):
 
 _RESBLOCK = paper_ppo(ResBlockNetwork())
 _VANILLA = paper_ppo(MlpNetwork(hidden_sizes=(64, 64)))
-_DDPG = DdpgConfig()
+_DDPG = paper_ddpg()
 
 
 def _training(arena: str, reward: str, algorithm: Algorithm) -> TrainingConfig:
