@@ -13,7 +13,8 @@ from workers.algorithms.actor_critic_gradients import AutogradActorCritic, Writt
 from workers.algorithms.ddpg import Ddpg, build_ddpg
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.replay import ReplayBuffer, Transitions
-from workers.algorithms.sac import Sac, build_sac, log_slope
+from workers.algorithms.sac import Sac, build_sac
+from workers.algorithms.sac_gradients import AutogradSac, WrittenSac, log_slope
 from workers.algorithms.td3 import Td3, build_td3
 from workers.config import DdpgConfig, MlpNetwork, Network, ResBlockNetwork, SacConfig, Td3Config
 from workers.policy import Policy
@@ -91,7 +92,7 @@ def test_log_slope_is_the_derivative_of_the_squashing(linear: float, angular: fl
 
 def test_sac_temperature_falls_while_entropy_is_above_its_target() -> None:
     # An actor that answers 0 has deviation e^-1.5: entropy 2 (-1.5 + 1.42) of u, ln(1/4) of the slopes, together -1.5.
-    sac = build_sac(SacConfig(network=SMALL), 3, 0, CPU)
+    sac = build_sac(SacConfig(network=SMALL, batch_size=1000), 3, 0, CPU)
     set_constant(sac.actor, 0.0)
     first = sac.learn(one_batch(pairs=500))["policy/temperature"].item()
     assert sac.learn(one_batch())["policy/temperature"].item() < first
@@ -148,6 +149,31 @@ def test_written_out_gradients_equal_autograd(network: Network) -> None:
     assert torch.allclose(written.actor(batch.observations), expected_loss)
     assert torch.allclose(actor.gradients, expected, rtol=0, atol=2e-6 * float(expected.abs().max()))
     assert torch.equal(critics.gradients, before)  # the actor's update leaves the critics alone
+
+
+@pytest.mark.parametrize("network", [MlpNetwork(), ResBlockNetwork()], ids=repr)
+def test_sacs_written_out_gradients_equal_autograd(network: Network) -> None:
+    sac = build_sac(SacConfig(network=network, batch_size=32), 16, 0, CPU)
+    actor, critics = sac.actor_optimizer, sac.critic_optimizer
+    reference, written = AutogradSac(sac.actor, sac.critics, actor, critics), WrittenSac(sac.actor, sac.critics, 32)
+    with torch.no_grad():
+        sac.actor.head.weight.mul_(10.0)
+    batch = Transitions(torch.randn(32, 16), torch.rand(32, 2), torch.rand(32, 1), torch.ones(32, 1), torch.randn(32, 16))
+    targets, noise, alpha = torch.randn(32, 1), torch.randn(32, 2), torch.tensor([0.3])
+
+    expected_loss = reference.critics(batch, targets)
+    expected = critics.gradients.clone()
+    critics.gradients.fill_(float("nan"))
+    assert torch.allclose(written.critics(batch, targets), expected_loss)
+    assert torch.allclose(critics.gradients, expected, rtol=0, atol=2e-6 * float(expected.abs().max()))
+
+    expected_loss, expected_log_probs = reference.actor(batch.observations, noise, alpha)
+    expected = actor.gradients.clone()
+    actor.gradients.fill_(float("nan"))
+    loss, log_probs = written.actor(batch.observations, noise, alpha)
+    assert torch.allclose(loss, expected_loss)
+    assert torch.allclose(log_probs, expected_log_probs)
+    assert torch.allclose(actor.gradients, expected, rtol=0, atol=5e-6 * float(expected.abs().max()))
 
 
 def record(algorithm: OffPolicyAlgorithm, rng: np.random.Generator, steps: int) -> None:

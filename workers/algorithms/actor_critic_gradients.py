@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.replay import Transitions
-from workers.backward import backward_of
+from workers.backward import Backward, backward_of
 from workers.networks import Body, DeterministicActor, bound_actions
 
 
@@ -35,6 +35,29 @@ def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Te
     return value
 
 
+@torch.enable_grad()
+def differentiate_critics(
+    critics: Sequence[Body], parameters: FlatParameters, batch: Transitions, targets: Tensor
+) -> Tensor:
+    """Overwrites the critics' gradients by autograd, given targets (n, 1); returns the loss."""
+    errors = [action_value(critic, batch.observations, batch.actions) - targets for critic in critics]
+    loss = torch.stack([error.square().mean() for error in errors]).sum()
+    parameters.differentiate(loss)
+    return loss.detach()
+
+
+@torch.no_grad()
+def write_critic_gradients(critics: Sequence[Backward], batch: Transitions, targets: Tensor) -> Tensor:
+    """The same, written out."""
+    inputs = torch.cat((batch.observations, batch.actions), dim=1)
+    loss = torch.zeros((), device=targets.device)
+    for critic in critics:
+        error = critic.forward(inputs).sub_(targets)
+        loss += error.square().mean()
+        critic.backward(error.mul_(2.0 / len(targets)))
+    return loss
+
+
 class AutogradActorCritic:
     """The reference."""
 
@@ -49,13 +72,9 @@ class AutogradActorCritic:
         self._actor, self._critics, self._penalty = actor, critics, logit_penalty
         self._actor_parameters, self._critic_parameters = actor_parameters, critic_parameters
 
-    @torch.enable_grad()
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `ActorCriticGradients.critics`."""
-        errors = [action_value(critic, batch.observations, batch.actions) - targets for critic in self._critics]
-        loss = torch.stack([error.square().mean() for error in errors]).sum()
-        self._critic_parameters.differentiate(loss)
-        return loss.detach()
+        return differentiate_critics(self._critics, self._critic_parameters, batch, targets)
 
     @torch.enable_grad()
     def actor(self, observations: Tensor) -> Tensor:
@@ -74,16 +93,9 @@ class WrittenActorCritic:
         self._actor = backward_of(actor.network, batch_size)
         self._critics = [backward_of(critic, batch_size) for critic in critics]
 
-    @torch.no_grad()
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `ActorCriticGradients.critics`."""
-        inputs = torch.cat((batch.observations, batch.actions), dim=1)
-        loss = torch.zeros((), device=targets.device)
-        for critic in self._critics:
-            error = critic.forward(inputs).sub_(targets)
-            loss += error.square().mean()
-            critic.backward(error.mul_(2.0 / len(targets)))
-        return loss
+        return write_critic_gradients(self._critics, batch, targets)
 
     @torch.no_grad()
     def actor(self, observations: Tensor) -> Tensor:

@@ -12,19 +12,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.nn import functional
 
 from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.off_policy import OffPolicyAlgorithm
-from workers.algorithms.ppo_gradients import log_prob
 from workers.algorithms.replay import Transitions
+from workers.algorithms.sac_gradients import SacGradients, WrittenSac, squashed_sample
 from workers.config import SacConfig
 from workers.layout import ACTION_SIZE
-from workers.networks import Body, bound_actions, build_network
-
-# Deviations of u from 0.7 % to 740 %: outside of it gradients vanish or samples saturate.
-LOG_STD_RANGE = (-5.0, 2.0)
+from workers.networks import Body, build_network
 
 
 class Temperature(nn.Module):
@@ -66,15 +62,11 @@ class Sac(OffPolicyAlgorithm):
             observation_size=observation_size,
             generator=generator,
         )
+        self.gradients: SacGradients = WrittenSac(actor, critics, config.batch_size)
 
     def sample(self, observations: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (n, 2) and their log densities (n, 1), differentiable by the actor's parameters (its Eq. 9)."""
-        mean, log_std = self.actor(observations).split(ACTION_SIZE, dim=1)
-        low, high = LOG_STD_RANGE
-        log_std = low + 0.5 * (high - low) * (torch.tanh(log_std) + 1.0)
-        noise = torch.randn(mean.shape, generator=self._generator, device=self._device)
-        u = mean + torch.exp(log_std) * noise
-        return bound_actions(u), (log_prob(noise, log_std) - log_slope(u)).unsqueeze(1)
+        """Actions (n, 2) of observations (n, size), and their log densities (n, 1)."""
+        return squashed_sample(self.actor(observations), self._noise(len(observations)))
 
     def explore(self, observations: Tensor) -> Tensor:
         """See `OffPolicyAlgorithm.explore`."""
@@ -92,30 +84,29 @@ class Sac(OffPolicyAlgorithm):
                 *(action_value(critic, batch.next_observations, next_actions) for critic in self.target_critics)
             )
             targets = batch.rewards + config.gamma * batch.continues * (following - alpha * next_log_probs)
-        critic_loss = torch.stack(
-            [(action_value(critic, batch.observations, batch.actions) - targets).square().mean() for critic in self.critics]
-        ).sum()
-        self.critic_optimizer.descend(critic_loss)
+        critic_loss = self.gradients.critics(batch, targets)
+        self.critic_optimizer.step()
 
         # phi <- phi - lambda_pi grad J_pi(phi), Eq. 10
-        actions, log_probs = self.sample(batch.observations)
-        values = torch.minimum(*(action_value(critic, batch.observations, actions) for critic in self.critics))
-        actor_loss = (alpha * log_probs - values).mean()
-        self.actor_optimizer.descend(actor_loss)
+        actor_loss, log_probs = self.gradients.actor(batch.observations, self._noise(len(batch.observations)), alpha)
+        self.actor_optimizer.step()
 
-        # alpha <- alpha - lambda grad J(alpha), Eq. 18, by the logarithm of alpha
-        surplus = log_probs.detach().mean() + config.target_entropy
-        self.temperature_optimizer.descend(-(self.temperature.log_alpha * surplus).sum())
+        # alpha <- alpha - lambda grad J(alpha), Eq. 18, by the logarithm of alpha: J = -log(alpha) (log pi + target)
+        self.temperature_optimizer.gradients.fill_(-(log_probs.mean() + config.target_entropy))
+        self.temperature_optimizer.step()
 
         # target_i <- tau theta_i + (1 - tau) target_i
         self.follow("target_critic", "critic")
         return {
-            "loss/policy": actor_loss.detach(),
-            "loss/value": critic_loss.detach(),
+            "loss/policy": actor_loss,
+            "loss/value": critic_loss,
             "value/mean": targets.mean(),
-            "policy/entropy": -log_probs.detach().mean(),
+            "policy/entropy": -log_probs.mean(),
             "policy/temperature": alpha.sum(),
         }
+
+    def _noise(self, rows: int) -> Tensor:
+        return torch.randn((rows, ACTION_SIZE), generator=self._generator, device=self._device)
 
     def set_progress(self, progress: float) -> dict[str, float]:
         """See `OffPolicyAlgorithm.set_progress`: the temperature sees to exploration."""
@@ -125,21 +116,6 @@ class Sac(OffPolicyAlgorithm):
         """See `Algorithm.policy_weights`: without the head's rows that make the deviation."""
         weights = {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.state_dict().items()}
         return weights | {name: weights[name][:ACTION_SIZE].copy() for name in ("head.weight", "head.bias")}
-
-
-def log_slope(u: Tensor) -> Tensor:
-    """Log of the derivative of `bound_actions` by u, summed over both actions: (n, 2) to (n,).
-
-    sigmoid'(u) = sigmoid(u) sigmoid(-u), tanh'(u) = 4 sigmoid(2 u) sigmoid(-2 u): exact where 1 - tanh(u)^2 would cancel.
-    """
-    linear, angular = u[:, 0], 2.0 * u[:, 1]
-    return (
-        functional.logsigmoid(linear)
-        + functional.logsigmoid(-linear)
-        + functional.logsigmoid(angular)
-        + functional.logsigmoid(-angular)
-        + math.log(4.0)
-    )
 
 
 def build_sac(config: SacConfig, observation_size: int, seed: int, device: torch.device) -> Sac:
