@@ -122,14 +122,14 @@ class OffPolicyConfig(Frozen):
         description="Environment steps of uniform actions before learning starts.",
         json_schema_extra=ADVANCED,
     )
-    actor_learning_rate: float = Field(3e-4, gt=0.0, le=0.1, title="Actor learning rate", json_schema_extra=ADVANCED)
+    actor_learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Actor learning rate", json_schema_extra=ADVANCED)
     critic_learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Critic learning rate", json_schema_extra=ADVANCED)
     learning_rate_schedule: Literal["linear", "constant"] = Field(
-        "constant", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
+        "linear", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
     )
-    gamma: float = Field(0.99, gt=0.0, lt=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
+    gamma: float = Field(0.97, gt=0.0, lt=1.0, title="Discount (gamma)", json_schema_extra=ADVANCED)
     tau: float = Field(
-        0.01,
+        0.05,
         gt=0.0,
         le=1.0,
         title="Target rate (tau)",
@@ -152,9 +152,9 @@ class _DeterministicConfig(OffPolicyConfig):
         description="Deviation, in halves of an action's range; decays linearly.",
         json_schema_extra=ADVANCED,
     )
-    final_exploration_noise: float = Field(0.05, ge=0.0, le=2.0, title="Exploration noise, last", json_schema_extra=ADVANCED)
+    final_exploration_noise: float = Field(0.3, ge=0.0, le=2.0, title="Exploration noise, last", json_schema_extra=ADVANCED)
     logit_penalty: float = Field(
-        0.0,
+        1e-4,
         ge=0.0,
         le=1.0,
         title="Logit penalty",

@@ -173,8 +173,8 @@ def test_a_critic_that_gets_worse_is_diagnosed() -> None:
 
 def test_values_that_no_policy_can_earn_are_diagnosed() -> None:
     ddpg = {"algorithm": {"name": "ddpg"}}
-    # 500 per metre x 0.25 m/s x 0.2 s = 25 a step is less than the 120 of an arrival: 120 x 0.01 / (1 - 0.99) = 120.
-    assert largest_value(TrainingConfig.model_validate(ddpg)) == pytest.approx(120.0)
+    # 500 per metre x 0.25 m/s x 0.2 s = 25 a step is less than the 120 of an arrival: 120 x 0.01 / (1 - 0.97) = 40.
+    assert largest_value(TrainingConfig.model_validate(ddpg)) == pytest.approx(40.0)
     (diagnosis,) = drawn(ddpg, value__mean=np.geomspace(0.1, 1e4, 40))
     assert diagnosis.id == "value_diverges"
     assert drawn(ddpg, value__mean=np.linspace(0.0, 15.0, 40)) == ()

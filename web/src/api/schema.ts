@@ -1350,7 +1350,7 @@ export interface components {
         "DdpgConfig-Input": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -1371,14 +1371,27 @@ export interface components {
             exploration_noise: number;
             /**
              * Exploration noise, last
-             * @default 0.05
+             * @default 0.3
              */
             final_exploration_noise: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
+            /**
+             * Logit penalty
+             * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
+             * @default 0.0001
+             */
+            logit_penalty: number;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -1410,7 +1423,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
@@ -1433,7 +1446,7 @@ export interface components {
         "DdpgConfig-Output": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -1454,14 +1467,27 @@ export interface components {
             exploration_noise: number;
             /**
              * Exploration noise, last
-             * @default 0.05
+             * @default 0.3
              */
             final_exploration_noise: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
+            /**
+             * Logit penalty
+             * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
+             * @default 0.0001
+             */
+            logit_penalty: number;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -1493,7 +1519,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
@@ -3472,7 +3498,7 @@ export interface components {
         "SacConfig-Input": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -3487,7 +3513,7 @@ export interface components {
             critic_learning_rate: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
             /**
@@ -3496,6 +3522,13 @@ export interface components {
              * @default 0.1
              */
             initial_temperature: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -3533,7 +3566,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
@@ -3556,7 +3589,7 @@ export interface components {
         "SacConfig-Output": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -3571,7 +3604,7 @@ export interface components {
             critic_learning_rate: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
             /**
@@ -3580,6 +3613,13 @@ export interface components {
              * @default 0.1
              */
             initial_temperature: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -3617,7 +3657,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
@@ -3953,7 +3993,7 @@ export interface components {
         "Td3Config-Input": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -3974,14 +4014,27 @@ export interface components {
             exploration_noise: number;
             /**
              * Exploration noise, last
-             * @default 0.05
+             * @default 0.3
              */
             final_exploration_noise: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
+            /**
+             * Logit penalty
+             * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
+             * @default 0.0001
+             */
+            logit_penalty: number;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -4030,7 +4083,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
@@ -4053,7 +4106,7 @@ export interface components {
         "Td3Config-Output": {
             /**
              * Actor learning rate
-             * @default 0.0003
+             * @default 0.001
              */
             actor_learning_rate: number;
             /**
@@ -4074,14 +4127,27 @@ export interface components {
             exploration_noise: number;
             /**
              * Exploration noise, last
-             * @default 0.05
+             * @default 0.3
              */
             final_exploration_noise: number;
             /**
              * Discount (gamma)
-             * @default 0.99
+             * @default 0.97
              */
             gamma: number;
+            /**
+             * Learning-rate schedule
+             * @description Linear decays to zero.
+             * @default linear
+             * @enum {string}
+             */
+            learning_rate_schedule: "linear" | "constant";
+            /**
+             * Logit penalty
+             * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
+             * @default 0.0001
+             */
+            logit_penalty: number;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -4130,7 +4196,7 @@ export interface components {
             /**
              * Target rate (tau)
              * @description Part of the way that target networks go in each update.
-             * @default 0.01
+             * @default 0.05
              */
             tau: number;
             /**
