@@ -38,7 +38,7 @@ RUN echo "$COMMIT" > /app/COMMIT
 
 USER mapless
 # A worker's first training should not wait for the compiler.
-RUN python -m sim.precompile
+RUN python -m workers.precompile
 VOLUME /data
 EXPOSE 8400
 ENTRYPOINT ["mapless"]

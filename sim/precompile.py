@@ -1,7 +1,4 @@
-"""`python -m sim.precompile`: compile the kernels into the cache beside them, so that no training waits for it.
-
-`make` runs it when the sources have changed; without it the first training on a machine would take half a minute more.
-"""
+"""Compile the simulator's kernels into the cache beside them; `workers.precompile` does this and more."""
 
 import numpy as np
 
@@ -22,7 +19,3 @@ def main() -> None:
     env = NavigationVectorEnv(task, 2, seed=0)
     env.reset()
     env.step(np.zeros((2, 2), dtype=np.float32))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,82 +1,130 @@
-"""Backward passes of the two networks, written out: what autograd computes, without its bookkeeping.
+"""Backward passes of the two networks, written out for a CPU: what autograd computes, without its bookkeeping.
 
-At these sizes autograd spends as much time on its graph as on arithmetic. Each class here runs one network forward and
-backward into buffers that it keeps, and writes the gradients into the parameters' `.grad`, which must exist. Autograd is
-the reference: a test holds the two equal.
+Each class here runs one network forward and backward by the compiled functions of `workers.dense`, on NumPy views of the
+parameters and of their `.grad`, which must exist and stay in their places (`FlatParameters` sees to both). Autograd is the
+reference: a test holds the two equal.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from workers import dense
 from workers.layout import LEAKY_SLOPE
 from workers.networks import Body, Mlp, ResBlock
 
-_aten = torch.ops.aten
+Floats = NDArray[np.floating[Any]]
+"""Of the parameters' own type."""
+
+ROWS = 128
+"""Rows that go through a network at once: 512 neurons wide they are a quarter of a megabyte, and stay in a core's cache from
+the forward to the backward pass. 64 to 256 are as good (`benchmarks.training_throughput`); 1,024 cost a fifth more."""
 
 
 class Backward(Protocol):
-    """One network's forward and backward pass; the gradients belong to the `forward` before them."""
+    """One network's forward and backward pass; the gradients belong to the `forward` before them.
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """(n, inputs) to (n, outputs), n at most the batch size that the buffers were made for."""
+    Results are buffers that the next call overwrites.
+    """
 
-    def backward(self, output_gradient: Tensor) -> None:
-        """Overwrites every parameter's `.grad`, given the derivative (n, outputs) of a scalar by the outputs."""
+    def forward(self, inputs: Floats) -> Floats:
+        """(n, inputs) to (n, outputs), n at most the rows that the buffers were made for."""
 
-    def input_gradient(self, output_gradient: Tensor) -> Tensor:
+    def backward(self, by_output: Floats, *, add: bool = False) -> None:
+        """Overwrites every parameter's `.grad`, or adds to it: `by_output` (n, outputs) is the derivative of some scalar."""
+
+    def input_gradient(self, by_output: Floats) -> Floats:
         """The derivative (n, inputs) of that scalar by the inputs; leaves the parameters' `.grad` alone."""
 
 
-def backward_of(network: Body, batch_size: int) -> Backward:
-    """The written-out passes of a network, with buffers for `batch_size` rows."""
-    return ResBlockBackward(network, batch_size) if isinstance(network, ResBlock) else MlpBackward(network, batch_size)
+def backward_of(network: Body, rows: int) -> Backward:
+    """The written-out passes of a network, with buffers for that many rows."""
+    return ResBlockBackward(network, rows) if isinstance(network, ResBlock) else MlpBackward(network, rows)
+
+
+class TensorBackward:
+    """The same for CPU tensors of any layout."""
+
+    def __init__(self, passes: Backward) -> None:
+        self._passes = passes
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """See `Backward.forward`."""
+        return torch.from_numpy(self._passes.forward(_contiguous(inputs)))
+
+    def backward(self, by_output: Tensor) -> None:
+        """See `Backward.backward`."""
+        self._passes.backward(_contiguous(by_output))
+
+    def input_gradient(self, by_output: Tensor) -> Tensor:
+        """See `Backward.input_gradient`."""
+        return torch.from_numpy(self._passes.input_gradient(_contiguous(by_output)))
+
+
+class _Layer:
+    """One `nn.Linear` with buffers: `outputs`, after its activation, and `delta`, the derivative by its sums before it."""
+
+    def __init__(self, layer: nn.Linear, rows: int, slope: float) -> None:
+        self.weight, self._bias = _array(layer.weight), _array(layer.bias)
+        self._by_weight, self._by_bias = _array(layer.weight.grad), _array(layer.bias.grad)
+        self._scratch = np.empty_like(self.weight)
+        self.slope = self.weight.dtype.type(slope)
+        self.outputs = _buffer(self, rows, layer.out_features)
+        self.delta = np.empty_like(self.outputs)
+
+    def forward(self, inputs: Floats) -> Floats:
+        outputs = self.outputs[: len(inputs)]
+        dense.dense(inputs, self.weight, self._bias, self.slope, outputs)
+        return outputs
+
+    def backward(self, delta: Floats, inputs: Floats, add: bool) -> None:
+        dense.parameter_gradients(delta, inputs, add, self._scratch, self._by_weight, self._by_bias)
 
 
 class MlpBackward:
     """`Mlp`, forward and backward."""
 
-    def __init__(self, network: Mlp, batch_size: int) -> None:
-        self._layers = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
-        self._head = network.head
-        self._relu = network.activation == "relu"
-        self._hidden = [_buffer(layer, batch_size) for layer in self._layers]
-        self._deltas = [_buffer(layer, batch_size) for layer in self._layers]
-        self._inputs = torch.empty(0)
+    def __init__(self, network: Mlp, rows: int) -> None:
+        self._tanh = network.activation == "tanh"
+        slope = 1.0 if self._tanh else 0.0
+        self._layers = [_Layer(layer, rows, slope) for layer in network.layers if isinstance(layer, nn.Linear)]
+        self._layers.append(_Layer(network.head, rows, 1.0))
+        self._by_input = _buffer(self._layers[0], rows, self._layers[0].weight.shape[1])
+        self._inputs: Floats = self._by_input
 
-    def forward(self, inputs: Tensor) -> Tensor:
+    def forward(self, inputs: Floats) -> Floats:
         """See `Backward.forward`."""
-        self._inputs = inputs
-        activate_ = torch.relu_ if self._relu else torch.tanh_
-        hidden, rows = inputs, len(inputs)
-        for layer, buffer in zip(self._layers, self._hidden, strict=True):
-            hidden = activate_(_linear(layer, hidden, buffer[:rows]))
-        return torch.addmm(self._head.bias, hidden, self._head.weight.t())
+        self._inputs = values = inputs
+        for layer in self._layers:
+            values = layer.forward(values)
+            if self._tanh and layer is not self._layers[-1]:
+                np.tanh(values, out=values)
+        return values
 
-    def backward(self, output_gradient: Tensor) -> None:
+    def backward(self, by_output: Floats, *, add: bool = False) -> None:
         """See `Backward.backward`."""
-        deltas = self._backpropagate(output_gradient)
-        inputs = (self._inputs, *(hidden[: len(output_gradient)] for hidden in self._hidden))
-        for layer, layer_inputs, delta in zip((*self._layers, self._head), inputs, deltas, strict=True):
-            _parameter_gradients(layer, layer_inputs, delta)
+        deltas = self._backpropagate(by_output)
+        inputs = (self._inputs, *(layer.outputs[: len(by_output)] for layer in self._layers))
+        for layer, delta, layer_inputs in zip(self._layers, deltas, inputs, strict=False):
+            layer.backward(delta, layer_inputs, add)
 
-    def input_gradient(self, output_gradient: Tensor) -> Tensor:
+    def input_gradient(self, by_output: Floats) -> Floats:
         """See `Backward.input_gradient`."""
-        return self._backpropagate(output_gradient)[0] @ self._layers[0].weight
+        return np.dot(self._backpropagate(by_output)[0], self._layers[0].weight, out=self._by_input[: len(by_output)])
 
-    def _backpropagate(self, output_gradient: Tensor) -> list[Tensor]:
-        """The derivative by each layer's sum before its activation, first layer first."""
-        rows = len(output_gradient)
-        deltas = [output_gradient]
-        for above, hidden, buffer in zip(
-            (self._head, *reversed(self._layers[1:])), reversed(self._hidden), reversed(self._deltas), strict=True
-        ):
-            delta = torch.mm(deltas[-1], above.weight, out=buffer[:rows])
-            if self._relu:
-                _aten.threshold_backward.grad_input(delta, hidden[:rows], 0, grad_input=delta)
+    def _backpropagate(self, by_output: Floats) -> list[Floats]:
+        """The derivative by each layer's sums before its activation, first layer first."""
+        rows = len(by_output)
+        deltas = [by_output]
+        for layer, below in zip(self._layers[:0:-1], self._layers[-2::-1], strict=True):
+            outputs, delta = below.outputs[:rows], below.delta[:rows]
+            if self._tanh:
+                dense.dense_backward_tanh(deltas[-1], layer.weight, outputs, delta)
             else:
-                _aten.tanh_backward.grad_input(delta, hidden[:rows], grad_input=delta)
+                dense.dense_backward(deltas[-1], layer.weight, outputs, below.slope, delta)
             deltas.append(delta)
         return deltas[::-1]
 
@@ -84,81 +132,74 @@ class MlpBackward:
 class ResBlockBackward:
     """`ResBlock`, forward and backward; names follow the layers in the paper's tables."""
 
-    def __init__(self, network: ResBlock, batch_size: int) -> None:
-        self._net = network
-        self._width1 = network.layer2.out_features
-        self._width2 = network.layer4.out_features
-        self._hidden1, self._delta1 = _buffer(network.layer1, batch_size), _buffer(network.layer1, batch_size)
-        self._hidden3, self._delta3 = _buffer(network.layer3, batch_size), _buffer(network.layer3, batch_size)
-        self._concat1 = network.head.weight.new_empty(batch_size, 2 * self._width1)
-        self._concat2 = network.head.weight.new_empty(batch_size, 2 * self._width2)
-        self._inputs = torch.empty(0)
+    def __init__(self, network: ResBlock, rows: int) -> None:
+        self._layer1, self._layer3 = _Layer(network.layer1, rows, LEAKY_SLOPE), _Layer(network.layer3, rows, LEAKY_SLOPE)
+        self._layer2, self._layer4 = _Layer(network.layer2, rows, 1.0), _Layer(network.layer4, rows, LEAKY_SLOPE)
+        self._head = _Layer(network.head, rows, 1.0)
+        self._slope = self._layer4.slope
+        width1, width2 = network.layer2.out_features, network.layer4.out_features
+        self._concat1, self._by_concat1 = (_buffer(self._head, rows, 2 * width1) for _ in range(2))
+        self._concat2, self._by_concat2 = (_buffer(self._head, rows, 2 * width2) for _ in range(2))
+        self._shortcut1 = _buffer(self._head, rows, width1)
+        self._shortcut2 = _buffer(self._head, rows, width2)
+        self._by_input = _buffer(self._head, rows, width1)
+        self._inputs: Floats = self._by_input
 
-    def forward(self, inputs: Tensor) -> Tensor:
+    def forward(self, inputs: Floats) -> Floats:
         """See `Backward.forward`."""
+        rows = len(inputs)
         self._inputs = inputs
-        net, rows = self._net, len(inputs)
-        hidden1 = _leaky_(_linear(net.layer1, inputs, self._hidden1[:rows]))
-        concat1 = self._concat1[:rows]
-        concat1[:, : self._width1] = torch.addmm(net.layer2.bias, hidden1, net.layer2.weight.t())
-        concat1[:, self._width1 :] = inputs
-        _leaky_(concat1)
-        hidden3 = _leaky_(_linear(net.layer3, concat1, self._hidden3[:rows]))
-        concat2 = self._concat2[:rows]
-        concat2[:, : self._width2] = _leaky_(torch.addmm(net.layer4.bias, hidden3, net.layer4.weight.t()))
-        concat2[:, self._width2 :] = concat1
-        _leaky_(concat2)
-        return torch.addmm(net.head.bias, concat2, net.head.weight.t())
-
-    def backward(self, output_gradient: Tensor) -> None:
-        """See `Backward.backward`."""
-        net, rows = self._net, len(output_gradient)
-        delta1, delta2, delta3, delta4, _ = self._backpropagate(output_gradient)
-        _parameter_gradients(net.head, self._concat2[:rows], output_gradient)
-        _parameter_gradients(net.layer4, self._hidden3[:rows], delta4)
-        _parameter_gradients(net.layer3, self._concat1[:rows], delta3)
-        _parameter_gradients(net.layer2, self._hidden1[:rows], delta2)
-        _parameter_gradients(net.layer1, self._inputs, delta1)
-
-    def input_gradient(self, output_gradient: Tensor) -> Tensor:
-        """See `Backward.input_gradient`."""
-        delta1, _, _, _, shortcut = self._backpropagate(output_gradient)
-        return torch.addmm(shortcut, delta1, self._net.layer1.weight)
-
-    def _backpropagate(self, output_gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """The derivatives by the sums of layers 1 to 4 before activation, and by the inputs over the first shortcut."""
-        net, rows = self._net, len(output_gradient)
         concat1, concat2 = self._concat1[:rows], self._concat2[:rows]
-        delta_concat2 = _through_leaky(output_gradient @ net.head.weight, concat2)
-        delta4 = _through_leaky(delta_concat2[:, : self._width2], concat2[:, : self._width2])
-        delta3 = torch.mm(delta4, net.layer4.weight, out=self._delta3[:rows])
-        _through_leaky(delta3, self._hidden3[:rows])
-        delta_concat1 = torch.addmm(delta_concat2[:, self._width2 :], delta3, net.layer3.weight)
-        _through_leaky(delta_concat1, concat1)
-        delta2 = delta_concat1[:, : self._width1]
-        delta1 = torch.mm(delta2, net.layer2.weight, out=self._delta1[:rows])
-        _through_leaky(delta1, self._hidden1[:rows])
-        return delta1, delta2, delta3, delta4, delta_concat1[:, self._width1 :]
+        dense.join(self._layer2.forward(self._layer1.forward(inputs)), inputs, self._slope, concat1)
+        dense.join(self._layer4.forward(self._layer3.forward(concat1)), concat1, self._slope, concat2)
+        return self._head.forward(concat2)
+
+    def backward(self, by_output: Floats, *, add: bool = False) -> None:
+        """See `Backward.backward`."""
+        rows = len(by_output)
+        self._backpropagate(by_output)
+        self._head.backward(by_output, self._concat2[:rows], add)
+        self._layer4.backward(self._layer4.delta[:rows], self._layer3.outputs[:rows], add)
+        self._layer3.backward(self._layer3.delta[:rows], self._concat1[:rows], add)
+        self._layer2.backward(self._layer2.delta[:rows], self._layer1.outputs[:rows], add)
+        self._layer1.backward(self._layer1.delta[:rows], self._inputs, add)
+
+    def input_gradient(self, by_output: Floats) -> Floats:
+        """See `Backward.input_gradient`."""
+        rows = len(by_output)
+        self._backpropagate(by_output)
+        by_input = np.dot(self._layer1.delta[:rows], self._layer1.weight, out=self._by_input[:rows])
+        by_input += self._shortcut1[:rows]
+        return by_input
+
+    def _backpropagate(self, by_output: Floats) -> None:
+        """Fills the deltas of layers 1 to 4 and the derivatives by what the two shortcuts carry."""
+        rows, slope = len(by_output), self._slope
+        layer1, layer2, layer3, layer4 = self._layer1, self._layer2, self._layer3, self._layer4
+        concat1, by_concat1 = self._concat1[:rows], self._by_concat1[:rows]
+        concat2, by_concat2 = self._concat2[:rows], self._by_concat2[:rows]
+        shortcut1, shortcut2 = self._shortcut1[:rows], self._shortcut2[:rows]
+
+        np.dot(by_output, self._head.weight, out=by_concat2)
+        # Layer 4 has an activation of its own under that of the concatenation: the slope counts twice.
+        dense.join_backward(by_concat2, concat2, slope * slope, slope, layer4.delta[:rows], shortcut2)
+        dense.dense_backward(layer4.delta[:rows], layer4.weight, layer3.outputs[:rows], slope, layer3.delta[:rows])
+        np.dot(layer3.delta[:rows], layer3.weight, out=by_concat1)
+        by_concat1 += shortcut2
+        dense.join_backward(by_concat1, concat1, slope, slope, layer2.delta[:rows], shortcut1)
+        dense.dense_backward(layer2.delta[:rows], layer2.weight, layer1.outputs[:rows], slope, layer1.delta[:rows])
 
 
-def _buffer(layer: nn.Linear, rows: int) -> Tensor:
-    return layer.weight.new_empty(rows, layer.out_features)
+def _contiguous(tensor: Tensor) -> Floats:
+    array: Floats = tensor.contiguous().numpy()
+    return array
 
 
-def _linear(layer: nn.Linear, inputs: Tensor, out: Tensor) -> Tensor:
-    return torch.addmm(layer.bias, inputs, layer.weight.t(), out=out)
+def _array(tensor: Tensor | None) -> Floats:
+    assert tensor is not None, "FlatParameters gives every parameter its gradient"
+    array: Floats = tensor.detach().numpy()
+    return array
 
 
-def _leaky_(values: Tensor) -> Tensor:
-    return nn.functional.leaky_relu_(values, LEAKY_SLOPE)
-
-
-def _through_leaky(delta: Tensor, result: Tensor) -> Tensor:
-    """In place: the slope's sign can be read from the result as well as from the argument."""
-    _aten.leaky_relu_backward.grad_input(delta, result, LEAKY_SLOPE, True, grad_input=delta)
-    return delta
-
-
-def _parameter_gradients(layer: nn.Linear, inputs: Tensor, delta: Tensor) -> None:
-    torch.mm(delta.t(), inputs, out=layer.weight.grad)
-    torch.sum(delta, 0, out=layer.bias.grad)
+def _buffer(layer: _Layer, rows: int, columns: int) -> Floats:
+    return np.empty((rows, columns), layer.weight.dtype)

@@ -13,9 +13,9 @@ import torch
 from numpy.typing import NDArray
 
 from sim.observations import observation_layout
-from sim.suites import run_suite, suite_for
+from sim.suites import suite_for
 from sim.vector_env import NavigationVectorEnv
-from workers.algorithms import build_algorithm, ppo_loss
+from workers.algorithms import build_algorithm
 from workers.algorithms.base import with_prefix, without_prefix
 from workers.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
 from workers.config import TrainingConfig
@@ -80,16 +80,6 @@ def train(
     finally:
         viewer.close()
         torch.set_flush_denormal(False)
-
-
-def warm_up() -> None:
-    """Loads compiled kernels, the default suite, and what PyTorch imports at its first optimiser."""
-    config = TrainingConfig()
-    task = config.task
-    run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
-    NavigationVectorEnv(task, 1, seed=0).reset()
-    build_algorithm(config.algorithm, observation_layout(task).size, 0, torch.device("cpu"))
-    ppo_loss.load()
 
 
 class Training:

@@ -12,6 +12,7 @@ from workers.algorithms.ppo import Ppo, build_ppo
 from workers.algorithms.ppo_gradients import AutogradPpo, WrittenPpo, entropy, log_prob
 from workers.algorithms.return_scaler import ReturnScaler
 from workers.algorithms.rollout import Minibatch, generalized_advantages
+from workers.backward import ROWS
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
 from workers.networks import GaussianActor, build_network
 
@@ -132,19 +133,20 @@ def test_clipped_surrogate_by_hand() -> None:
 
 @pytest.mark.parametrize("network", [ResBlockNetwork(), MlpNetwork(), MlpNetwork(activation="tanh")], ids=repr)
 def test_written_out_gradients_equal_autograd(network: Network) -> None:
-    config = PpoConfig(network=network, robots=8, rollout_steps=8, minibatch_size=64, entropy_coefficient=0.01)
+    rows = ROWS + 72  # more than go through the networks at once
+    config = PpoConfig(network=network, robots=8, rollout_steps=25, minibatch_size=rows, entropy_coefficient=0.01)
     ppo = build_ppo(config, 16, 0, CPU)
     with torch.no_grad():
         ppo.actor.network.head.weight.normal_(0.0, 0.3)
     generator = torch.Generator().manual_seed(1)
-    ratios = (torch.rand(64, generator=generator) + 0.5).tolist()
-    batch = batch_with_ratio(ppo.actor, ratios, torch.randn(64, generator=generator).tolist())
+    ratios = (torch.rand(rows, generator=generator) + 0.5).tolist()
+    batch = batch_with_ratio(ppo.actor, ratios, torch.randn(rows, generator=generator).tolist())
     flat = ppo._optimizer
 
     reference = AutogradPpo(ppo.actor, ppo.critic, 0.2, 0.01)(batch)
     expected = flat.gradients.clone()
     flat.gradients.fill_(float("nan"))
-    written = WrittenPpo(ppo.actor, ppo.critic, 0.2, 0.01, 64)(batch)
+    written = WrittenPpo(ppo.actor, ppo.critic, 0.2, 0.01)(batch)
 
     assert torch.allclose(written.float(), reference, rtol=1e-4, atol=1e-6)
     assert expected.abs().max() > 0.01

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.replay import Transitions
-from workers.backward import Backward, backward_of
+from workers.backward import TensorBackward, backward_of
 from workers.networks import Body, DeterministicActor, bound_actions
 
 
@@ -47,7 +47,7 @@ def differentiate_critics(
 
 
 @torch.no_grad()
-def write_critic_gradients(critics: Sequence[Backward], batch: Transitions, targets: Tensor) -> Tensor:
+def write_critic_gradients(critics: Sequence[TensorBackward], batch: Transitions, targets: Tensor) -> Tensor:
     """The same, written out."""
     inputs = torch.cat((batch.observations, batch.actions), dim=1)
     loss = torch.zeros((), device=targets.device)
@@ -86,12 +86,12 @@ class AutogradActorCritic:
 
 
 class WrittenActorCritic:
-    """The same gradients without autograd; a test compares them with `AutogradActorCritic`'s."""
+    """The same gradients without autograd, on a CPU; a test compares them with `AutogradActorCritic`'s."""
 
     def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int, logit_penalty: float) -> None:
         self._penalty = logit_penalty
-        self._actor = backward_of(actor.network, batch_size)
-        self._critics = [backward_of(critic, batch_size) for critic in critics]
+        self._actor = TensorBackward(backward_of(actor.network, batch_size))
+        self._critics = [TensorBackward(backward_of(critic, batch_size)) for critic in critics]
 
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `ActorCriticGradients.critics`."""
@@ -113,3 +113,17 @@ class WrittenActorCritic:
             by_logits.add_(logits, alpha=2.0 * self._penalty / rows)
         self._actor.backward(by_logits)
         return -values.mean()
+
+
+def fastest_gradients(
+    actor: DeterministicActor,
+    critics: Sequence[Body],
+    actor_parameters: FlatParameters,
+    critic_parameters: FlatParameters,
+    batch_size: int,
+    logit_penalty: float,
+) -> ActorCriticGradients:
+    """Written out on a CPU; by autograd elsewhere."""
+    if actor_parameters.values.device.type == "cpu":
+        return WrittenActorCritic(actor, critics, batch_size, logit_penalty)
+    return AutogradActorCritic(actor, critics, actor_parameters, critic_parameters, logit_penalty)

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.algorithms.actor_critic_gradients import ActorCriticGradients, WrittenActorCritic, action_value
+from workers.algorithms.actor_critic_gradients import ActorCriticGradients, action_value, fastest_gradients
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
 from workers.algorithms.replay import Transitions
@@ -45,7 +45,9 @@ class NoisyPolicy(OffPolicyAlgorithm):
             observation_size=actor.observation_size,
             generator=generator,
         )
-        self.gradients: ActorCriticGradients = WrittenActorCritic(actor, critics, config.batch_size, config.logit_penalty)
+        self.gradients: ActorCriticGradients = fastest_gradients(
+            actor, critics, self.actor_optimizer, self.critic_optimizer, config.batch_size, config.logit_penalty
+        )
         self._noise = config.exploration_noise
         self._half_range = ACTION_HALF_RANGE.to(generator.device)
 

@@ -126,7 +126,8 @@ class Ppo:
         steps, robots, final_observations = storage.truncations()
         if steps.size:
             rewards[steps, robots] += np.float32(config.gamma) * self.critic(final_observations)[:, 0].cpu().numpy()
-        values = self.critic(storage.observations.flatten(0, 1)).view(storage.steps + 1, storage.robots)
+        # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
+        values = torch.stack([self.critic(observations)[:, 0] for observations in storage.observations])
         advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.ends, config.gamma, config.gae_lambda)
         return values, torch.from_numpy(advantages).to(storage.device)
 
@@ -158,7 +159,7 @@ class Ppo:
 def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: Body) -> PpoGradients:
     """Written out on a CPU; by autograd elsewhere."""
     if actor.log_std.device.type == "cpu":
-        return WrittenPpo(actor, critic, config.clip_range, config.entropy_coefficient, config.minibatch_size)
+        return WrittenPpo(actor, critic, config.clip_range, config.entropy_coefficient)
     return AutogradPpo(actor, critic, config.clip_range, config.entropy_coefficient)
 
 

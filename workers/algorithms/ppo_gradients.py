@@ -16,7 +16,7 @@ from torch import Tensor
 
 from workers.algorithms.ppo_loss import LOG_SQRT_2PI, STATISTICS, differentiate_policy_loss, differentiate_value_loss
 from workers.algorithms.rollout import Minibatch
-from workers.backward import backward_of
+from workers.backward import ROWS, backward_of
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, GaussianActor
 
@@ -72,38 +72,33 @@ class AutogradPpo:
 class WrittenPpo:
     """The same gradients without autograd, on a CPU; a test compares them with `AutogradPpo`'s."""
 
-    def __init__(
-        self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float, batch_size: int
-    ) -> None:
+    def __init__(self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float) -> None:
         log_std = actor.log_std
         assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
         self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
-        self._policy = backward_of(actor.network, batch_size)
-        self._critic = backward_of(critic, batch_size)
-        self._by_logits = log_std.new_empty(batch_size, ACTION_SIZE)
-        self._by_values = log_std.new_empty(batch_size, 1)
+        self._policy, self._critic = backward_of(actor.network, ROWS), backward_of(critic, ROWS)
+        self._by_logits = np.empty((ROWS, ACTION_SIZE), np.float32)
+        self._by_values = np.empty((ROWS, 1), np.float32)
 
-    @torch.no_grad()
     def __call__(self, batch: Minibatch) -> Tensor:
         """See `PpoGradients`."""
-        rows = len(batch.advantages)
-        by_logits, by_values = self._by_logits[:rows], self._by_values[:rows]
-        statistics = np.zeros(STATISTICS)
-        differentiate_policy_loss(
-            self._policy.forward(batch.observations).numpy(),
-            batch.actions.numpy(),
-            batch.log_probs.numpy(),
-            batch.advantages.numpy(),
-            self._log_std,
-            self._clip_range,
-            self._entropy_coefficient,
-            by_logits.numpy(),
-            self._by_log_std,
-            statistics,
-        )
-        self._policy.backward(by_logits)
-        values = self._critic.forward(batch.observations).numpy()
-        differentiate_value_loss(values, batch.returns.numpy(), by_values.numpy(), statistics)
-        self._critic.backward(by_values)
+        observations, actions = batch.observations.numpy(), batch.actions.numpy()
+        log_probs, advantages, returns = batch.log_probs.numpy(), batch.advantages.numpy(), batch.returns.numpy()
+        size = len(observations)
+        statistics, by_log_std = np.zeros(STATISTICS), np.full(ACTION_SIZE, -self._entropy_coefficient)
+        for first in range(0, size, ROWS):
+            some = slice(first, first + ROWS)
+            inputs, add = observations[some], first > 0
+            by_logits, by_values = self._by_logits[: len(inputs)], self._by_values[: len(inputs)]
+            logits = self._policy.forward(inputs)
+            differentiate_policy_loss(
+                logits, actions[some], log_probs[some], advantages[some], self._log_std, self._clip_range, 1.0 / size,
+                by_logits, by_log_std, statistics,
+            )  # fmt: skip
+            self._policy.backward(by_logits, add=add)
+            values = self._critic.forward(inputs)
+            differentiate_value_loss(values, returns[some], 1.0 / size, by_values, statistics)
+            self._critic.backward(by_values, add=add)
+        self._by_log_std[:] = by_log_std
         return torch.from_numpy(statistics)

@@ -1,6 +1,6 @@
-"""PPO's losses and their derivatives by the networks' outputs, in one compiled pass over a minibatch.
+"""PPO's losses and their derivatives by the networks' outputs, in one compiled pass over samples of a minibatch.
 
-A minibatch is so small that some thirty tensor operations cost more in calls than in arithmetic. `ppo_gradients` has the
+These are so few that some thirty tensor operations cost more in calls than in arithmetic. `ppo_gradients` has the
 formulas, and the reference by autograd that a test compares this with.
 """
 
@@ -18,9 +18,9 @@ STATISTICS = 4
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def differentiate_policy_loss(
-    logits, actions, log_probs, advantages, log_std, clip_range, entropy_coefficient, by_logits, by_log_std, statistics
+    logits, actions, log_probs, advantages, log_std, clip_range, share, by_logits, by_log_std, statistics
 ):
-    """The clipped surrogate (Schulman et al. 2017, Eq. 7), less the entropy bonus of Eq. 9.
+    """The clipped surrogate (Schulman et al. 2017, Eq. 7) of some of a minibatch's samples.
 
     Args:
         logits: (n, 2) the actor's network's outputs, before the sigmoid and the tanh.
@@ -29,13 +29,13 @@ def differentiate_policy_loss(
         advantages: (n,).
         log_std: (2,).
         clip_range: how far the ratio may go from 1.
-        entropy_coefficient: weight of the entropy bonus.
+        share: what a sample counts: one over the minibatch's size.
         by_logits: (n, 2), written: derivative of the loss by the logits.
-        by_log_std: (2,), written: derivative of the loss by the log deviations.
+        by_log_std: (2,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: all of `STATISTICS` but the value loss.
     """
     rows = logits.shape[0]
-    share = _ONE / np.float32(rows)
+    weight = np.float32(share)
     low, high = np.float32(1.0 - clip_range), np.float32(1.0 + clip_range)
     inverse0, inverse1 = math.exp(-log_std[0]), math.exp(-log_std[1])
     constant = log_std[0] + log_std[1] + np.float32(2.0 * LOG_SQRT_2PI)
@@ -52,7 +52,7 @@ def differentiate_policy_loss(
         surrogate = ratio * advantages[i]
         clipped_surrogate = clipped * advantages[i]
         # min(r A, clip(r) A) is r A, whose derivative by log r is r A, unless clip(r) A is smaller: then it is constant.
-        by_log_prob = np.float32(0.0) if clipped_surrogate < surrogate else -share * surrogate
+        by_log_prob = np.float32(0.0) if clipped_surrogate < surrogate else -weight * surrogate
         sum0 += by_log_prob * (noise0 * noise0 - _ONE)
         sum1 += by_log_prob * (noise1 * noise1 - _ONE)
         # d log p / d mean = noise / std; then through the sigmoid, s (1 - s), and the tanh, 1 - t^2.
@@ -61,36 +61,28 @@ def differentiate_policy_loss(
         loss -= min(surrogate, clipped_surrogate)
         kl += ratio - _ONE - log_ratio
         clips += ratio != clipped
-    by_log_std[0] = sum0 - entropy_coefficient
-    by_log_std[1] = sum1 - entropy_coefficient
-    statistics[0] += loss / rows
-    statistics[2] += kl / rows
-    statistics[3] += clips / rows
+    by_log_std[0] += sum0
+    by_log_std[1] += sum1
+    statistics[0] += share * loss
+    statistics[2] += share * kl
+    statistics[3] += share * clips
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def differentiate_value_loss(values, returns, by_values, statistics):
-    """The mean squared error of Eq. 9.
+def differentiate_value_loss(values, returns, share, by_values, statistics):
+    """The squared error of Eq. 9 of some of a minibatch's samples.
 
     Args:
         values: (n, 1) the critic's outputs.
         returns: (n,) its targets.
+        share: what a sample counts: one over the minibatch's size.
         by_values: (n, 1), written: derivative of the loss by the values.
         statistics: (4,) float64, added to: the value loss.
     """
-    rows = values.shape[0]
-    scale = _TWO / np.float32(rows)
+    scale = _TWO * np.float32(share)
     loss = 0.0
-    for i in range(rows):
+    for i in range(values.shape[0]):
         error = values[i, 0] - returns[i]
         by_values[i, 0] = scale * error
         loss += error * error
-    statistics[1] += loss / rows
-
-
-def load() -> None:
-    """Compiles both functions for a CPU's float32 arrays, or reads them from the cache: seconds before a first update."""
-    table, column, row = np.zeros((1, 2), np.float32), np.zeros((1, 1), np.float32), np.zeros(1, np.float32)
-    statistics = np.zeros(STATISTICS)
-    differentiate_policy_loss(table, table, row, row, table[0], 0.2, 0.0, table.copy(), np.empty(2, np.float32), statistics)
-    differentiate_value_loss(column, row, column.copy(), statistics)
+    statistics[1] += share * loss

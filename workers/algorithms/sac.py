@@ -17,7 +17,7 @@ from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.replay import Transitions
-from workers.algorithms.sac_gradients import SacGradients, WrittenSac, squashed_sample
+from workers.algorithms.sac_gradients import SacGradients, fastest_gradients, squashed_sample
 from workers.config import SacConfig
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, build_network
@@ -62,7 +62,9 @@ class Sac(OffPolicyAlgorithm):
             observation_size=observation_size,
             generator=generator,
         )
-        self.gradients: SacGradients = WrittenSac(actor, critics, config.batch_size)
+        self.gradients: SacGradients = fastest_gradients(
+            actor, critics, self.actor_optimizer, self.critic_optimizer, config.batch_size
+        )
 
     def sample(self, observations: Tensor) -> tuple[Tensor, Tensor]:
         """Actions (n, 2) of observations (n, size), and their log densities (n, 1)."""

@@ -16,7 +16,7 @@ from workers.algorithms.actor_critic_gradients import action_value, differentiat
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.ppo_gradients import log_prob
 from workers.algorithms.replay import Transitions
-from workers.backward import backward_of
+from workers.backward import TensorBackward, backward_of
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, bound_actions
 
@@ -91,11 +91,11 @@ class AutogradSac:
 
 
 class WrittenSac:
-    """The same gradients without autograd; a test compares them with `AutogradSac`'s."""
+    """The same gradients without autograd, on a CPU; a test compares them with `AutogradSac`'s."""
 
     def __init__(self, actor: Body, critics: Sequence[Body], batch_size: int) -> None:
-        self._actor = backward_of(actor, batch_size)
-        self._critics = [backward_of(critic, batch_size) for critic in critics]
+        self._actor = TensorBackward(backward_of(actor, batch_size))
+        self._critics = [TensorBackward(backward_of(critic, batch_size)) for critic in critics]
 
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `SacGradients.critics`."""
@@ -128,3 +128,16 @@ class WrittenSac:
         by_raw = (by_u * spread - weight) * (_HALF * (1.0 - bent.square()))
         self._actor.backward(torch.cat((by_u, by_raw), dim=1))
         return (alpha * log_probs - torch.minimum(first, second)).mean(), log_probs
+
+
+def fastest_gradients(
+    actor: Body,
+    critics: Sequence[Body],
+    actor_parameters: FlatParameters,
+    critic_parameters: FlatParameters,
+    batch_size: int,
+) -> SacGradients:
+    """Written out on a CPU; by autograd elsewhere."""
+    if actor_parameters.values.device.type == "cpu":
+        return WrittenSac(actor, critics, batch_size)
+    return AutogradSac(actor, critics, actor_parameters, critic_parameters)

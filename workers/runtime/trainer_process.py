@@ -132,7 +132,8 @@ def main(descriptor: int, parent: int) -> None:
 
     # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
     from workers.live.viewer import LiveViewer
-    from workers.trainer import train, warm_up
+    from workers.precompile import warm_up
+    from workers.trainer import train
 
     warm_up()
 

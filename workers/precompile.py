@@ -1,0 +1,42 @@
+"""`python -m workers.precompile`: compile everything into the caches beside it, so that no training waits for the compiler.
+
+`make` runs it when the sources have changed; without it the first training on a machine would take a minute more.
+"""
+
+import numpy as np
+import torch
+
+import sim.precompile
+from sim.config import TaskConfig
+from sim.observations import observation_layout
+from sim.suites import run_suite, suite_for
+from sim.vector_env import NavigationVectorEnv
+from workers.algorithms import build_algorithm
+from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
+
+
+def warm_up() -> None:
+    """Loads what a training's first second would be spent on: compiled code, the default suite, PyTorch's lazy imports."""
+    task = TaskConfig()
+    run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
+    NavigationVectorEnv(task, 1, seed=0).reset()
+    networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork())
+    for network in networks:
+        _update_once(PpoConfig(network=network, robots=4, rollout_steps=4, minibatch_size=16, epochs=1), task)
+
+
+def _update_once(config: PpoConfig, task: TaskConfig) -> None:
+    """One update from a rollout in which nothing happens."""
+    size = observation_layout(task).size
+    algorithm = build_algorithm(config, size, 0, torch.device("cpu"))
+    observations, rewards = np.zeros((config.robots, size), np.float32), np.zeros(config.robots, np.float32)
+    nothing = np.zeros(config.robots, np.bool_)
+    for _ in range(algorithm.steps_per_update):
+        algorithm.act(observations)
+        algorithm.record(observations, rewards, nothing, nothing, observations)
+    algorithm.update(0.0)
+
+
+if __name__ == "__main__":
+    sim.precompile.main()
+    warm_up()
