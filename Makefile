@@ -44,7 +44,8 @@ endef
 .venv/.dev: requirements-dev.txt .venv/.run
 	$(call install,requirements-dev.txt)
 
-.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py) workers/dense.py workers/algorithms/ppo_loss.py .venv/.run
+.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py) workers/dense.py \
+    workers/algorithms/adam.py workers/algorithms/ppo_loss.py .venv/.run
 	@echo "Compiling the simulator and the networks' backward passes ..."
 	@$(BIN)/python -m workers.precompile
 	@touch $@

@@ -19,9 +19,15 @@ from workers.networks import Body, Mlp, ResBlock
 Floats = NDArray[np.floating[Any]]
 """Of the parameters' own type."""
 
-ROWS = 128
-"""Rows that go through a network at once: 512 neurons wide they are a quarter of a megabyte, and stay in a core's cache from
-the forward to the backward pass. 64 to 256 are as good (`benchmarks.training_throughput`); 1,024 cost a fifth more."""
+_ELEMENTS = 32_768  # 128 kB
+
+
+def rows_at_once(network: Body) -> int:
+    """Rows that best go through a network at once: a layer's activations stay in a core's cache from forward to backward.
+
+    Half as many or four times as many cost a tenth more, 1,024 rows of 512 a fifth.
+    """
+    return max(_ELEMENTS // max(parameter.shape[0] for parameter in network.parameters()), 1)
 
 
 class Backward(Protocol):

@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch import nn
 
+from workers.algorithms import flat
 from workers.algorithms.flat import FlatAdam, FlatParameters
 
 
@@ -12,9 +13,12 @@ def make_network() -> nn.Sequential:
     return nn.Sequential(nn.Linear(3, 8), nn.Tanh(), nn.Linear(8, 2))
 
 
-def test_adam_steps_as_torchs() -> None:
+@pytest.mark.parametrize("path", ["compiled", "tensors"])
+def test_adam_steps_as_torchs(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ours, theirs = make_network(), make_network()
     adam = FlatAdam(ours, learning_rate=1e-2)
+    if path == "tensors":  # as on any other device than a CPU
+        monkeypatch.setattr(flat, "adam_step", lambda *vectors: adam._step_in_tensors(*vectors[-2:]))
     reference = torch.optim.Adam(theirs.parameters(), lr=1e-2)
     for step in range(50):
         inputs = torch.randn(16, 3, generator=torch.Generator().manual_seed(step))
@@ -30,25 +34,33 @@ def test_adam_steps_as_torchs() -> None:
 def test_values_and_gradients_are_the_modules_own() -> None:
     network = make_network()
     before = [parameter.clone() for parameter in network.parameters()]
-    flat = FlatParameters(network)
+    parameters = FlatParameters(network)
     assert all(torch.equal(a, b) for a, b in zip(before, network.parameters(), strict=True))
-    flat.values.mul_(2.0)
+    parameters.values.mul_(2.0)
     assert all(torch.equal(2.0 * a, b) for a, b in zip(before, network.parameters(), strict=True))
-    flat.differentiate(network(torch.ones(1, 3)).sum())
-    assert torch.equal(flat.gradients[-2:], torch.ones(2))  # the last bias adds to the sum as it is
+    parameters.differentiate(network(torch.ones(1, 3)).sum())
+    assert torch.equal(parameters.gradients[-2:], torch.ones(2))  # the last bias adds to the sum as it is
 
 
 def test_nan_is_seen() -> None:
-    flat = FlatParameters(make_network())
-    assert flat.finite
-    flat.values[5] = float("nan")
-    assert not flat.finite
+    parameters = FlatParameters(make_network())
+    assert parameters.finite
+    parameters.values[5] = float("nan")
+    assert not parameters.finite
+
+
+def test_nan_in_a_gradient_is_not_clipped_away() -> None:
+    adam = FlatAdam(make_network(), learning_rate=1e-2)
+    adam.gradients[5] = float("nan")
+    adam.clip_gradients(0.5)
+    adam.step()
+    assert not adam.finite
 
 
 @pytest.mark.parametrize("norm", [0.1, 10.0])
 def test_clipping_only_ever_shrinks(norm: float) -> None:
-    flat = FlatParameters(nn.Linear(1, 1), nn.Linear(1, 1))
-    flat.gradients.copy_(torch.tensor([3.0, 4.0, 0.3, 0.4]))
-    flat.clip_gradients(norm)
-    for part, length in ((flat.gradients[:2], 5.0), (flat.gradients[2:], 0.5)):
+    parameters = FlatParameters(nn.Linear(1, 1), nn.Linear(1, 1))
+    parameters.gradients.copy_(torch.tensor([3.0, 4.0, 0.3, 0.4]))
+    parameters.clip_gradients(norm)
+    for part, length in ((parameters.gradients[:2], 5.0), (parameters.gradients[2:], 0.5)):
         assert part.norm().item() == pytest.approx(min(norm, length), rel=1e-4)

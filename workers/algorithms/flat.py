@@ -8,8 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-BETA1, BETA2 = 0.9, 0.999
-EPSILON = 1e-8
+from workers.algorithms.adam import BETA1, BETA2, EPSILON, adam_step, clip_norm
 
 
 class FlatParameters:
@@ -46,6 +45,9 @@ class FlatParameters:
     def clip_gradients(self, max_norm: float) -> None:
         """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
         for gradient in self._module_gradients:
+            if gradient.device.type == "cpu":
+                clip_norm(gradient.numpy(), max_norm)
+                continue
             gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
 
 
@@ -61,18 +63,24 @@ class FlatAdam(FlatParameters):
         self._steps = 0
         self._mean = torch.zeros_like(self.values)
         self._square = torch.zeros_like(self.values)
-        self._root = torch.empty_like(self.values)
 
     @torch.no_grad()
     def step(self) -> None:
         """One step against `gradients`."""
         self._steps += 1
-        self._mean.lerp_(self.gradients, 1.0 - BETA1)
-        self._square.mul_(BETA2).addcmul_(self.gradients, self.gradients, value=1.0 - BETA2)
         # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
         correction = math.sqrt(1.0 - BETA2**self._steps)
-        root = torch.sqrt(self._square, out=self._root).add_(correction * EPSILON)
-        self.values.addcdiv_(self._mean, root, value=-self.learning_rate * correction / (1.0 - BETA1**self._steps))
+        rate, epsilon = self.learning_rate * correction / (1.0 - BETA1**self._steps), correction * EPSILON
+        if self.values.device.type == "cpu":
+            values, gradients = self.values.numpy(), self.gradients.numpy()
+            adam_step(values, gradients, self._mean.numpy(), self._square.numpy(), rate, epsilon)
+        else:
+            self._step_in_tensors(rate, epsilon)
+
+    def _step_in_tensors(self, rate: float, epsilon: float) -> None:
+        self._mean.lerp_(self.gradients, 1.0 - BETA1)
+        self._square.mul_(BETA2).addcmul_(self.gradients, self.gradients, value=1.0 - BETA2)
+        self.values.addcdiv_(self._mean, torch.sqrt(self._square).add_(epsilon), value=-rate)
 
     def descend(self, loss: Tensor) -> None:
         """One step against the gradient of a scalar, by autograd."""

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from workers.algorithms.ppo_loss import LOG_SQRT_2PI, STATISTICS, differentiate_policy_loss, differentiate_value_loss
 from workers.algorithms.rollout import Minibatch
-from workers.backward import ROWS, backward_of
+from workers.backward import backward_of, rows_at_once
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, GaussianActor
 
@@ -77,9 +77,10 @@ class WrittenPpo:
         assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
         self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
-        self._policy, self._critic = backward_of(actor.network, ROWS), backward_of(critic, ROWS)
-        self._by_logits = np.empty((ROWS, ACTION_SIZE), np.float32)
-        self._by_values = np.empty((ROWS, 1), np.float32)
+        self._rows = rows = min(rows_at_once(actor.network), rows_at_once(critic))
+        self._policy, self._critic = backward_of(actor.network, rows), backward_of(critic, rows)
+        self._by_logits = np.empty((rows, ACTION_SIZE), np.float32)
+        self._by_values = np.empty((rows, 1), np.float32)
 
     def __call__(self, batch: Minibatch) -> Tensor:
         """See `PpoGradients`."""
@@ -87,8 +88,8 @@ class WrittenPpo:
         log_probs, advantages, returns = batch.log_probs.numpy(), batch.advantages.numpy(), batch.returns.numpy()
         size = len(observations)
         statistics, by_log_std = np.zeros(STATISTICS), np.full(ACTION_SIZE, -self._entropy_coefficient)
-        for first in range(0, size, ROWS):
-            some = slice(first, first + ROWS)
+        for first in range(0, size, self._rows):
+            some = slice(first, first + self._rows)
             inputs, add = observations[some], first > 0
             by_logits, by_values = self._by_logits[: len(inputs)], self._by_values[: len(inputs)]
             logits = self._policy.forward(inputs)

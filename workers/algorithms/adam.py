@@ -1,0 +1,36 @@
+"""Adam and clipping over flat float32 vectors, one compiled pass each; the formulas are in `workers.algorithms.flat`."""
+
+import math
+
+import numba as nb
+import numpy as np
+
+BETA1, BETA2 = 0.9, 0.999
+EPSILON = 1e-8
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def adam_step(values, gradients, mean, square, rate, epsilon):
+    """Update moments and values (n,), given the rate and epsilon that both bias corrections leave."""
+    keep1, keep2 = np.float32(BETA1), np.float32(BETA2)
+    take1, take2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)
+    rate, epsilon = np.float32(rate), np.float32(epsilon)
+    for i in range(values.shape[0]):
+        gradient = gradients[i]
+        mean[i] = keep1 * mean[i] + take1 * gradient
+        square[i] = keep2 * square[i] + take2 * gradient * gradient
+        values[i] -= rate * mean[i] / (math.sqrt(square[i]) + epsilon)
+
+
+# The order of a sum is free, or it would be added up one by one; NaN stays NaN.
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc"})
+def clip_norm(gradients, max_norm):
+    """Scale gradients (n,) to at most this 2-norm."""
+    total = 0.0
+    for i in range(gradients.shape[0]):
+        total += gradients[i] * gradients[i]
+    norm = math.sqrt(total) + 1e-6
+    if not norm <= max_norm:
+        factor = np.float32(max_norm / norm)
+        for i in range(gradients.shape[0]):
+            gradients[i] *= factor
