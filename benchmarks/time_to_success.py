@@ -34,9 +34,9 @@ from workers.policy import torch_policy
 from workers.trainer import REPORT_INTERVAL, Training
 
 TASK = TaskConfig(arena=ArenaConfig(name="complex"))
-STEPS = {"ppo": 1_000_000, "ddpg": 300_000, "td3": 300_000, "sac": 200_000}
-# A second or two of training each.
-EVALUATE_EVERY = {"ppo": 50_000, "ddpg": 20_000, "td3": 20_000, "sac": 20_000}
+STEPS = {"ppo": 1_000_000, "ddpg": 150_000, "td3": 150_000, "sac": 100_000}
+# One to three seconds of training each.
+EVALUATE_EVERY = {"ppo": 50_000, "ddpg": 10_000, "td3": 10_000, "sac": 10_000}
 LEVELS = (0.95, 0.99)
 EPISODES_SEED = 123
 PPO_TARGET_SECONDS = 30.0

@@ -154,7 +154,7 @@ class _DeterministicConfig(OffPolicyConfig):
     )
     final_exploration_noise: float = Field(0.3, ge=0.0, le=2.0, title="Exploration noise, last", json_schema_extra=ADVANCED)
     logit_penalty: float = Field(
-        1e-4,
+        1e-3,
         ge=0.0,
         le=1.0,
         title="Logit penalty",

@@ -1,8 +1,8 @@
 """Deep Deterministic Policy Gradient (Lillicrap et al. 2016, 'Continuous control with deep reinforcement learning').
 
 The lines of its Algorithm 1 are named in `Ddpg.learn`. Different here: noise is uncorrelated and decays (its
-Ornstein-Uhlenbeck process gains nothing on this task), all robots act at once, and the critic sees actions from its
-first layer on.
+Ornstein-Uhlenbeck process gains nothing on this task), all robots act at once, the critic sees actions from its first
+layer on, learning rates may decay, and a penalty keeps the actor's logits small (`actor_critic_gradients`).
 """
 
 import copy

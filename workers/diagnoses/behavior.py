@@ -71,7 +71,8 @@ def actions_saturate(history: History) -> Diagnosis | None:
             Evidence(metric="train/success_rate", value=history.success, expected="rising"),
         ),
         advice=(
-            "Lower the learning rate (of the actor): what has saturated seldom comes back, so start anew.",
+            "Raise the logit penalty (DDPG, TD3), for example to 0.001: it is what brings a saturated actor back.",
+            "Lower the learning rate (of the actor) and start anew: without that penalty saturation seldom ends.",
             "Scale rewards down, or switch return scaling on.",
             "Use less exploration noise if it alone fills the range.",
         ),

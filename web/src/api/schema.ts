@@ -1389,7 +1389,7 @@ export interface components {
             /**
              * Logit penalty
              * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
-             * @default 0.0001
+             * @default 0.001
              */
             logit_penalty: number;
             /**
@@ -1485,7 +1485,7 @@ export interface components {
             /**
              * Logit penalty
              * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
-             * @default 0.0001
+             * @default 0.001
              */
             logit_penalty: number;
             /**
@@ -4032,7 +4032,7 @@ export interface components {
             /**
              * Logit penalty
              * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
-             * @default 0.0001
+             * @default 0.001
              */
             logit_penalty: number;
             /**
@@ -4145,7 +4145,7 @@ export interface components {
             /**
              * Logit penalty
              * @description Keeps the actor from the flat ends of its sigmoid and tanh, where it no longer learns.
-             * @default 0.0001
+             * @default 0.001
              */
             logit_penalty: number;
             /**
