@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sim.arenas import Arena, build_arenas, free_distance
@@ -61,6 +61,7 @@ def test_obstacles_stay_inside_the_walls(family: FamilyName, difficulty: float, 
 
 @settings(max_examples=30, deadline=None)
 @given(families, difficulties, st.floats(5.0, 20.0), st.floats(0.1, 0.45), seeds)
+@example("corridors", 0.0, 5.0, 0.45, 0)  # one street is all that fits
 def test_other_sizes_and_robots_are_served_as_well(
     family: FamilyName, difficulty: float, size: float, clearance: float, seed: int
 ) -> None:

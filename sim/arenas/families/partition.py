@@ -8,6 +8,8 @@ from sim.arenas.families.layout import WALL, Plan
 # Shortest side of a block between corridors and of a room, metres, from easy to hard.
 _BLOCKS = (1.7, 0.9)
 _ROOMS = (3.6, 1.9)
+# Blocks are at most this share of what a street leaves of the floor.
+_SMALL_FLOOR = 0.4
 # A wall longer than this gets a second door in easy plans, metres.
 _LONG_WALL = 5.0
 # Where a cut may lie, as shares of what is possible: never the same grid, never slivers.
@@ -39,7 +41,8 @@ class _Area:
 
 def corridors(plan: Plan) -> None:
     """Streets between solid blocks. Every street runs from one older street (or wall) to another, so all hang together."""
-    smallest = plan.between(*_BLOCKS)
+    # However small the floor, there is a street across it.
+    smallest = min(plan.between(*_BLOCKS), _SMALL_FLOOR * (plan.size - plan.passage))
     waiting = [_Area(-plan.half, -plan.half, plan.half, plan.half)]
     while waiting:
         area = waiting.pop()
