@@ -27,7 +27,7 @@ from sim.sensing_config import OdometryConfig as OdometryConfig
 from sim.sensing_config import RandomisationConfig as RandomisationConfig
 
 ArenaName = Literal["simple", "complex"]
-FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages"]
+FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed"]
 ObservationName = Literal["paper", "improved"]
 
 
@@ -53,7 +53,7 @@ class GeneratedArenaConfig(Frozen):
         "clutter",
         title="Arena",
         description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
-        "warehouse aisles, a maze, or narrow passages.",
+        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed.",
     )
     difficulty: float = Field(
         0.5,

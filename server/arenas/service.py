@@ -24,6 +24,8 @@ _FAMILIES: tuple[tuple[str, FamilyName], ...] = (
     ("Warehouse aisles", "warehouse"),
     ("Maze", "maze"),
     ("Narrow passages", "passages"),
+    ("Thicket of pillars", "thicket"),
+    ("Clutter and thickets", "mixed"),
 )
 _TITLES = {config.name: title for title, config in _FIXED} | {name: title for title, name in _FAMILIES}
 

@@ -41,7 +41,7 @@ def launch(client: TestClient, arena: dict[str, Any]) -> Any:
 def test_the_gallery_shows_what_can_be_trained_on(client: TestClient) -> None:
     arenas = client.get("/api/arenas").json()
     assert [arena["key"] for arena in arenas] == [
-        "simple", "complex", "clutter", "corridors", "rooms", "warehouse", "maze", "passages"
+        "simple", "complex", "clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed"
     ]  # fmt: skip
     for arena in arenas:
         assert launch(client, arena["config"]).status_code == 201
@@ -61,17 +61,18 @@ def test_fixed_and_generated_arenas_are_drawn_as_they_are_trained_on(client: Tes
 
 
 def test_an_upload_is_looked_at_first_and_kept_on_demand(client: TestClient) -> None:
+    before = client.get("/api/arenas").json()
     preview = upload(client).json()
     assert (preview["title"], preview["obstacles"], preview["known"]) == ("Lab", 1, False)
-    assert len(client.get("/api/arenas").json()) == 8
+    assert client.get("/api/arenas").json() == before
     kept = upload(client, keep=True).json()
     assert kept == preview | {"known": True}
-    (arena,) = client.get("/api/arenas").json()[8:]
+    (arena,) = client.get("/api/arenas").json()[len(before) :]
     assert (arena["kind"], arena["title"], arena["config"]) == ("imported", "Lab", kept["config"])
     assert client.get(f"/api/arenas/imported/{arena['key']}").json() == kept
     # The same place again is no second arena.
     upload(client, LAB.replace("Lab", "Other name"), keep=True)
-    assert len(client.get("/api/arenas").json()) == 9
+    assert len(client.get("/api/arenas").json()) == len(before) + 1
 
 
 @pytest.mark.parametrize(

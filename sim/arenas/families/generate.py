@@ -9,8 +9,10 @@ from sim.arenas.cells import CELL, components, free_mask
 from sim.arenas.families.clutter import clutter
 from sim.arenas.families.layout import Plan
 from sim.arenas.families.maze import maze
+from sim.arenas.families.mixed import mixed
 from sim.arenas.families.partition import corridors, rooms
 from sim.arenas.families.passages import passages
+from sim.arenas.families.thicket import thicket
 from sim.arenas.families.warehouse import warehouse
 from sim.arenas.geometry import Arena
 from sim.config import MAX_MAPS, FamilyName
@@ -23,6 +25,8 @@ FAMILIES: Final[dict[FamilyName, Callable[[Plan], None]]] = {
     "warehouse": warehouse,
     "maze": maze,
     "passages": passages,
+    "thicket": thicket,
+    "mixed": mixed,
 }
 
 SIZE = 10.0

@@ -1931,10 +1931,10 @@ export interface components {
             /** Movers */
             movers?: components["schemas"]["MoversConfig-Input"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "passages" | "rooms" | "warehouse";
+            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
             /**
              * Map seed
              * @description Which maps; the suites' maps are never among them.
@@ -1962,10 +1962,10 @@ export interface components {
             /** Movers */
             movers: components["schemas"]["MoversConfig-Output"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, or narrow passages. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "passages" | "rooms" | "warehouse";
+            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
             /**
              * Map seed
              * @description Which maps; the suites' maps are never among them.
@@ -4584,7 +4584,7 @@ export interface operations {
         parameters: {
             query: {
                 difficulty?: number;
-                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages";
+                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages" | "thicket" | "mixed";
                 seed?: number;
             };
             header?: never;

@@ -68,7 +68,7 @@ function ImportedCard({ arena, onDelete }: { arena: ArenaSummary; onDelete: (are
   )
 }
 
-type Family = 'clutter' | 'corridors' | 'rooms' | 'warehouse' | 'maze' | 'passages'
+type Family = 'clutter' | 'corridors' | 'rooms' | 'warehouse' | 'maze' | 'passages' | 'thicket' | 'mixed'
 
 function FamilyCard({ arena }: { arena: ArenaSummary }) {
   const [difficulty, setDifficulty] = useState(0.5)
