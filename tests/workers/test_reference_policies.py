@@ -152,7 +152,10 @@ def test_the_same_recipe_gives_the_same_files(tmp_path: Path) -> None:
     assert one == two
 
 
-@pytest.mark.parametrize(("arguments", "answer"), [([], "name at least one policy"), (["nobody"], "choose one of")])
+@pytest.mark.parametrize(
+    ("arguments", "answer"),
+    [([], "name at least one policy"), (["nobody"], "choose one of"), (["simple", "--seed", "1"], "name a --folder")],
+)
 def test_what_to_build_has_to_be_named(arguments: list[str], answer: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(arguments)

@@ -2,6 +2,7 @@
 
     python -m workers.reference.build NAME ...     # these policies
     python -m workers.reference.build --baselines  # what they are compared with
+    python -m workers.reference.build NAME --seed 1 --folder elsewhere  # what another seed would have made
 
 The same recipe gives the same files on the same machine; another processor rounds otherwise, and trains another policy.
 """
@@ -87,12 +88,14 @@ class BestCheckpoint:
         return False
 
 
-def build(made_from: Recipe, folder: Path = FOLDER) -> Card:
-    """Trains a policy and writes its files into `folder`/NAME, whatever was there before."""
+def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> Card:
+    """Trains a policy, with the recipe's seed or another, and writes its files into `folder`/NAME, whatever was there."""
+    command = f"{_COMMAND} {made_from.name}" if seed is None else f"{_COMMAND} {made_from.name} --seed {seed}"
+    seed = made_from.seed if seed is None else seed
     target = folder / made_from.name
     with TemporaryDirectory() as scratch:
         best = BestCheckpoint()
-        train(made_from.training, made_from.seed, best, Path(scratch))
+        train(made_from.training, seed, best, Path(scratch))
         assert best.archive is not None  # every training ends with an evaluation
         shutil.rmtree(target, ignore_errors=True)
         target.mkdir(parents=True)
@@ -111,9 +114,9 @@ def build(made_from: Recipe, folder: Path = FOLDER) -> Card:
         name=made_from.name,
         title=made_from.title,
         description=made_from.description,
-        command=f"{_COMMAND} {made_from.name}",
+        command=command,
         training=made_from.training,
-        seed=made_from.seed,
+        seed=seed,
         step=best.step,
         results=tuple(results),
     )
@@ -166,7 +169,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # No `choices`: Python 3.11 would look for the empty list among them.
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"Which policies: {known}.")
     parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with.")
+    parser.add_argument("--seed", type=int, help="Train with another seed than the recipe's; needs --folder.")
+    parser.add_argument(
+        "--folder", type=Path, default=FOLDER, help="Where the policies' folders go, if not where they ship."
+    )
     options = parser.parse_args(arguments)
+    if options.seed is not None and options.folder == FOLDER:
+        parser.error("what ships has its recipe's seed: name a --folder for another one")
     try:
         recipes = [recipe(name) for name in options.names]
     except KeyError as error:
@@ -176,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.baselines:
         measure_baselines()
     for made_from in recipes:
-        card = build(made_from)
+        card = build(made_from, options.folder, options.seed)
         for result in card.results:
             found = result.figures
             sys.stdout.write(
