@@ -105,6 +105,20 @@ def test_healthy_default_trainings_are_left_alone(seed: int, tmp_path: Path) -> 
         ),
         ("actions_saturate", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1, "logit_penalty": 0.0}}),
         ("spins", 12_000, {"algorithm": {**SMALL_DDPG, "actor_learning_rate": 0.1, "logit_penalty": 0.0}}),
+        # A target that moves with what learns from it, and steps too large: the deadly triad with nothing against it.
+        (
+            "value_diverges",
+            3_000,
+            {
+                "algorithm": {
+                    **SMALL_DDPG,
+                    "critic_learning_rate": 0.03,
+                    "gamma": 0.99,
+                    "tau": 1.0,
+                    "network": {"name": "resblock"},
+                }
+            },
+        ),
         (
             "success_stuck",
             40_000,
@@ -112,8 +126,11 @@ def test_healthy_default_trainings_are_left_alone(seed: int, tmp_path: Path) -> 
         ),
         (
             "reward_hacked",
-            60_000,
-            {"task": {"reward": {"progress": -500.0, "collision": 0.0}}, "algorithm": {**SMALL_PPO, "learning_rate": 3e-3}},
+            80_000,
+            {
+                "task": {"reward": {"progress": -500.0, "collision": 0.0}},
+                "algorithm": {**SMALL_PPO, "robots": 128, "minibatch_size": 512, "learning_rate": 1e-3},
+            },
         ),
     ],
 )
