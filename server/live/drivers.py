@@ -50,8 +50,8 @@ class PolicyDrivers:
         """
         driver = self._drivers.get(subject)
         if driver is None or driver.ended:
-            if sum(not other.ended for other in self._drivers.values()) >= self._capacity:
-                raise TooManyViewsError(f"{self._capacity} finished policies are watched already: close one of their pages")
+            if (reason := self.refusal(subject)) is not None:
+                raise TooManyViewsError(reason)
             driver = self._drivers[subject] = _Driver(self._hub, subject, save)
         driver.watchers += 1
         try:
@@ -59,6 +59,15 @@ class PolicyDrivers:
         finally:
             driver.watchers -= 1
             asyncio.get_running_loop().call_later(self._linger, self._end_if_unwatched, subject, driver)
+
+    def refusal(self, subject: str) -> str | None:
+        """Why this policy can't drive now, and what to do about it; None where it drives, or has room to."""
+        driver = self._drivers.get(subject)
+        if driver is not None and not driver.ended:
+            return None
+        if sum(not other.ended for other in self._drivers.values()) < self._capacity:
+            return None
+        return f"{self._capacity} finished policies are watched already. Close one of their pages, and this one drives."
 
     async def close(self) -> None:
         """Ends every process."""

@@ -113,20 +113,24 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
 @router.websocket("/live/{run_id}/{theme}/display")
 async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, services: ServicesDep) -> None:
     """The numbers of the head-up display, a few times a second where they change."""
-    if await _found(run_id, services) is None:
+    subject = await _found(run_id, services)
+    if subject is None:
         await websocket.close(_POLICY_VIOLATION)
         return
     await websocket.accept()
-    await until_one_ends(partial(_send_scores, websocket, run_id, theme, services), partial(_wait_for_the_end, websocket))
+    await until_one_ends(partial(_send_scores, websocket, subject, theme, services), partial(_wait_for_the_end, websocket))
 
 
-async def _send_scores(websocket: WebSocket, run_id: str, theme: Theme, services: Services) -> None:
+async def _send_scores(websocket: WebSocket, subject: Watched, theme: Theme, services: Services) -> None:
     told = ""
     while True:
-        score = services.live.score(run_id, theme).model_dump_json()
-        if score != told:
-            await websocket.send_text(score)
-            told = score
+        score = services.live.score(subject.id, theme)
+        if subject.save is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
+            score = score.model_copy(update={"refusal": refusal})
+        text = score.model_dump_json()
+        if text != told:
+            await websocket.send_text(text)
+            told = text
         await asyncio.sleep(_DISPLAY_SECONDS)
 
 

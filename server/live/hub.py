@@ -226,6 +226,8 @@ class LiveHub:
         screen = channel.screens.get(theme)
         if screen is None or screen.view is None:
             score = Score(state="waiting" if channel.connected else "no worker")
+            if self._open_scenes >= self._capacity:
+                score = score.model_copy(update={"refusal": self._full})
         else:
             score = screen.view.score()
         return score.model_copy(update={"after_training": channel.driver is not None and not channel.callbacks})
@@ -239,6 +241,10 @@ class LiveHub:
             await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---------------------------------------------------------------------------------------------------------------------
+
+    @property
+    def _full(self) -> str:
+        return f"{self._capacity} live views are open already. Close one of their pages, and this one opens."
 
     def _channel(self, run_id: str) -> _Channel:
         return self._channels.setdefault(run_id, _Channel())
@@ -264,7 +270,7 @@ class LiveHub:
         async with screen.lock:
             if screen.view is None:
                 if self._open_scenes >= self._capacity:
-                    raise TooManyViewsError(f"{self._capacity} live views are open already: close one of their pages")
+                    raise TooManyViewsError(self._full)
                 self._open_scenes += 1
                 try:
                     screen.view = await asyncio.to_thread(self._view_factory, task, theme, channel.settings)

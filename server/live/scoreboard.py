@@ -33,6 +33,7 @@ class Score(BaseModel):
         speed: simulated seconds per wall second.
         arrivals, collisions, timeouts: attempts of the robots on screen that ended since the view began.
         robots: the first few, or the one that is followed.
+        refusal: why nothing can be shown for now, and what to do about it.
     """
 
     state: ViewState = "waiting"
@@ -44,6 +45,7 @@ class Score(BaseModel):
     collisions: int = 0
     timeouts: int = 0
     robots: list[RobotLine] = []
+    refusal: str | None = None
 
 
 class Scoreboard:

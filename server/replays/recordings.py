@@ -6,6 +6,7 @@ from threading import Lock
 
 from server.errors import ReplayFailedError, ReplayTimeoutError
 from server.processes import ProcessFailedError, ProcessTimeoutError, run_module
+from server.replays.simulator import simulator
 from server.replays.subject import Subject
 from workers.replays.recording import Recording
 
@@ -20,11 +21,13 @@ class RecordingStore:
     Args:
         directory: may be removed at any time; it is made where it is missing.
         max_bytes: the recordings that were looked at longest ago go first.
+        simulator: names what drives now; recordings of another one are not shown any more, and go in their time.
     """
 
-    def __init__(self, directory: Path, max_bytes: int) -> None:
+    def __init__(self, directory: Path, max_bytes: int, simulator: str | None = None) -> None:
         self._directory = directory
         self._max_bytes = max_bytes
+        self._simulator = simulator
         self._making = Lock()
 
     def get(self, subject: Subject) -> Recording:
@@ -34,7 +37,7 @@ class RecordingStore:
             ReplayFailedError: its archive is refused, or the suite is no longer what it was.
             ReplayTimeoutError: it took too long.
         """
-        path = self._directory / f"{subject.sha256[:32]}-{subject.recorded.suite_hash[:16]}{_SUFFIX}"
+        path = self._path(subject)
         recording = _load(path)
         if recording is None:
             with self._making:
@@ -45,6 +48,10 @@ class RecordingStore:
                 f"The suite {subject.recorded.suite} has changed since this evaluation: its episodes can't be driven again."
             )
         return recording
+
+    def _path(self, subject: Subject) -> Path:
+        by = self._simulator or simulator()
+        return self._directory / f"{subject.sha256[:32]}-{subject.recorded.suite_hash[:16]}-{by}{_SUFFIX}"
 
     def _make(self, subject: Subject, path: Path) -> Recording:
         self._directory.mkdir(parents=True, exist_ok=True)

@@ -175,7 +175,7 @@ def test_there_are_only_so_many_scenes() -> None:
     async def scenario() -> None:
         hub = LiveHub(LiveView, linger=0.0, capacity=1)
         async with hub.watch("one", TaskConfig()):
-            with pytest.raises(TooManyViewsError, match="close one"):
+            with pytest.raises(TooManyViewsError, match="Close one"):
                 async with hub.watch("two", TaskConfig()):
                     raise AssertionError("opened")
             assert hub.watch_request("two") is None

@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from server.checkpoints.repository import CheckpointRepository
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub, TooManyViewsError
+from server.live.view import LiveView
 from server.services import Services
 from tests.server.harness import Reports
 from tests.server.test_live import Asked, connect, make_frame, receive_until, refused
@@ -150,6 +151,17 @@ def test_a_linked_worker_is_shown_instead() -> None:
     asyncio.run(scenario())
 
 
+def test_who_finds_no_place_reads_why_in_the_picture(client: TestClient, services: Services) -> None:
+    services.drivers = PolicyDrivers(services.live, capacity=0)
+    assert refused(client, "/live/policy-simple/light")
+    with connect(client, "/live/policy-simple/light/display") as display:
+        assert "Close one of their pages" in display.receive_json()["refusal"]
+    services.live = LiveHub(LiveView, capacity=0)
+    services.drivers = PolicyDrivers(services.live)
+    with connect(client, "/live/policy-simple/light/display") as display:
+        assert "live views are open already" in display.receive_json()["refusal"]
+
+
 def test_only_so_many_drive_at_the_same_time() -> None:
     async def scenario() -> None:
         drivers = PolicyDrivers(LiveHub(lambda *_: None), capacity=1)  # type: ignore[arg-type]
@@ -160,7 +172,8 @@ def test_only_so_many_drive_at_the_same_time() -> None:
 
         async with drivers.driving("one", lambda path: path.touch()):
             await watch("one")
-            with pytest.raises(TooManyViewsError, match="close one of their pages"):
+            assert drivers.refusal("one") is None
+            with pytest.raises(TooManyViewsError, match="Close one of their pages"):
                 await watch("two")
         await drivers.close()
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import dataclasses
 import os
 import re
 import time
@@ -16,6 +17,7 @@ from fastapi.testclient import TestClient
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
 from server.replays.recordings import RecordingStore
+from server.replays.subjects import policy_subject
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN
@@ -110,6 +112,20 @@ def test_a_reference_policy_is_replayed_too(client: TestClient) -> None:
     assert download.headers["content-disposition"] == 'attachment; filename="mapless-complex-episode199.html"'
     assert "darkMode:false" in download.text
     assert 'data-theme="light"' in download.text
+
+
+def test_what_another_simulator_drove_is_driven_again(client: TestClient, kept: Path) -> None:
+    assert client.get("/api/policies/complex/suites/complex-200/replays/0").status_code == 200
+
+    class DrivenAgain(Exception): ...
+
+    def save(_: Path) -> None:
+        raise DrivenAgain
+
+    subject = dataclasses.replace(policy_subject("complex", "complex-200"), save=save)
+    RecordingStore(kept, max_bytes=1).get(subject)
+    with pytest.raises(DrivenAgain):
+        RecordingStore(kept, max_bytes=1, simulator="another").get(subject)
 
 
 def test_what_ended_otherwise_than_recorded_says_so(client: TestClient, services: Services) -> None:

@@ -49,7 +49,8 @@ addEventListener("DOMContentLoaded", () => {
         parts.push(list);
       }
     } else {
-      parts.push(element("div", "waiting", score.after_training ? "Starting the best policy …" : waiting[score.state]));
+      const starting = score.after_training ? "Starting the best policy …" : waiting[score.state];
+      parts.push(element("div", "waiting", score.refusal ?? starting));
     }
     display.dataset.state = score.state;
     display.replaceChildren(...parts);
