@@ -33,10 +33,12 @@ interface RunLiveViewProps {
   state: RunState
   /** Whether there is a policy to drive once the training is over; undefined while that is not known. */
   kept: boolean | undefined
+  /** Whether something else in 3D lies over the page: two pictures at once would share one machine. */
+  covered: boolean
 }
 
-export function RunLiveView({ runId, state, kept }: RunLiveViewProps) {
-  const watching = useWatching()
+export function RunLiveView({ runId, state, kept, covered }: RunLiveViewProps) {
+  const watching = useWatching() && !covered
   const training = state === 'running' || state === 'stopping'
   const driven = !training && state !== 'queued' && kept === true
   const shown = training || driven
@@ -55,8 +57,8 @@ export function RunLiveView({ runId, state, kept }: RunLiveViewProps) {
   )
 }
 
-export function PolicyLiveView({ name }: { name: string }) {
-  const watching = useWatching()
+export function PolicyLiveView({ name, covered }: { name: string; covered: boolean }) {
+  const watching = useWatching() && !covered
   const { live, change } = usePolicyLive(name, watching)
   return (
     <LiveView

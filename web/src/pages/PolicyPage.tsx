@@ -11,7 +11,7 @@ import { PolicyResults } from '../components/PolicyResults'
 import { Page, Panel, QueryError } from '../components/ui'
 import { summaryOf } from '../lib/experiments'
 import { count } from '../lib/format'
-import { useTitle } from '../lib/hooks'
+import { useNumberInAddress, useTitle } from '../lib/hooks'
 import classes from './PolicyPage.module.css'
 
 export function PolicyPage() {
@@ -37,6 +37,7 @@ export function PolicyPage() {
 }
 
 function LoadedPolicy({ policy }: { policy: ReferencePolicy }) {
+  const [episode] = useNumberInAddress('episode')
   return (
     <Page
       title={policy.title}
@@ -59,7 +60,7 @@ function LoadedPolicy({ policy }: { policy: ReferencePolicy }) {
       <Stack gap="md">
         <div className={classes.stage}>
           <Panel flush>
-            <PolicyLiveView name={policy.name} />
+            <PolicyLiveView name={policy.name} covered={episode !== null} />
           </Panel>
           <Panel title="How it was made">
             <dl className={classes.facts}>

@@ -86,8 +86,11 @@ test('an episode is replayed; its address can be passed on', async () => {
     'href',
     '/replays/checkpoints/cp2/1/light/?download',
   )
+  // Two pictures at once would share one machine.
+  expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
   await user.keyboard('{Escape}')
   await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(screen.getByTitle('The robots in 3D')).toBeInTheDocument()
   expect(router.state.location.search).toBe('')
 })
 

@@ -65,6 +65,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
   const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', init)
   const events = $api.useQuery('get', '/api/runs/{run_id}/events', init)
   const [step, setStep] = useNumberInAddress('step')
+  const [episode] = useNumberInAddress('episode')
   const episodes = useRef<HTMLDivElement>(null)
   const chosen = chosenOf(checkpoints.data ?? [], step)
   const choose = (checkpoint: Checkpoint) => {
@@ -112,6 +113,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
               runId={run.id}
               state={run.state}
               kept={checkpoints.data && checkpoints.data.length > 0}
+              covered={episode !== null && chosen?.evaluation != null}
             />
           </Panel>
           <Panel data-testid="main-curves">
