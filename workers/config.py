@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from sim.config import ADVANCED, Frozen, TaskConfig
 from sim.schema import HIDDEN
@@ -60,7 +60,7 @@ class PpoConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     epochs: int = Field(6, ge=1, le=50, title="Epochs", description="Passes over each rollout.", json_schema_extra=ADVANCED)
-    minibatch_size: int = Field(1024, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED)
+    minibatch_size: int = Field(1024, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED, validate_default=True)
     learning_rate: float = Field(1e-3, gt=0.0, le=0.1, title="Learning rate", json_schema_extra=ADVANCED)
     learning_rate_schedule: Literal["linear", "constant"] = Field(
         "linear", title="Learning-rate schedule", description="Linear decays to zero.", json_schema_extra=ADVANCED
@@ -83,14 +83,16 @@ class PpoConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
 
-    @model_validator(mode="after")
-    def _minibatch_fits(self) -> "PpoConfig":
-        if self.minibatch_size > self.robots * self.rollout_steps:
+    @field_validator("minibatch_size")
+    @classmethod
+    def _fits_into_a_rollout(cls, value: int, info: ValidationInfo) -> int:
+        robots, steps = info.data.get("robots"), info.data.get("rollout_steps")
+        if robots is not None and steps is not None and value > robots * steps:
             raise ValueError(
-                f"minibatch_size {self.minibatch_size} is larger than a rollout of {self.robots} robots x "
-                f"{self.rollout_steps} steps: lower it, or take more robots or a longer rollout"
+                f"at most {robots * steps} here, which is a whole rollout ({robots} robots x {steps} steps): "
+                "lower it, or take more robots or a longer rollout"
             )
-        return self
+        return value
 
 
 class OffPolicyConfig(Frozen):

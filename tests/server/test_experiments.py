@@ -84,6 +84,10 @@ def test_launching_queues_one_run_a_seed_and_rings_for_each(
         ({"seeds": [0, -1]}, ["body", "seeds", 1]),
         ({"training": {"steps": 10}}, ["body", "training", "steps"]),
         ({"training": {"algorithm": {"name": "ppo", "gamma": 1.5}}}, ["body", "training", "algorithm", "ppo", "gamma"]),
+        (
+            {"training": {"algorithm": {"name": "ppo", "robots": 8}}},
+            ["body", "training", "algorithm", "ppo", "minibatch_size"],
+        ),
         ({"training": {"task": {"lidar": {"batches": 7}}}}, ["body", "training", "task", "lidar"]),
         ({"surprise": 1}, ["body", "surprise"]),
     ],
@@ -94,6 +98,14 @@ def test_a_wrong_value_is_refused_next_to_its_field(client: TestClient, body: di
     assert response.status_code == 422
     assert [problem["loc"] for problem in response.json()["detail"]] == [loc]
     assert client.get("/api/experiments").json()["total"] == 0
+
+
+def test_a_minibatch_that_does_not_fit_is_answered_with_what_does(client: TestClient) -> None:
+    algorithm = {"name": "ppo", "robots": 8, "rollout_steps": 32}
+    response = client.post("/api/experiments", json={"training": {"algorithm": algorithm}})
+    assert "at most 256 here" in response.json()["detail"][0]["msg"]
+    fitting = {"training": {"algorithm": algorithm | {"minibatch_size": 256}}}
+    assert client.post("/api/experiments", json=fitting).status_code == 201
 
 
 def test_infinite_and_missing_numbers_are_refused(client: TestClient) -> None:
