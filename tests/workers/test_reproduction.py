@@ -202,10 +202,13 @@ def test_bins_average_and_bridge_gaps_only_between_points() -> None:
     edges = np.array([0.0, 10, 20, 30, 40, 50])
     curve = binned([12, 18, 35, 99], [1.0, 3.0, 6.0, 9.0], edges)
     np.testing.assert_allclose(curve, [np.nan, 2.0, 4.0, 6.0, np.nan])
+
+
+def test_the_mean_is_over_all_seeds_or_not_there() -> None:
     mean, low, high = band(np.array([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]]))
-    np.testing.assert_allclose(mean, [2.0, 5.0, np.nan])
+    np.testing.assert_allclose(mean, [2.0, np.nan, np.nan])
     # Two seeds, one degree of freedom: 12.706 x sqrt(2) / sqrt(2).
-    np.testing.assert_allclose(high - mean, [12.706, 0.0, np.nan], atol=1e-3)
+    np.testing.assert_allclose(high - mean, [12.706, np.nan, np.nan], atol=1e-3)
     np.testing.assert_allclose(mean - low, high - mean)
 
 

@@ -33,9 +33,9 @@ def band(curves: Floats) -> tuple[Floats, Floats, Floats]:
         curves: (seeds, points); nan where a seed has no value.
 
     Returns:
-        mean, low and high, (points,) each; nan where no seed has a value.
+        mean, low and high, (points,) each; nan where a seed has no value: a mean over fewer seeds would jump, up where the
+        worst is missing, as a seed is whose robots end no attempt any more.
     """
-    columns = [column[np.isfinite(column)] for column in curves.T]
-    intervals = [mean_interval(column.tolist()) if column.size else (np.nan,) * 3 for column in columns]
+    intervals = [mean_interval(column.tolist()) if np.isfinite(column).all() else (np.nan,) * 3 for column in curves.T]
     mean, low, high = np.array(intervals, np.float64).reshape(-1, 3).T
     return mean, low, high

@@ -131,12 +131,14 @@ def _curve(color: str, steps: Floats, values: Floats, scale: _Scale) -> list[str
     there = np.flatnonzero(np.isfinite(mean))
     there_and_back = np.concatenate([there, there[::-1]])
     edge = np.concatenate([high[there], low[there[::-1]]])
-    parts = [f'<path class="band {color}" d="{_path(steps[there_and_back], edge, scale)}Z"/>']
+    parts = [f'<path class="band {color}" d="{_path(steps[there_and_back], edge, scale)}Z"/>'] if there.size else []
     if len(values) > 1:
         for one in values:
             seen = np.isfinite(one)
-            parts.append(f'<path class="seed {color}" d="{_path(steps[seen], one[seen], scale)}"/>')
-    parts.append(f'<path class="mean {color}" d="{_path(steps[there], mean[there], scale)}"/>')
+            if seen.any():
+                parts.append(f'<path class="seed {color}" d="{_path(steps[seen], one[seen], scale)}"/>')
+    if there.size:
+        parts.append(f'<path class="mean {color}" d="{_path(steps[there], mean[there], scale)}"/>')
     return parts
 
 
