@@ -1,6 +1,6 @@
 """What a person may do with an experiment."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from sqlalchemy.orm import Session
 
@@ -115,18 +115,31 @@ class ExperimentService:
         Raises:
             NotFoundError: there is none.
         """
+        self._delete(lambda repository: [repository.get(experiment_id)])
+
+    def delete_campaign(self, campaign_id: str) -> None:
+        """`delete` for every experiment of a campaign.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+        """
+        self._delete(lambda repository: repository.campaign(campaign_id))
+
+    def _delete(self, find: Callable[[ExperimentRepository], Sequence[models.Experiment]]) -> None:
         with self._services.database.write() as session:
             repository = ExperimentRepository(session)
-            experiment = repository.get(experiment_id)
-            run_ids = [run.id for run in experiment.runs]
+            experiments = find(repository)
+            run_ids = [run.id for experiment in experiments for run in experiment.runs]
             checkpoint_ids = CheckpointRepository(session).ids(run_ids)
-            repository.delete(experiment)
+            for experiment in experiments:
+                repository.delete(experiment)
         # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
         for checkpoint_id in checkpoint_ids:
             self._services.files.delete(checkpoint_id)
-        self._publish(experiment_id, "deleted")
+        for experiment in experiments:
+            self._publish(experiment.id, "deleted")
 
     def _publish(self, experiment_id: str, kind: str) -> None:
         self._services.bus.publish(Change.model_validate({"experiment_id": experiment_id, "run_id": None, "kind": kind}))

@@ -34,6 +34,12 @@ def launch_reproduction(request: CampaignCreate, service: ReproductionServiceDep
     return service.launch(request)
 
 
+@router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT, responses=NOT_FOUND)
+def delete_reproduction(campaign_id: str, service: ReproductionServiceDep) -> None:
+    """Delete a campaign: its experiments, runs, curves and checkpoints."""
+    service.delete(campaign_id)
+
+
 @router.post("/{campaign_id}/stop", responses=NOT_FOUND | CONFLICT)
 def stop_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Reproduction:
     """End every run of the campaign that has not ended."""

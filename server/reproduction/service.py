@@ -1,4 +1,4 @@
-"""Launches, reads, stops and resumes campaigns."""
+"""Launches, reads, stops, resumes and deletes campaigns."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -10,6 +10,7 @@ from server import models
 from server.errors import ConflictError
 from server.events.bus import Change
 from server.experiments.repository import ExperimentRepository
+from server.experiments.service import ExperimentService
 from server.ids import new_id
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
@@ -106,6 +107,14 @@ class ReproductionService:
         for run in self._move(campaign_id, "resume", resume_run, refusal):
             self._runs.announce_queued(run)
         return self.get(campaign_id)
+
+    def delete(self, campaign_id: str) -> None:
+        """Remove a campaign with everything that it has trained. Workers that still train for it are cut off.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+        """
+        ExperimentService(self._services).delete_campaign(campaign_id)
 
     def _move(
         self, campaign_id: str, occasion: Occasion, move: Callable[[Session, models.Run], None], refusal: str

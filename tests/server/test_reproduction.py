@@ -181,6 +181,15 @@ def test_a_deleted_row_is_missing_and_the_rest_stays(client: TestClient, service
     assert row_of(left, kept["id"])["ours"]["success"] == {"mean": 0.5, "low": None, "high": None}
 
 
+def test_a_deleted_campaign_leaves_nothing_and_others_alone(client: TestClient, reports: Reports) -> None:
+    kept = reports.experiment()
+    campaign = launch(client, seeds=1)["campaign"]["id"]
+    assert client.delete(f"/api/reproduction/{campaign}").status_code == 204
+    assert [experiment["id"] for experiment in client.get("/api/experiments").json()["items"]] == [kept["id"]]
+    assert client.get("/api/reproduction").json()["campaigns"] == []
+    assert client.delete(f"/api/reproduction/{campaign}").status_code == 404
+
+
 def test_what_is_not_there_and_what_cannot_be(client: TestClient) -> None:
     assert client.get("/api/reproduction", params={"campaign": "nothing"}).status_code == 404
     assert client.post("/api/reproduction/nothing/stop").status_code == 404

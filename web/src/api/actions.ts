@@ -44,6 +44,11 @@ export function useActions() {
       '/api/reproduction/{campaign_id}/resume',
       settle('go on with the reproduction'),
     ),
+    deleteReproduction: $api.useMutation(
+      'delete',
+      '/api/reproduction/{campaign_id}',
+      settle('delete the reproduction'),
+    ),
     stopRun: $api.useMutation('post', '/api/runs/{run_id}/stop', settle('stop the run')),
     resumeRun: $api.useMutation('post', '/api/runs/{run_id}/resume', settle('resume the run')),
   }

@@ -1,11 +1,12 @@
 /** What can be done to an experiment: a menu, with the dialogs that it needs. */
-import { ActionIcon, Button, Group, Menu, Modal, Stack, Text, TextInput } from '@mantine/core'
+import { ActionIcon, Button, Group, Menu, Modal, Stack, TextInput } from '@mantine/core'
 import { useDisclosure } from '@mantine/hooks'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useActions } from '../api/actions'
 import type { Experiment } from '../api/types'
 import { plural } from '../lib/format'
+import { DeleteDialog } from './DeleteDialog'
 import { IconCopy, IconDots, IconPencil, IconPlayerPlay, IconPlayerStop, IconTrash } from './icons'
 import { canResume, canStop } from './states'
 
@@ -67,33 +68,23 @@ export function ExperimentMenu({ experiment, onDeleted }: ExperimentMenuProps) {
         }
         busy={actions.renameExperiment.isPending}
       />
-      <Modal opened={deleting} onClose={remove.close} title={`Delete “${name}”?`}>
-        <Stack>
-          <Text size="sm">
-            Its {plural(experiment.runs.length, 'run')}, curves and checkpoints are removed for good. Runs
-            that are going on are ended.
-          </Text>
-          <Group justify="flex-end">
-            <Button variant="default" onClick={remove.close} data-autofocus>
-              Keep
-            </Button>
-            <Button
-              color="red"
-              loading={actions.deleteExperiment.isPending}
-              onClick={() =>
-                actions.deleteExperiment.mutate(of, {
-                  onSuccess: () => {
-                    remove.close()
-                    onDeleted?.()
-                  },
-                })
-              }
-            >
-              Delete
-            </Button>
-          </Group>
-        </Stack>
-      </Modal>
+      <DeleteDialog
+        opened={deleting}
+        what={`“${name}”`}
+        busy={actions.deleteExperiment.isPending}
+        onClose={remove.close}
+        onDelete={() =>
+          actions.deleteExperiment.mutate(of, {
+            onSuccess: () => {
+              remove.close()
+              onDeleted?.()
+            },
+          })
+        }
+      >
+        Its {plural(experiment.runs.length, 'run')}, curves and checkpoints are removed for good. Runs that
+        are going on are ended.
+      </DeleteDialog>
     </>
   )
 }

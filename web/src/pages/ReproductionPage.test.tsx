@@ -114,6 +114,24 @@ test('everything is cancelled with one button, and goes on with one', async () =
   ])
 })
 
+test('a campaign is deleted with everything in it, once that is confirmed', async () => {
+  const server = startServer({
+    ...routes,
+    'DELETE /api/reproduction/camp1': () => {
+      server.routes[ROUTE] = none
+      return new Response(null, { status: 204 })
+    },
+  })
+  const { user } = open('/reproduction?campaign=camp1')
+  await user.click(await screen.findByRole('button', { name: 'Delete this campaign' }))
+  const dialog = await screen.findByRole('dialog', { name: 'Delete this campaign?' })
+  expect(dialog).toHaveTextContent('Its 4 trainings')
+  expect(server.changes).toEqual([])
+  await user.click(within(dialog).getByRole('button', { name: 'Delete' }))
+  expect(await screen.findByTestId('invitation')).toBeInTheDocument()
+  expect(server.changes.map((change) => change.route)).toEqual(['DELETE /api/reproduction/camp1'])
+})
+
 test('a second launch that the server refuses is explained', async () => {
   startServer({
     ...routes,

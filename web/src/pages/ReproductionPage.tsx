@@ -1,12 +1,14 @@
 /** The paper reproduced: one button, its tables beside ours, its figures, and a sentence for each of its claims. */
-import { Button, Group, Select, Skeleton, Stack, Text } from '@mantine/core'
+import { ActionIcon, Button, Group, Select, Skeleton, Stack, Text, Tooltip } from '@mantine/core'
+import { useDisclosure } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useSearchParams } from 'react-router'
 import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Reproduction } from '../api/types'
-import { IconPlayerPlay, IconPlayerStop, IconRocket } from '../components/icons'
+import { DeleteDialog } from '../components/DeleteDialog'
+import { IconPlayerPlay, IconPlayerStop, IconRocket, IconTrash } from '../components/icons'
 import { CampaignState } from '../components/reproduction/CampaignState'
 import { Claims } from '../components/reproduction/Claims'
 import { PaperFigures } from '../components/reproduction/PaperFigures'
@@ -54,6 +56,7 @@ export function ReproductionPage() {
               onChoose={(id) => setSearch({ campaign: id }, { replace: true })}
             />
             <CampaignActions reproduction={data} onLaunched={showNewest} />
+            <DeleteCampaign campaign={data.campaign} rows={data.rows} onDeleted={showNewest} />
           </Group>
         )
       }
@@ -164,6 +167,49 @@ function CampaignActions({
       >
         {campaign.effort < 1 ? 'Reproduce the paper' : 'Reproduce again'}
       </Button>
+    </>
+  )
+}
+
+function DeleteCampaign({
+  campaign,
+  rows,
+  onDeleted,
+}: {
+  campaign: NonNullable<Reproduction['campaign']>
+  rows: Reproduction['rows']
+  onDeleted: () => void
+}) {
+  const { deleteReproduction } = useActions()
+  const [asking, ask] = useDisclosure()
+  const trainings = rows.reduce((sum, row) => sum + row.runs.length, 0)
+  return (
+    <>
+      <Tooltip label="Delete this campaign">
+        <ActionIcon variant="default" size={36} aria-label="Delete this campaign" onClick={ask.open}>
+          <IconTrash size={16} />
+        </ActionIcon>
+      </Tooltip>
+      <DeleteDialog
+        opened={asking}
+        what="this campaign"
+        busy={deleteReproduction.isPending}
+        onClose={ask.close}
+        onDelete={() =>
+          deleteReproduction.mutate(
+            { params: { path: { campaign_id: campaign.id } } },
+            {
+              onSuccess: () => {
+                ask.close()
+                onDeleted()
+              },
+            },
+          )
+        }
+      >
+        Its {plural(trainings, 'training')}, their curves and checkpoints are removed for good. Runs that are
+        going on are ended.
+      </DeleteDialog>
     </>
   )
 }
