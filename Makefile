@@ -3,11 +3,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
+SERVICE_TESTS := tests/browser tests/server tests/services
 .PHONY: help run test check format lock pages types
 
 help:
 	@echo "make run     set up, start the server and its workers, print the address"
-	@echo "make test    all tests (browser tests where Chromium is installed)"
+	@echo "make test    all tests (browser tests where Chromium is installed); ARGS=\"tests/sim -x\" for some"
 	@echo "make check   linters, types, architecture"
 	@echo "make format  format everything"
 	@echo "make lock    compile the hash-pinned requirements anew"
@@ -60,7 +61,15 @@ run: pages .venv/.kernels
 
 test: .venv/.dev pages .venv/.kernels
 	$(BIN)/python web/build.py run test
+ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
+else
+	@# In two halves side by side, one with all that brings processes of its own and keeps time by the clock.
+	@log=$$(mktemp) && trap 'rm -f $$log' EXIT; \
+	$(BIN)/python -m pytest $(SERVICE_TESTS) >$$log 2>&1 & service=$$!; \
+	$(BIN)/python -m pytest $(SERVICE_TESTS:%=--ignore=%); rest=$$?; \
+	wait $$service; service=$$?; cat $$log; exit $$((rest > service ? rest : service))
+endif
 
 check: .venv/.dev pages
 	$(BIN)/ruff format --check .

@@ -58,5 +58,8 @@ def test_no_venv_module(checkout: Path) -> None:
 def test_no_network(checkout: Path) -> None:
     nowhere = "http://127.0.0.1:9/simple"
     offline = {"PIP_INDEX_URL": nowhere, "PIP_RETRIES": "0", "PIP_NO_CACHE_DIR": "1", "PIP_CONFIG_FILE": os.devnull}
-    line = first_refusal(checkout, sys.executable, **offline, PIP_FIND_LINKS="")
+    # An environment that is made at once: a real one takes seconds, and is what these tests run in.
+    environment = "mkdir -p .venv/bin && cp fake-python .venv/bin/python"
+    python = fake_python(checkout, f'[ "$2" = venv ] && {environment} || exec {sys.executable} "$@"')
+    line = first_refusal(checkout, python, **offline, PIP_FIND_LINKS="")
     assert "is there a network? Then run make again" in line

@@ -5,7 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from workers.checkpoints import Checkpoint, read_policy, write_checkpoint
+from workers.manifest import TrainingCounters
+from workers.reference.library import reference_policy
 
 ROOT = Path(__file__).parents[1]
 # What the arena and the README's lines need; versions are those that are locked.
@@ -24,13 +29,14 @@ def clean_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return python
 
 
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The last checkpoint of a short training from the command line, as the README starts it."""
-    directory = tmp_path_factory.mktemp("checkpoints")
-    command = [sys.executable, "-m", "server", "train", "--steps", "60000", "--seed", "1", "--out", str(directory)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    return max(directory.glob("*.zip"), key=lambda path: path.stat().st_mtime_ns)
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    """A policy that was trained well, in an archive as one is written today."""
+    manifest, policy = read_policy(reference_policy("simple").archive)
+    counters = TrainingCounters(step=manifest.step, updates=1, evaluations=1)
+    path = tmp_path / "checkpoint.zip"
+    write_checkpoint(path, Checkpoint(manifest, dict(policy.weights), {"none": np.zeros(1)}, counters))
+    return path
 
 
 def test_a_downloaded_policy_drives_the_arena_with_numpy_alone(clean_python: Path, archive: Path) -> None:
@@ -41,7 +47,7 @@ def test_a_downloaded_policy_drives_the_arena_with_numpy_alone(clean_python: Pat
     assert result.returncode == 0, result.stderr
     arrivals = re.fullmatch(r"(\d+) targets reached in 400 s\n", result.stdout)
     assert arrivals is not None
-    assert int(arrivals.group(1)) >= 10
+    assert int(arrivals.group(1)) >= 15  # 20 s for each
 
 
 def test_the_environment_is_clean(clean_python: Path) -> None:

@@ -47,7 +47,7 @@ def read_url(process: "subprocess.Popen[str]", seconds: float) -> str:
     raise AssertionError(f"mapless up printed no address:\n{seen}")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address, with its login token, of a service with two workers that runs until the last of these tests has ended."""
     data = tmp_path_factory.mktemp("data")
@@ -60,7 +60,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         assert process.wait(10) == 0, "Ctrl-C must end the service cleanly within 10 s"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     """Debian's Chromium, or any that is on the path."""
     executable = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -13,14 +13,17 @@ from itertools import islice
 from pathlib import Path
 
 import httpx
+from typer.testing import CliRunner
+
+from server.cli import app
 
 ROOT = Path(__file__).parents[2]
 
 
-def environment(data: Path, **more: str) -> dict[str, str]:
-    """A clean environment: no settings but these."""
+def environment(data: Path) -> dict[str, str]:
+    """A clean environment: no settings but this."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("MAPLESS_")}
-    return kept | {"MAPLESS_DATA_DIR": str(data)} | more
+    return kept | {"MAPLESS_DATA_DIR": str(data)}
 
 
 @contextmanager
@@ -84,15 +87,9 @@ def test_what_was_launched_is_there_after_a_restart(tmp_path: Path) -> None:
 
 def start_and_fail(data: Path, *arguments: str, **more: str) -> str:
     """The one line with which a start is refused."""
-    result = subprocess.run(
-        [sys.executable, "-m", "server", "serve", *arguments],
-        cwd=ROOT,
-        env=environment(data, **more),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert result.returncode == 1
+    others = {name: None for name in os.environ if name.startswith("MAPLESS_")}
+    result = CliRunner().invoke(app, ["serve", *arguments], env={**others, "MAPLESS_DATA_DIR": str(data), **more})
+    assert result.exit_code == 1
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
     return line

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 TOKEN = "a-login-token-for-tests"
 WORKER_TOKEN = "a-worker-token-for-tests"
 # A short lease, so that what is lost is missed soon.
-LEASE_SECONDS = 4
+LEASE_SECONDS = 3
 # Far more than anything here takes; compiling the simulation's kernels anew, on a fresh checkout, takes a minute.
 PATIENCE = 150.0
 # Environment steps between two updates of the default training.

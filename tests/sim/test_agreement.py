@@ -104,7 +104,7 @@ def test_collision_flags_are_those_of_chipmunk(arena: Arena, seed: int) -> None:
     task = TaskConfig(collision_distance=0.0, step_limit=10)
     rng = np.random.default_rng(seed)
     half = np.array([arena.half_width, arena.half_height])
-    positions = rng.uniform(-half, half, (400, 2))
+    positions = rng.uniform(-half, half, (100, 2))
     positions = positions[free_distance(arena, positions) > task.robot.inscribed_radius + 1e-4]
     assume(len(positions) > 0)
     poses = np.column_stack([positions, rng.uniform(-np.pi, np.pi, len(positions))])

@@ -120,7 +120,7 @@ def test_a_mover_without_room_stays_out() -> None:
     assert np.isfinite(world.robots.observations).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_rays_and_collisions_are_those_of_chipmunk(seed: int) -> None:
     arena = crowded_arena(seed)
@@ -188,7 +188,7 @@ def test_a_collision_with_a_mover_worked_by_hand() -> None:
     assert touched == [2]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_a_rectangular_body_meets_movers_as_chipmunk_says(seed: int) -> None:
     task = TaskConfig(robot=JackalConfig(), collision_distance=0.0)

@@ -82,7 +82,7 @@ def test_a_round_body_is_a_point_with_a_radius(arena: Arena, seed: int) -> None:
 def test_collisions_of_a_driving_rectangle_are_those_of_chipmunk(arena: Arena, seed: int) -> None:
     robot = RectangularConfig(length=0.6, width=0.3, max_linear_speed=0.3, max_angular_speed=0.3)
     task = TaskConfig(robot=robot, collision_distance=0.0, step_limit=10)
-    poses = random_poses(arena, seed, 200)
+    poses = random_poses(arena, seed, 60)
     poses = poses[body_clearances(arena, poses, robot) > TOLERANCE]
     if not len(poses):
         return

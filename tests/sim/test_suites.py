@@ -1,5 +1,6 @@
 """Frozen suites, shortest paths, driving side by side, baselines."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -164,9 +165,14 @@ def test_the_baselines_are_far_from_solving_complex() -> None:
     assert (run_suite(random_policy(), COMPLEX, suite).outcomes == 1).mean() < 0.1
 
 
+def every_fourth(suite: Suite) -> Suite:
+    """Enough scenarios for a slow controller."""
+    part = {name: getattr(suite, name)[::4] for name in ("arena_indices", "starts", "targets", "shortest_paths")}
+    return dataclasses.replace(suite, **part)
+
+
 def test_the_dynamic_window_touches_nothing_and_beats_the_blind() -> None:
-    suite = load_suite("complex-200")
-    table = run_controller(dynamic_window(COMPLEX), COMPLEX, suite)
+    table = run_controller(dynamic_window(COMPLEX), COMPLEX, every_fourth(load_suite("complex-200")))
     assert not (table.outcomes == 2).any()
     assert (table.outcomes == 1).mean() > 0.95
     assert table.min_clearances.min() > 0.0
