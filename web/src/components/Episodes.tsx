@@ -45,7 +45,7 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
           {filter === 'all' ? 'Failures first, then the narrowest.' : 'The narrowest first.'}
         </Text>
       </Group>
-      <Table.ScrollContainer type="native" minWidth={520} mah={420}>
+      <Table.ScrollContainer type="native" minWidth={340} mah={420}>
         <Table highlightOnHover className={table.table}>
           <Table.Thead>
             <Table.Tr>
@@ -54,9 +54,15 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
               </Table.Th>
               <Table.Th>Outcome</Table.Th>
               <Table.Th ta="right">Steps</Table.Th>
-              <Table.Th ta="right">Path</Table.Th>
-              <Table.Th ta="right">Of the shortest</Table.Th>
-              <Table.Th ta="right">Clearance</Table.Th>
+              <Table.Th ta="right" visibleFrom="sm">
+                Path
+              </Table.Th>
+              <Table.Th ta="right" visibleFrom="sm">
+                Of the shortest
+              </Table.Th>
+              <Table.Th ta="right" visibleFrom="sm">
+                Clearance
+              </Table.Th>
               <Table.Th w={120} aria-label="Replay" />
             </Table.Tr>
           </Table.Thead>
@@ -72,15 +78,16 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
                 <Table.Td ta="right" className={ui.number}>
                   {count(episode.steps)}
                 </Table.Td>
-                <Table.Td ta="right" className={ui.number}>
+                <Table.Td ta="right" className={ui.number} visibleFrom="sm">
                   {episode.path_length.toFixed(1)} m
                 </Table.Td>
-                <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`}>
+                <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`} visibleFrom="sm">
                   {factor(detour(episode))}
                 </Table.Td>
                 <Table.Td
                   ta="right"
                   className={ui.number}
+                  visibleFrom="sm"
                   title="Smallest distance between the body and anything"
                 >
                   {episode.min_clearance.toFixed(2)} m

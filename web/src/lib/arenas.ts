@@ -10,8 +10,10 @@ export function arenaFacts({ geometry, obstacles, free_share }: ArenaView): stri
     `${significant(width)} × ${significant(height)} m`,
     obstacles === 0 ? 'no obstacles' : plural(obstacles, 'obstacle'),
     ...(geometry.movers.length > 0 ? [`${geometry.movers.length} moving`] : []),
-    `${Math.round(100 * free_share)}\u00a0%\u00a0free`,
-  ].join(' · ')
+    `${Math.round(100 * free_share)} % free`,
+  ]
+    .map((fact) => fact.replaceAll(' ', '\u00a0'))
+    .join('\u00a0· ')
 }
 
 /** The address of a launch form with this arena. */

@@ -155,5 +155,7 @@ test('an arena is deleted after a question, and a refusal is told', async () => 
 })
 
 test('facts are short', () => {
-  expect(arenaFacts({ ...LAB, obstacles: 0 })).toBe('8 × 6 m · no obstacles · 82\u00a0%\u00a0free')
+  expect(arenaFacts({ ...LAB, obstacles: 0 })).toBe(
+    '8\u00a0×\u00a06\u00a0m\u00a0· no\u00a0obstacles\u00a0· 82\u00a0%\u00a0free',
+  )
 })
