@@ -1,4 +1,7 @@
-"""The robots that can be driven: their bodies and limits, from data sheets (pydantic only)."""
+"""The robots that can be driven: their bodies and limits, and where these come from (pydantic only).
+
+Sources are public repositories of the makers on GitHub, as `owner/repository: file`.
+"""
 
 import math
 from typing import Annotated, Any, Literal
@@ -120,15 +123,22 @@ class RectangularRobot(_Drive):
 class BurgerConfig(DiscRobot):
     """TurtleBot3 Burger as the paper drives it: at most 0.25 m/s and 1 rad/s.
 
-    Its data sheet (ROBOTIS e-Manual, *TurtleBot3 Features*) says 138 x 178 mm, 0.22 m/s and 2.84 rad/s; 0.105 m is the
-    radius that its navigation package plans with.
+    Its manual says 138 x 178 mm, 0.22 m/s and 2.84 rad/s (ROBOTIS-GIT/emanual:
+    docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*). 0.105 m is the radius with which its
+    navigation plans (ROBOTIS-GIT/turtlebot3: turtlebot3_navigation2/param/burger.yaml): a disc about its axle, while its
+    LiDAR sits 32 mm behind that (turtlebot3_description/urdf/turtlebot3_burger.urdf.xacro), and here above it.
     """
 
     name: Literal["burger"] = Field("burger", title="TurtleBot3 Burger")
 
 
 class WaffleConfig(RectangularRobot):
-    """TurtleBot3 Waffle Pi (ROBOTIS e-Manual, *TurtleBot3 Features*): 281 x 306 mm, 0.26 m/s, 1.82 rad/s."""
+    """TurtleBot3 Waffle Pi: 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+
+    All from its manual (ROBOTIS-GIT/emanual: docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*).
+    Its LiDAR sits above its middle, and its axle 64 mm ahead of that (ROBOTIS-GIT/turtlebot3:
+    turtlebot3_description/urdf/turtlebot3_waffle_pi.urdf.xacro), while here it turns about its middle.
+    """
 
     name: Literal["waffle"] = Field("waffle", title="TurtleBot3 Waffle")
     length: float = _length(0.281)
@@ -138,7 +148,13 @@ class WaffleConfig(RectangularRobot):
 
 
 class JackalConfig(RectangularRobot):
-    """A robot like Clearpath's Jackal, whose data sheet says 508 x 430 mm and 2 m/s; its controller allows 4 rad/s."""
+    """A robot like Clearpath's Jackal: 508 x 430 mm, 2 m/s, 4 rad/s.
+
+    The speeds are the limits of its controller (jackal/jackal: jackal_control/config/control.yaml), which also allows 20
+    m/s² and 25 rad/s². The size is the one that is quoted as the maker's specification; the data sheet itself was not at
+    hand. The robot's own description (jackal_description/urdf/jackal.urdf.xacro) is in keeping with it: a mount on the
+    front fender is 256 mm ahead of the middle, and the outer sides of the wheels are 416 mm apart.
+    """
 
     name: Literal["jackal"] = Field("jackal", title="Jackal-like")
     length: float = _length(0.508)

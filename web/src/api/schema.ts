@@ -1082,8 +1082,10 @@ export interface components {
          * BurgerConfig
          * @description TurtleBot3 Burger as the paper drives it: at most 0.25 m/s and 1 rad/s.
          *
-         *     Its data sheet (ROBOTIS e-Manual, *TurtleBot3 Features*) says 138 x 178 mm, 0.22 m/s and 2.84 rad/s; 0.105 m is the
-         *     radius that its navigation package plans with.
+         *     Its manual says 138 x 178 mm, 0.22 m/s and 2.84 rad/s (ROBOTIS-GIT/emanual:
+         *     docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*). 0.105 m is the radius with which its
+         *     navigation plans (ROBOTIS-GIT/turtlebot3: turtlebot3_navigation2/param/burger.yaml): a disc about its axle, while its
+         *     LiDAR sits 32 mm behind that (turtlebot3_description/urdf/turtlebot3_burger.urdf.xacro), and here above it.
          */
         "BurgerConfig-Input": {
             /**
@@ -1126,8 +1128,10 @@ export interface components {
          * BurgerConfig
          * @description TurtleBot3 Burger as the paper drives it: at most 0.25 m/s and 1 rad/s.
          *
-         *     Its data sheet (ROBOTIS e-Manual, *TurtleBot3 Features*) says 138 x 178 mm, 0.22 m/s and 2.84 rad/s; 0.105 m is the
-         *     radius that its navigation package plans with.
+         *     Its manual says 138 x 178 mm, 0.22 m/s and 2.84 rad/s (ROBOTIS-GIT/emanual:
+         *     docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*). 0.105 m is the radius with which its
+         *     navigation plans (ROBOTIS-GIT/turtlebot3: turtlebot3_navigation2/param/burger.yaml): a disc about its axle, while its
+         *     LiDAR sits 32 mm behind that (turtlebot3_description/urdf/turtlebot3_burger.urdf.xacro), and here above it.
          */
         "BurgerConfig-Output": {
             /**
@@ -2042,7 +2046,12 @@ export interface components {
         };
         /**
          * JackalConfig
-         * @description A robot like Clearpath's Jackal, whose data sheet says 508 x 430 mm and 2 m/s; its controller allows 4 rad/s.
+         * @description A robot like Clearpath's Jackal: 508 x 430 mm, 2 m/s, 4 rad/s.
+         *
+         *     The speeds are the limits of its controller (jackal/jackal: jackal_control/config/control.yaml), which also allows 20
+         *     m/s² and 25 rad/s². The size is the one that is quoted as the maker's specification; the data sheet itself was not at
+         *     hand. The robot's own description (jackal_description/urdf/jackal.urdf.xacro) is in keeping with it: a mount on the
+         *     front fender is 256 mm ahead of the middle, and the outer sides of the wheels are 416 mm apart.
          */
         "JackalConfig-Input": {
             /**
@@ -2089,7 +2098,12 @@ export interface components {
         };
         /**
          * JackalConfig
-         * @description A robot like Clearpath's Jackal, whose data sheet says 508 x 430 mm and 2 m/s; its controller allows 4 rad/s.
+         * @description A robot like Clearpath's Jackal: 508 x 430 mm, 2 m/s, 4 rad/s.
+         *
+         *     The speeds are the limits of its controller (jackal/jackal: jackal_control/config/control.yaml), which also allows 20
+         *     m/s² and 25 rad/s². The size is the one that is quoted as the maker's specification; the data sheet itself was not at
+         *     hand. The robot's own description (jackal_description/urdf/jackal.urdf.xacro) is in keeping with it: a mount on the
+         *     front fender is 256 mm ahead of the middle, and the outer sides of the wheels are 416 mm apart.
          */
         "JackalConfig-Output": {
             /**
@@ -4359,7 +4373,11 @@ export interface components {
         };
         /**
          * WaffleConfig
-         * @description TurtleBot3 Waffle Pi (ROBOTIS e-Manual, *TurtleBot3 Features*): 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         * @description TurtleBot3 Waffle Pi: 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         *
+         *     All from its manual (ROBOTIS-GIT/emanual: docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*).
+         *     Its LiDAR sits above its middle, and its axle 64 mm ahead of that (ROBOTIS-GIT/turtlebot3:
+         *     turtlebot3_description/urdf/turtlebot3_waffle_pi.urdf.xacro), while here it turns about its middle.
          */
         "WaffleConfig-Input": {
             /**
@@ -4406,7 +4424,11 @@ export interface components {
         };
         /**
          * WaffleConfig
-         * @description TurtleBot3 Waffle Pi (ROBOTIS e-Manual, *TurtleBot3 Features*): 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         * @description TurtleBot3 Waffle Pi: 281 x 306 mm, 0.26 m/s, 1.82 rad/s.
+         *
+         *     All from its manual (ROBOTIS-GIT/emanual: docs/en/platform/turtlebot3/features/features.md, *Hardware Specifications*).
+         *     Its LiDAR sits above its middle, and its axle 64 mm ahead of that (ROBOTIS-GIT/turtlebot3:
+         *     turtlebot3_description/urdf/turtlebot3_waffle_pi.urdf.xacro), while here it turns about its middle.
          */
         "WaffleConfig-Output": {
             /**
