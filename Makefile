@@ -48,6 +48,7 @@ endef
 .venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py) workers/dense.py \
     workers/algorithms/adam.py workers/algorithms/ppo_loss.py .venv/.run
 	@echo "Compiling the simulator and the networks' backward passes ..."
+	@rm -rf sim/kernels/__pycache__
 	@$(BIN)/python -m workers.precompile
 	@touch $@
 

@@ -11,7 +11,7 @@ from sim.kernels.movers import DECISION, move_movers, place_movers
 from sim.kernels.random import seed_streams
 from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
 from sim.mover_config import MoverKind
-from sim.shapes import pack_shapes
+from sim.shapes import Shapes
 
 _KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}
 # Other streams than the robots', for the same seed.
@@ -23,6 +23,7 @@ class Movers:
 
     Args:
         arenas: the pool; tile t is a copy of arena t modulo their number.
+        shapes: of the pool.
         origins: (tiles, 2) centres of the tiles, metres.
         period: seconds of a step.
         alike: whether all copies of an arena have the same movers in the same places.
@@ -33,7 +34,9 @@ class Movers:
         fastest: m/s, the highest top speed of them all.
     """
 
-    def __init__(self, arenas: Sequence[Arena], origins: NDArray[np.float64], period: float, *, alike: bool) -> None:
+    def __init__(
+        self, arenas: Sequence[Arena], shapes: Shapes, origins: NDArray[np.float64], period: float, *, alike: bool
+    ) -> None:
         tiles, slots = len(origins), max(len(arena.movers) for arena in arenas)
         self.discs: NDArray[np.float32] = np.full((tiles, slots, DISC_COLUMNS), -1.0, dtype=np.float32)
         self.fastest = max((mover.speed for arena in arenas for mover in arena.movers), default=0.0)
@@ -50,7 +53,7 @@ class Movers:
                 records["waypoints"] = len(mover.waypoints)
                 waypoints += mover.waypoints
         self._records = table.reshape(-1)
-        bounds, circles, boxes = pack_shapes(arenas)
+        bounds, circles, boxes = shapes
         self._crowd = Crowd(
             records=self._records,
             discs=self.discs,
@@ -60,11 +63,13 @@ class Movers:
             circles=circles,
             boxes=boxes,
             origins=origins,
+            steps=np.zeros(1, dtype=np.int64),
+            lines=np.empty((2, 4 + circles.shape[1] + boxes.shape[1] + 2 * slots, 3)),
+            chosen=np.empty((slots + 1, 2)),
         )
         self._copies = tiles // len(arenas) if alike else 1
         self._period = period
         self._steps_between = max(1, round(DECISION / period))
-        self._steps = np.zeros(1, dtype=np.int64)
 
     def __len__(self) -> int:
         return len(self._records)
@@ -76,7 +81,7 @@ class Movers:
 
     def place(self) -> None:
         """Draw where all of them start."""
-        self._steps[0] = 0
+        self._crowd.steps[0] = 0
         place_movers(self._crowd)
 
     def of(self, tile: int) -> NDArray[np.float32]:
@@ -98,13 +103,11 @@ class Movers:
             command: of `sim.physics.TiledSpace`, whose rows of movers are written.
             robots: rows before them.
         """
-        decide = self._steps[0] % self._steps_between == 0
-        move_movers(self._crowd, self._period, self._steps_between * self._period, decide, command, robots)
-        self._steps += 1
+        move_movers(self._crowd, self._period, self._steps_between, command, robots)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """The arrays that the future depends on, by name; empty where nothing moves."""
         if not len(self):
             return {}
         arrays: dict[str, NDArray[np.generic]] = {f"mover_{name}": self._records[name] for name in MOVER.names or ()}
-        return arrays | {"mover_discs": self.discs, "mover_steps": self._steps}
+        return arrays | {"mover_discs": self.discs, "mover_steps": self._crowd.steps}

@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from sim.arenas import Arena
 from sim.kernels.records import BOX_COLUMNS, CIRCLE_COLUMNS
 
+Shapes = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
+"""Bounds, circles and boxes of a pool of arenas, as `sim.kernels.bundles.Geometry` has them."""
 
-def pack_shapes(arenas: Sequence[Arena]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+
+def pack_shapes(arenas: Sequence[Arena]) -> Shapes:
     """Bounds (M, 2), circles (M, C, 3) and boxes (M, B, 6) of a pool of arenas, padded with empty slots."""
     bounds = np.array([(arena.half_width, arena.half_height) for arena in arenas], dtype=np.float32)
     circles = np.full((len(arenas), max(len(a.circles) for a in arenas), CIRCLE_COLUMNS), -1.0, dtype=np.float32)

@@ -143,8 +143,8 @@ class World:
         origins = tile_origins(self.arenas, replicas)
         nowhere = np.empty((0, 2), dtype=np.float32)
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
-        self.movers = Movers(self.arenas, origins, task.control_period, alike=not respawn)
-        bounds, circles, boxes = pack_shapes(self.arenas)
+        bounds, circles, boxes = shapes = pack_shapes(self.arenas)
+        self.movers = Movers(self.arenas, shapes, origins, task.control_period, alike=not respawn)
         self.geometry = Geometry(
             bounds=bounds,
             circles=circles,

@@ -3,18 +3,19 @@
 ORCA is *Optimal Reciprocal Collision Avoidance* (van den Berg, Guy, Lin and Manocha, "Reciprocal n-Body Collision
 Avoidance", 2011); the programs are the incremental ones of de Berg et al., "Computational Geometry", chapter 4, as that
 paper uses them. A half-plane is a row (nx, ny, b) of `lines` and permits the velocities v with n·v <= b, where n has
-length 1. All is float64 without floating-point freedoms, so that the same scene gives the same velocities on every machine.
+length 1. All is float64 with none but those floating-point freedoms that change no result, so that the same scene gives the
+same velocities on every machine.
 """
 
 import math
 
-import numba as nb
+from sim.kernels.options import kernel
 
 _PARALLEL = 1e-9
 _SLACK = 1e-12  # m/s by which rounding may leave a half-plane
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(inline="always")
 def orca_line(px, py, wx, wy, radius, horizon, share, vx, vy, lines, n):
     """Write row n of `lines`: what another disc permits to ours.
 
@@ -52,7 +53,7 @@ def orca_line(px, py, wx, wy, radius, horizon, share, vx, vy, lines, n):
     lines[n, 2] = nx * (vx + share * ux) + ny * (vy + share * uy)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(inline="always")
 def _on_line(lines, i, speed, wish_x, wish_y, outwards, velocity):
     """The best velocity on the edge of half-plane i within those before it; False where there is none."""
     b = lines[i, 2]
@@ -82,7 +83,7 @@ def _on_line(lines, i, speed, wish_x, wish_y, outwards, velocity):
     return True
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(inline="always")
 def _closest(lines, count, speed, wish_x, wish_y, outwards, velocity):
     """Write the velocity closest to the wish or, `outwards`, furthest in its direction; the first half-plane that fails.
 
@@ -103,7 +104,7 @@ def _closest(lines, count, speed, wish_x, wish_y, outwards, velocity):
     return count
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(inline="always")
 def choose_velocity(lines, hard, count, speed, wish_x, wish_y, scratch, velocity):
     """Write to `velocity` (2,) the permitted one, of at most `speed`, that is closest to the wish; m/s.
 
@@ -116,7 +117,8 @@ def choose_velocity(lines, hard, count, speed, wish_x, wish_y, scratch, velocity
         if lines[i, 0] * velocity[0] + lines[i, 1] * velocity[1] - lines[i, 2] <= violation:
             continue
         for j in range(hard):
-            scratch[j, :] = lines[j, :]
+            for k in range(3):
+                scratch[j, k] = lines[j, k]
         n = hard
         for j in range(hard, i):
             # Where half-plane j is violated no more than i.
@@ -137,7 +139,7 @@ def choose_velocity(lines, hard, count, speed, wish_x, wish_y, scratch, velocity
         violation = lines[i, 0] * velocity[0] + lines[i, 1] * velocity[1] - lines[i, 2]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(inline="always")
 def free_part(lines, hard, vx, vy):
     """The largest part, 0 to 1, of a velocity that the first `hard` half-planes permit."""
     part = 1.0

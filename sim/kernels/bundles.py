@@ -48,6 +48,8 @@ class Crowd(NamedTuple):
         waypoints: (W, 2) float64 of all patrols, metres.
         maps: (tiles,) the arena of each tile.
         bounds, circles, boxes, origins: see `Geometry`.
+        steps: (1,) taken since all were placed.
+        lines, chosen: scratch for half-planes, (2, n, 3), and for the velocities of a tile's movers, (K + 1, 2).
     """
 
     records: NDArray[np.void]
@@ -58,6 +60,9 @@ class Crowd(NamedTuple):
     circles: Floats
     boxes: Floats
     origins: Doubles
+    steps: NDArray[np.int64]
+    lines: Doubles
+    chosen: Doubles
 
 
 class Robots(NamedTuple):

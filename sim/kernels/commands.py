@@ -2,9 +2,9 @@
 
 import math
 
-import numba as nb
 import numpy as np
 
+from sim.kernels.options import kernel
 from sim.kernels.records import DELAY, MAX_ANGULAR, MAX_LINEAR
 
 ZERO = np.float32(0.0)
@@ -14,13 +14,13 @@ _SERIES = 1e-4
 """Below this half angle sin(h)/h is 1 - h²/6 to the last bit."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _largest_change(acceleration, limit, period):
     """Change of a velocity in one period as a fraction of its limit; 2, the whole span, where it is unlimited."""
     return np.float32(min(2.0, acceleration * period / limit) if acceleration > 0.0 else 2.0)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _delayed(i, linear, angular, delay, pending):
     """The action that robot i follows now, which it was given `delay` steps ago; the new one joins the queue."""
     now_linear = pending[i, 0, 0]
@@ -33,7 +33,7 @@ def _delayed(i, linear, angular, delay, pending):
     return now_linear, now_angular
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def write_commands(actions, robots, state, command, parameters):
     """Turn actions into the bodies' velocities, as late as robots follow them.
 

@@ -2,9 +2,9 @@
 
 import math
 
-import numba as nb
 import numpy as np
 
+from sim.kernels.options import kernel
 from sim.kernels.random import normal, uniform
 from sim.kernels.records import DISTANCE_NOISE, DROPOUT, FIELD_OF_VIEW, HEADING_NOISE, NOISE, RANGE, RATE
 
@@ -14,7 +14,7 @@ AHEAD = math.radians(30.0)
 """Rays within this angle of the heading tell how free the way ahead is (the `clearance` reward)."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def rays_ahead(angles, spread):
     """Which of the rays at `spread` times these angles, radians in order, point ahead: the first, and one past the last.
 
@@ -33,7 +33,7 @@ def rays_ahead(angles, spread):
     return first, last
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _spread_rays(i, robots, geometry, p):
     """Let robot i's rays cover the field of view that it has drawn."""
     spread = robots.drawn[i, FIELD_OF_VIEW] / p.field_of_view
@@ -44,7 +44,7 @@ def _spread_rays(i, robots, geometry, p):
     robots.ahead[i, 0], robots.ahead[i, 1] = rays_ahead(geometry.ray_angles, spread)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def begin_episode(i, robots, geometry, p):
     """Draw what robot i is like in this episode; its pose is known, no action waits, and the next scan is new."""
     for k in range(robots.drawn.shape[1]):
@@ -61,14 +61,14 @@ def begin_episode(i, robots, geometry, p):
         robots.scan_ages[i] = 0
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def find_itself(i, robots):
     """Let robot i know its pose: with a new target, odometry starts anew."""
     if robots.drift.shape[0]:
         robots.drift[i] = 0.0
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def drift(i, dx, dy, turn, robots):
     """Let robot i's believed pose drift while it truly moves by dx, dy, metres, and turns by `turn`, radians."""
     heading_noise = robots.drawn[i, HEADING_NOISE] * math.sqrt(abs(turn))
@@ -84,7 +84,14 @@ def drift(i, dx, dy, turn, robots):
     robots.drift[i, 1] += stretch * (sin * dx + cos * dy) - dy
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
+def _copy(i, source, target):
+    """Copy row i."""
+    for k in range(source.shape[1]):
+        target[i, k] = source[i, k]
+
+
+@kernel()
 def perceive(i, robots, p):
     """Turn robot i's true scan into what it gets to see: a new scan with its faults, or the last one once more."""
     if robots.scan_ages.shape[0] == 0:
@@ -94,13 +101,13 @@ def perceive(i, robots, p):
     steps = max(1, int(1.0 / (rate * p.period) + 0.5)) if rate > 0.0 else 1
     if robots.scan_ages[i] % steps == 0:
         _disturb(i, robots, p)
-        robots.held_ranges[i] = robots.ranges[i]
+        _copy(i, robots.ranges, robots.held_ranges)
     else:
-        robots.ranges[i] = robots.held_ranges[i]
+        _copy(i, robots.held_ranges, robots.ranges)
     robots.scan_ages[i] += 1
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _disturb(i, robots, p):
     """Add the LiDAR's noise and dropouts to robot i's scan; what is beyond its own range is not seen."""
     limit = np.float32(robots.drawn[i, RANGE])

@@ -5,10 +5,10 @@
 
 import math
 
-import numba as nb
 import numpy as np
 
 from sim.kernels.observing import wrapped
+from sim.kernels.options import kernel
 from sim.kernels.sensing import FAST
 
 ZERO = np.float32(0.0)
@@ -17,7 +17,7 @@ PASSING_SAMPLES = 16
 """Points of a step at which a mover's distance from a rectangular body is looked at: at 1.5 m/s they are 2 cm apart."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def from_rectangle(along, across, half_length, half_width):
     """Signed distance from a rectangle to a point in its frame, metres: negative inside."""
     beyond = abs(along) - half_length
@@ -27,7 +27,7 @@ def from_rectangle(along, across, half_length, half_width):
     return math.sqrt(px * px + py * py) + min(max(beyond, beside), ZERO)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def _nearest_corner(x, y, cos, sin, length, width, half_length, half_width):
     """Distance from a rectangle to the nearest corner of one with half extents `length`, `width` at x, y in its frame."""
     ax = cos * length
@@ -40,7 +40,7 @@ def _nearest_corner(x, y, cos, sin, length, width, half_length, half_width):
     return min(nearest, from_rectangle(x - ax - bx, y - ay - by, half_length, half_width))
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def _between(x, y, cos, sin, length, width, half_length, half_width):
     """Signed distance between a rectangle and another at x, y in its frame, turned by (cos, sin); see `sim.footprint`."""
     c = abs(cos)
@@ -60,7 +60,7 @@ def _between(x, y, cos, sin, length, width, half_length, half_width):
     )
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def rectangle_clearance(x, y, heading, index, bounds, circles, boxes, length, width):
     """Signed distance from a body of half extents `length` and `width` at a pose to the nearest surface, metres."""
     cos = np.float32(math.cos(heading))
@@ -98,7 +98,7 @@ def rectangle_clearance(x, y, heading, index, bounds, circles, boxes, length, wi
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def swept_rectangle_clearance(x, y, heading, dx, dy, tile, discs, closing, length, width, clearance):
     """`clearance` or, where it is smaller, that of a body from a tile's movers, metres.
 
@@ -125,7 +125,7 @@ def swept_rectangle_clearance(x, y, heading, dx, dy, tile, discs, closing, lengt
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def moving_rectangle_clearance(
     last_x, last_y, last_heading, x, y, heading, index, bounds, circles, boxes, length, width, samples
 ):
@@ -141,7 +141,7 @@ def moving_rectangle_clearance(
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def rectangle_clearances(poses, maps, bounds, circles, boxes, length, width, result):
     """Fill `result` (n,) with the clearances of a body at `poses` (n, 3), each in the arena that `maps` (n,) names."""
     for i in range(poses.shape[0]):

@@ -17,10 +17,8 @@ make no difference to movers.
 
 import math
 
-import numba as nb
-import numpy as np
-
 from sim.kernels.avoidance import choose_velocity, free_part, orca_line
+from sim.kernels.options import kernel
 from sim.kernels.random import uniform
 from sim.kernels.records import PATROL, PEDESTRIAN, WALKER
 from sim.kernels.surroundings import EXACT, SKIN, free_length, gap, obstacle_lines
@@ -43,7 +41,7 @@ _DETOUR = 1.5  # times the straight way's time after which a pedestrian goes els
 _HESITATION = 2.0  # s more, likewise
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def _draw_goal(m, index, crowd, furthest):
     """Give mover m a goal in sight: somewhere on the way into a drawn direction, or at its end where `furthest`."""
     records = crowd.records
@@ -67,7 +65,7 @@ def _draw_goal(m, index, crowd, furthest):
     record.patience = _HESITATION + _DETOUR * distance / record.speed
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT)
 def _turn(m, records):
     """Give walker m a new direction."""
     angle = 2.0 * math.pi * uniform(records, m)
@@ -75,7 +73,7 @@ def _turn(m, records):
     records[m].goal_y = math.sin(angle)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT)
 def _next_waypoint(record, crowd):
     """Send a patrol on: to its round's next corner, or back to where it came from."""
     if record.waypoints:
@@ -91,7 +89,7 @@ def _next_waypoint(record, crowd):
         record.other_y = y
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT)
 def _draw_place(m, index, crowd):
     """Put mover m somewhere: on its round if it has one, else anywhere within the walls."""
     records = crowd.records
@@ -110,7 +108,7 @@ def _draw_place(m, index, crowd):
         record.y = (2.0 * uniform(records, m) - 1.0) * (crowd.bounds[index, 1] - record.radius)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT)
 def place_movers(crowd):
     """Put every mover of every tile, at rest, somewhere clear of obstacles and of the movers before it.
 
@@ -162,7 +160,7 @@ def place_movers(crowd):
         discs[tile, k, 4] = 0.0
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def _dividing_lines(m, first, slots, records, interval, lines, n):
     """Write, from row n on, the half-planes that keep mover m on its side of the others for `interval` seconds.
 
@@ -186,7 +184,7 @@ def _dividing_lines(m, first, slots, records, interval, lines, n):
     return n
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def _orca_lines(m, first, slots, records, lines, n):
     """Write, from row n on, the half-planes that keep mover m and the others apart for `HORIZON` seconds; likewise."""
     record = records[m]
@@ -207,7 +205,7 @@ def _orca_lines(m, first, slots, records, lines, n):
     return n
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def _decide(tile, crowd, interval, lines, scratch, chosen):
     """Choose the velocities of a tile's movers for the next `interval` seconds."""
     records = crowd.records
@@ -275,40 +273,36 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
             records[first + k].vy = chosen[k, 1]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def move_movers(crowd, period, interval, decide, command, robots):
+@kernel(fastmath=EXACT)
+def move_movers(crowd, period, between, command, robots):
     """Let every mover go on for one control period.
 
     Args:
-        crowd: `sim.kernels.bundles.Crowd`, whose records and discs are updated.
+        crowd: `sim.kernels.bundles.Crowd`, whose records, discs and steps are updated.
         period: seconds of this step.
-        interval: seconds until the next decision, where this step begins with one.
-        decide: whether it does.
+        between: steps from one decision to the next.
         command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the rows after the first `robots` are written.
         robots: how many bodies are robots.
     """
     records = crowd.records
     discs = crowd.discs
     slots = discs.shape[1]
-    if decide:
-        most = 4 + crowd.circles.shape[1] + crowd.boxes.shape[1] + 2 * slots
-        lines = np.empty((most, 3))
-        scratch = np.empty((most, 3))
-        chosen = np.empty((slots + 1, 2))
+    if crowd.steps[0] % between == 0:
         for tile in range(discs.shape[0]):
-            _decide(tile, crowd, interval, lines, scratch, chosen)
-    for m in range(records.shape[0]):
-        record = records[m]
-        tile = m // slots
-        k = m % slots
-        row = robots + m
-        command[row, 0] = crowd.origins[tile, 0] + record.x
-        command[row, 1] = crowd.origins[tile, 1] + record.y
-        command[row, 3] = record.vx
-        command[row, 4] = record.vy
-        record.x += period * record.vx
-        record.y += period * record.vy
-        discs[tile, k, 0] = record.x
-        discs[tile, k, 1] = record.y
-        discs[tile, k, 3] = period * record.vx
-        discs[tile, k, 4] = period * record.vy
+            _decide(tile, crowd, between * period, crowd.lines[0], crowd.lines[1], crowd.chosen)
+    crowd.steps[0] += 1
+    for tile in range(discs.shape[0]):
+        for k in range(slots):
+            m = tile * slots + k
+            record = records[m]
+            row = robots + m
+            command[row, 0] = crowd.origins[tile, 0] + record.x
+            command[row, 1] = crowd.origins[tile, 1] + record.y
+            command[row, 3] = record.vx
+            command[row, 4] = record.vy
+            record.x += period * record.vx
+            record.y += period * record.vy
+            discs[tile, k, 0] = record.x
+            discs[tile, k, 1] = record.y
+            discs[tile, k, 3] = period * record.vx
+            discs[tile, k, 4] = period * record.vy

@@ -2,9 +2,9 @@
 
 import math
 
-import numba as nb
 import numpy as np
 
+from sim.kernels.options import kernel
 from sim.kernels.records import PAPER
 from sim.kernels.sensing import FAST, nearest_of
 
@@ -15,7 +15,7 @@ TWO_PI = np.float32(2.0 * math.pi)
 EXTRA = 6  # sim.observations.EXTRA
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def wrapped(angle):
     """An angle of less than one and a half turns in [-pi, pi]."""
     if angle > PI:
@@ -25,13 +25,13 @@ def wrapped(angle):
     return min(max(angle, -PI), PI)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def bearing_of(dx, dy, heading):
     """Direction of (dx, dy) against the heading, in [-pi, pi], left positive."""
     return wrapped(np.float32(math.atan2(dy, dx)) - heading)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+@kernel(fastmath=FAST, inline="always")
 def observe(i, robots, geometry, p):
     """Write robot i's newest observation before the earlier ones; `sim.observations` says what each number is."""
     record = robots.records[i]
@@ -72,7 +72,7 @@ def observe(i, robots, geometry, p):
     out[i, k + 5] = abs(bearing) / PI
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+@kernel(fastmath=FAST, inline="always")
 def observe_first(i, robots, geometry, p):
     """Write robot i's first observation of an episode, which stands for the earlier ones too."""
     observe(i, robots, geometry, p)

@@ -5,9 +5,10 @@ SplitMix64 (Steele, Lea and Flood 2014): 64 bits of state, passes BigCrush, and 
 
 import math
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+
+from sim.kernels.options import kernel
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _FIRST = np.uint64(0xBF58476D1CE4E5B9)
@@ -15,7 +16,7 @@ _SECOND = np.uint64(0x94D049BB133111EB)
 _TO_UNIT = 2.0**-53
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel()
 def mixed(z):
     """SplitMix64's finaliser: a bijection of 64-bit integers whose output looks random."""
     z = (z ^ (z >> np.uint64(30))) * _FIRST
@@ -23,14 +24,14 @@ def mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel()
 def uniform(records, i):
     """The next number of the generator of robot or mover i, float64 in [0, 1)."""
     records[i].random += GOLDEN
     return np.float64(mixed(records[i].random) >> np.uint64(11)) * _TO_UNIT
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel()
 def normal(records, i):
     """A number of the standard normal distribution (Box and Muller 1958), from two of generator i."""
     size = math.sqrt(-2.0 * math.log(1.0 - uniform(records, i)))  # 1 - u keeps the logarithm finite

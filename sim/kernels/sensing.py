@@ -6,19 +6,21 @@ scenes the ranges agree with Chipmunk's exact queries within 1e-4 m (tests/sim/t
 
 import math
 
-import numba as nb
 import numpy as np
+
+from sim.kernels.options import kernel
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 FAR = np.float32(1e6)  # m; the fast floating-point rules below do without infinities
+MARGIN = np.float32(0.01)  # m
 TINY = np.float32(1e-12)  # keeps divisions by a direction finite; far below any direction that a float32 angle gives
 
 FAST = {"nnan", "ninf", "nsz", "arcp", "contract", "afn", "reassoc"}
 """Floating-point freedoms that let the ray loops vectorise; each of them is within the 1e-4 m that the tests allow."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def clearance_at(x, y, index, bounds, circles, boxes):
     """Signed distance from a point to the nearest surface of arena `index`, metres (see `sim.arenas.free_distance`)."""
     distance = min(bounds[index, 0] - abs(x), bounds[index, 1] - abs(y))
@@ -43,7 +45,7 @@ def clearance_at(x, y, index, bounds, circles, boxes):
     return distance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def nearest_of(ranges, row, first, last):
     """The smallest of ranges[row, first:last], which is not empty."""
     nearest = ranges[row, first]
@@ -52,7 +54,7 @@ def nearest_of(ranges, row, first, last):
     return nearest
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy):
     """Shorten the rays (dx, dy) that meet a circle whose centre is (fx, fy) away and whose surface `gap`."""
     rays = dx.shape[0]
@@ -70,7 +72,7 @@ def _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy):
         ranges[row, i] = min(ranges[row, i], hit if (square >= ZERO and hit >= ZERO) else limit)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, row, dx, dy):
     """Fill row `row` of `ranges` (n, rays) with the scan from a pose and return the clearance of the point, metres.
 
@@ -142,7 +144,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def disc_clearance(x, y, tile, discs):
     """Signed distance from a point to the nearest mover of a tile, metres; `FAR` where there is none."""
     distance = FAR
@@ -155,7 +157,7 @@ def disc_clearance(x, y, tile, discs):
     return distance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@kernel(fastmath=FAST)
 def swept_clearance(x, y, dx, dy, tile, discs):
     """The same, smallest while the point came to (x, y) by (dx, dy) and each mover by its last step, both straight."""
     distance = FAR
@@ -174,13 +176,12 @@ def swept_clearance(x, y, dx, dy, tile, discs):
     return distance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
-    """Shorten row `row` of `ranges` by a tile's movers and return the clearance from them, `FAR` where there are none.
+@kernel(fastmath=FAST, inline="always")
+def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy, clearance):
+    """Shorten row `row` of `ranges` by a tile's movers; return `clearance` or, where it is smaller, that from them.
 
     `dx` and `dy` are the rays' directions as `sense` leaves them.
     """
-    clearance = FAR
     if discs.shape[1] == 0:
         return clearance
     # The middle of the field of view, at most as long as 1: what is behind it is out of sight of rays that look ahead.
@@ -193,7 +194,12 @@ def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
             continue
         fx = discs[tile, j, 0] - x
         fy = discs[tile, j, 1] - y
-        gap = math.sqrt(fx * fx + fy * fy) - radius
+        squared = fx * fx + fy * fy
+        # Most are out of reach, which takes no root to see; the margin is far above rounding.
+        reach = max(limit, clearance) + radius + MARGIN
+        if squared >= reach * reach:
+            continue
+        gap = math.sqrt(squared) - radius
         clearance = min(clearance, gap)
         if gap >= limit or (looks_ahead and ahead_x * fx + ahead_y * fy < -radius):
             continue
@@ -201,7 +207,7 @@ def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy):
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def scan_poses(poses, maps, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges):
     """Fill `ranges` (n, rays) with the scans from `poses` (n, 3), each in the arena that `maps` (n,) names.
 
@@ -217,7 +223,7 @@ def scan_poses(poses, maps, bounds, circles, boxes, ray_cos, ray_sin, limit, loo
         )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def clearance_points(points, maps, bounds, circles, boxes, result):
     """Fill `result` (n,) with the clearances of `points` (n, 2), each in the arena that `maps` (n,) names."""
     for i in range(points.shape[0]):

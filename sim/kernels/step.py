@@ -1,14 +1,13 @@
 """After the physics of a step: outcomes, rewards, observations and resets."""
 
 import math
-from typing import Any
 
-import numba as nb
 import numpy as np
 
 from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
 from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
 from sim.kernels.observing import bearing_of, observe, observe_first
+from sim.kernels.options import kernel
 from sim.kernels.random import uniform
 from sim.kernels.records import (
     ALIGNMENT,
@@ -37,14 +36,11 @@ MAX_RATIO = np.float32(8.0)
 MOVER_ROOM = np.float32(1.1)
 """Metres that a robot's centre starts away from every mover's surface."""
 
-UNCOUNTED: dict[str, Any] = {"_nrt": False}
-"""For a function that allocates nothing: counting references to all arrays, for every robot, took half of a step's time."""
-
 SPAWN_TRIES = 200
 """Draws before a start or target is taken as it is; the cells are free, so one in three or so is good."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def _distance_to_target(i, robots):
     """Metres from robot i to its target."""
     dx = robots.targets[i, 0] - robots.poses[i, 0]
@@ -52,7 +48,7 @@ def _distance_to_target(i, robots):
     return np.float32(math.sqrt(dx * dx + dy * dy))
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _draw_target(i, robots, geometry, p):
     """Give robot i a new target: uniform in its arena's target cells, clear of obstacles, not next to the robot."""
     records = robots.records
@@ -74,7 +70,7 @@ def _draw_target(i, robots, geometry, p):
     records[i].distance = _distance_to_target(i, robots)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _draw_start(i, robots, geometry, p, state):
     """Put robot i, at rest, somewhere free in an arena of the pool."""
     records = robots.records
@@ -101,7 +97,7 @@ def _draw_start(i, robots, geometry, p, state):
     _place(i, x, y, heading, robots, geometry, p, state)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _place(i, x, y, heading, robots, geometry, p, state):
     """Put robot i, at rest, at a pose in its arena."""
     tile = robots.records[i].replica * p.replica_stride + robots.records[i].map
@@ -115,7 +111,7 @@ def _place(i, x, y, heading, robots, geometry, p, state):
     robots.records[i].angular = ZERO
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _forget_attempt(record):
     """Start counting anew."""
     record.steps = 0
@@ -124,7 +120,7 @@ def _forget_attempt(record):
     record.min_clearance = ZERO  # the first step sets it
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def _nothing_happened(i, robots):
     """Clear the results of robot i's step."""
     robots.outcomes[i] = NONE
@@ -134,7 +130,7 @@ def _nothing_happened(i, robots):
     robots.truncations[i] = False
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def reset_robots(poses, targets, robots, geometry, parameters, state):
     """Begin a new episode for every robot.
 
@@ -167,13 +163,13 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
         observe_first(i, robots, geometry, p)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def _scanner_of(i, robots):
     """Row of `ray_cos`, `ray_sin` and `ahead` that is robot i's: the only one where all scanners are alike."""
     return i if robots.ahead.shape[0] > 1 else 0
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def _sense(i, robots, geometry, p):
     """Scan from robot i's pose; returns the clearance of its centre, metres."""
     x = robots.poses[i, 0]
@@ -186,13 +182,12 @@ def _sense(i, robots, geometry, p):
         p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y,
     )  # fmt: skip
     tile = robots.records[i].replica * p.replica_stride + index
-    moving = sense_discs(
-        x, y, tile, geometry.discs, p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y
+    return sense_discs(
+        x, y, tile, geometry.discs, p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y, clearance
     )
-    return min(clearance, moving)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+@kernel(fastmath=FAST, inline="always")
 def _clearance_on_the_way(i, x, y, clearance, robots, geometry, p):
     """`clearance` or, where it is smaller, that of points between (x, y) and robot i's pose, metres."""
     for k in range(1, p.path_samples):
@@ -204,7 +199,7 @@ def _clearance_on_the_way(i, x, y, clearance, robots, geometry, p):
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+@kernel(fastmath=FAST, inline="always")
 def _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry, p):
     """`clearance` or, where it is smaller, that of robot i's body from movers while all came where they are now, metres."""
     x = robots.poses[i, 0]
@@ -220,7 +215,7 @@ def _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry
     return clearance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+@kernel(fastmath=FAST, inline="always")
 def _reward(i, outcome, before, robots, p):
     """Write robot i's reward and its terms for a step that began `before` metres from the target."""
     terms = robots.terms
@@ -251,7 +246,7 @@ def _reward(i, outcome, before, robots, p):
     robots.records[i].attempt_reward += robots.rewards[i]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
+@kernel(fastmath=FAST)
 def step_robots(state, robots, geometry, parameters):
     """Everything that follows the physics of a step.
 

@@ -6,8 +6,9 @@ All is float64 with none but those floating-point freedoms that change no result
 
 import math
 
-import numba as nb
 import numpy as np
+
+from sim.kernels.options import kernel
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Floating-point freedoms that change no result."""
@@ -18,7 +19,7 @@ SKIN = 0.005
 _TINY = 1e-12  # keeps divisions by a direction finite
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT)
 def gap(x, y, index, bounds, circles, boxes):
     """Signed distance from a point to the nearest surface of arena `index`, metres: the same on every machine."""
     distance = min(bounds[index, 0] - abs(x), bounds[index, 1] - abs(y))
@@ -42,7 +43,7 @@ def gap(x, y, index, bounds, circles, boxes):
     return distance
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes, lines):
     """Write the half-planes that obstacles nearer than `reach` leave to a disc; returns how many.
 
@@ -81,14 +82,16 @@ def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes,
             continue
         gx = x - boxes[index, j, 0]
         gy = y - boxes[index, j, 1]
+        # No further from the box's middle than this is any of its corners.
+        beyond = far + boxes[index, j, 2] + boxes[index, j, 3]
+        if gx * gx + gy * gy >= beyond * beyond:
+            continue
         cos = np.float64(boxes[index, j, 4])
         sin = np.float64(boxes[index, j, 5])
         lx = cos * gx + sin * gy
         ly = cos * gy - sin * gx
         along = abs(lx) - boxes[index, j, 2]
         across = abs(ly) - boxes[index, j, 3]
-        if along >= far or across >= far:
-            continue
         px = max(along, 0.0)
         py = max(across, 0.0)
         squared = px * px + py * py
@@ -108,7 +111,7 @@ def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes,
     return n
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@kernel(fastmath=EXACT, inline="always")
 def free_length(x, y, dx, dy, keep, index, bounds, circles, boxes):
     """Metres that a disc which needs `keep` around its centre can go in direction (dx, dy); boxes count with square corners.
 
@@ -126,7 +129,7 @@ def free_length(x, y, dx, dy, keep, index, bounds, circles, boxes):
         aside = fx * dy - fy * dx
         far = circles[index, j, 2] + keep
         square = far * far - aside * aside
-        if ahead > 0.0 and square > 0.0 and ahead - far < length:
+        if square > 0.0 and ahead > 0.0 and ahead - far < length:
             length = min(length, max(ahead - math.sqrt(square), 0.0))
     for j in range(boxes.shape[1]):
         if boxes[index, j, 2] <= 0.0:
@@ -138,7 +141,7 @@ def free_length(x, y, dx, dy, keep, index, bounds, circles, boxes):
         # No further from the box's middle than this is any of its corners.
         reach = half_length + half_width
         ahead = -(gx * dx + gy * dy)
-        if ahead <= -reach or ahead - reach >= length or abs(gx * dy - gy * dx) >= reach:
+        if abs(gx * dy - gy * dx) >= reach or ahead <= -reach or ahead - reach >= length:
             continue
         cos = np.float64(boxes[index, j, 4])
         sin = np.float64(boxes[index, j, 5])

@@ -2,8 +2,9 @@
 
 import math
 
-import numba as nb
 import numpy as np
+
+from sim.kernels.options import kernel
 
 LINEAR_SAMPLES = 6
 ANGULAR_SAMPLES = 15
@@ -18,7 +19,7 @@ NEAR_TARGET = 0.1
 """Metres from the target at which an arc ends well."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def _choose(ranges, limit, angles, bearing, distance, top_linear, top_angular, period, steps, keep, weights, action):
     """Write the best action (2,) for one robot, as fractions of the limits, from its scan (rays,) and polar target."""
     goal_x = distance * math.cos(bearing)
@@ -73,7 +74,7 @@ def _choose(ranges, limit, angles, bearing, distance, top_linear, top_angular, p
                 action[1] = angular
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def choose_all(ranges, limit, angles, polar, top_linear, top_angular, period, steps, keep, weights, actions):
     """`_choose` for n robots: ranges (n, rays), polar (n, 2) bearing and distance, actions (n, 2)."""
     for i in range(ranges.shape[0]):

@@ -17,6 +17,7 @@ from sim.mover_config import MoverKind, MoversConfig
 from sim.movers import Movers
 from sim.physics import add_arena, robot_body, tile_origins
 from sim.scenarios import draw_scenarios, scenario_world
+from sim.shapes import pack_shapes
 from sim.suites import load_suite
 from sim.vector_env import NavigationVectorEnv
 from sim.world import World
@@ -42,7 +43,7 @@ def crowded_arena(seed: int) -> Arena:
 
 def alone(arena: Arena, *, seed: int = 0, period: float = 0.2) -> Movers:
     """Movers without a world around them."""
-    movers = Movers((arena,), tile_origins((arena,), 1), period, alike=False)
+    movers = Movers((arena,), pack_shapes((arena,)), tile_origins((arena,), 1), period, alike=False)
     movers.seed(seed)
     movers.place()
     return movers

@@ -1,0 +1,46 @@
+"""How the kernels are compiled, and where what was compiled is kept."""
+
+import hashlib
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any, Literal
+
+import numba
+
+_config: Any = numba.config
+_njit: Any = numba.njit  # whose stubs leave out what is private
+_HERE = Path(__file__).parent
+_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))).hexdigest()[:16]
+_FOLDER = str(Path(_config.CACHE_DIR or _HERE / "__pycache__") / _SOURCES)
+
+
+def kernel(
+    *, fastmath: Collection[str] = (), inline: Literal["never", "always"] = "never", allocates: bool = False
+) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function, and keep the compiled code for the next process.
+
+    Args:
+        fastmath: floating-point freedoms.
+        inline: "always" for what is called for each robot or shape: a call hands over at least seven numbers for each array.
+        allocates: whether it makes arrays, or calls what does. For all others Numba need not count references to their
+            arrays, which it does atomically and at every call: a good part of the time of what is called that often.
+    """
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        # Compiled code holds the functions that it calls. Numba compiles anew when the file of a function has changed, but
+        # does not look at those of what it calls: kept by all sources, code is never older than any of them.
+        usual, _config.CACHE_DIR = _config.CACHE_DIR, _FOLDER
+        try:
+            return _njit(
+                function,
+                cache=True,
+                nogil=True,
+                error_model="numpy",
+                fastmath=set(fastmath),
+                inline=inline,
+                _nrt=allocates,
+            )
+        finally:
+            _config.CACHE_DIR = usual
+
+    return compiled
