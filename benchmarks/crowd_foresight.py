@@ -178,6 +178,13 @@ def extrapolated(steps: int) -> Callable[[int, World], Floats]:
     return forecast
 
 
+def surprise(truth: Floats, steps: int) -> float:
+    """How far from where its last step pointed to a mover is after some steps, metres: the median."""
+    positions = truth[..., :2]
+    expected = positions[1:-steps] + steps * (positions[1:-steps] - positions[: -steps - 1])
+    return float(np.median(np.hypot(*np.moveaxis(positions[1 + steps :] - expected, -1, 0))))
+
+
 def foretold(truth: Floats, steps: int) -> Callable[[int, World], Floats]:
     """Every mover goes where it will go."""
     return lambda now, _: truth[now + 1 : now + 1 + steps]
@@ -203,6 +210,7 @@ def main() -> None:
         figures[name] = round(100.0 * success, 1)
         print(f"{name}: {figures[name]} %", flush=True)
 
+    figures["metres off after 2 s at the same velocity, median"] = round(surprise(truth, steps[2.0]), 2)
     table = run_controller(lambda situation: np.zeros((len(situation.poses), 2), np.float32), TASK, suite)
     note("standing still, not hit within 100 steps", float((table.steps > 100).mean()))
     table = drive(suite, extrapolated(steps[EXTRAPOLATED]))

@@ -101,6 +101,11 @@ def test_a_pool_has_as_many_maps_as_asked_for() -> None:
     assert same(pool[1], generate_arena("rooms", 0.5, pool_seeds(5, 3)[1]))
 
 
+def test_a_mixed_pool_has_thickets_of_thin_pillars_and_clutter() -> None:
+    thin = [bool((arena.circles[:, 2] == 0.1).all()) for arena in build_arenas(GeneratedArenaConfig(name="mixed", maps=20))]
+    assert 0 < sum(thin) < 20
+
+
 def test_a_fixed_arena_has_no_difficulty_and_stays_as_it_was_written() -> None:
     assert TaskConfig.model_validate({"arena": {"name": "simple"}}) == TaskConfig()
     with pytest.raises(ValueError, match="difficulty"):
