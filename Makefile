@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
-SERVICE_TESTS := tests/browser tests/server tests/services
+STACK_TESTS := tests/browser tests/services
 .PHONY: help run test check format lock pages types
 
 help:
@@ -65,11 +65,11 @@ test: .venv/.dev pages .venv/.kernels
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
 else
-	@# In two halves side by side, one with all that brings processes of its own and keeps time by the clock.
+	@# In two halves side by side, one with whole services and a browser.
 	@log=$$(mktemp) && trap 'rm -f $$log' EXIT; \
-	$(BIN)/python -m pytest $(SERVICE_TESTS) >$$log 2>&1 & service=$$!; \
-	$(BIN)/python -m pytest $(SERVICE_TESTS:%=--ignore=%); rest=$$?; \
-	wait $$service; service=$$?; cat $$log; exit $$((rest > service ? rest : service))
+	$(BIN)/python -m pytest $(STACK_TESTS) >$$log 2>&1 & stack=$$!; \
+	$(BIN)/python -m pytest $(STACK_TESTS:%=--ignore=%); rest=$$?; \
+	wait $$stack; stack=$$?; cat $$log; exit $$((rest > stack ? rest : stack))
 endif
 
 check: .venv/.dev pages
