@@ -44,7 +44,7 @@ RECIPES: tuple[Recipe, ...] = (
     ),
     Recipe(
         name="clutter",
-        title="Anywhere",
+        title="Through clutter",
         description="Trained on 1,024 maps of dense clutter with a scanner that looks all round, for places that it has "
         "never seen: three minutes on one core.",
         training=TrainingConfig(
