@@ -25,7 +25,8 @@ _ELEMENTS = 32_768  # 128 kB
 def rows_at_once(network: Body) -> int:
     """Rows that best go through a network at once: a layer's activations stay in a core's cache from forward to backward.
 
-    Half as many or four times as many cost a tenth more, 1,024 rows of 512 a fifth.
+    Measured with PPO's minibatches of 1,024: half as many rows change its time by -5 (ResBlock) to +8 % (128 wide), two to
+    eight times as many by 0 to +13 %.
     """
     return max(_ELEMENTS // max(parameter.shape[0] for parameter in network.parameters()), 1)
 
