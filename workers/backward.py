@@ -19,16 +19,17 @@ from workers.networks import Body, Mlp, ResBlock
 Floats = NDArray[np.floating[Any]]
 """Of the parameters' own type."""
 
-_ELEMENTS = 32_768  # 128 kB
+_FEWEST_ROWS, _MOST_ROWS = 32, 512
 
 
 def rows_at_once(network: Body) -> int:
-    """Rows that best go through a network at once: a layer's activations stay in a core's cache from forward to backward.
+    """Rows that best go through a network at once: as many as leave every product small enough for the quick kernels.
 
-    Measured with PPO's minibatches of 1,024: half as many rows change its time by -5 (ResBlock) to +8 % (128 wide), two to
-    eight times as many by 0 to +13 %.
+    Measured with PPO's minibatches of 1,024, one row more takes 23 % (ResBlock) or 25 % (128 wide) longer. Networks so wide that
+    too few rows would be left are quickest with many.
     """
-    return max(_ELEMENTS // max(parameter.shape[0] for parameter in network.parameters()), 1)
+    rows = dense.SMALL_PRODUCT // max(parameter.numel() for parameter in network.parameters())
+    return min(rows, _MOST_ROWS) if rows >= _FEWEST_ROWS else _MOST_ROWS
 
 
 class Backward(Protocol):
@@ -37,8 +38,11 @@ class Backward(Protocol):
     Results are buffers that the next call overwrites.
     """
 
-    def forward(self, inputs: Floats) -> Floats:
-        """(n, inputs) to (n, outputs), n at most the rows that the buffers were made for."""
+    def forward(self, inputs: Floats, *, same: bool = False) -> Floats:
+        """(n, inputs) to (n, outputs), n at most the rows that the buffers were made for.
+
+        With `same`, which saves work, the parameters are those of the call before.
+        """
 
     def backward(self, by_output: Floats, *, add: bool = False) -> None:
         """Overwrites every parameter's `.grad`, or adds to it: `by_output` (n, outputs) is the derivative of some scalar."""
@@ -77,18 +81,20 @@ class _Layer:
     def __init__(self, layer: nn.Linear, rows: int, slope: float) -> None:
         self.weight, self._bias = _array(layer.weight), _array(layer.bias)
         self._by_weight, self._by_bias = _array(layer.weight.grad), _array(layer.bias.grad)
-        self._scratch = np.empty_like(self.weight)
+        self._transposed = np.empty(self.weight.shape[::-1], self.weight.dtype)
         self.slope = self.weight.dtype.type(slope)
         self.outputs = _buffer(self, rows, layer.out_features)
         self.delta = np.empty_like(self.outputs)
 
-    def forward(self, inputs: Floats) -> Floats:
+    def forward(self, inputs: Floats, same: bool) -> Floats:
         outputs = self.outputs[: len(inputs)]
-        dense.dense(inputs, self.weight, self._bias, self.slope, outputs)
+        if not same:
+            dense.transpose(self.weight, self._transposed)
+        dense.dense(inputs, self._transposed, self._bias, self.slope, outputs)
         return outputs
 
     def backward(self, delta: Floats, inputs: Floats, add: bool) -> None:
-        dense.parameter_gradients(delta, inputs, add, self._scratch, self._by_weight, self._by_bias)
+        dense.parameter_gradients(delta, inputs, add, self._by_weight, self._by_bias)
 
 
 class MlpBackward:
@@ -102,11 +108,11 @@ class MlpBackward:
         self._by_input = _buffer(self._layers[0], rows, self._layers[0].weight.shape[1])
         self._inputs: Floats = self._by_input
 
-    def forward(self, inputs: Floats) -> Floats:
+    def forward(self, inputs: Floats, *, same: bool = False) -> Floats:
         """See `Backward.forward`."""
         self._inputs = values = inputs
         for layer in self._layers:
-            values = layer.forward(values)
+            values = layer.forward(values, same)
             if self._tanh and layer is not self._layers[-1]:
                 np.tanh(values, out=values)
         return values
@@ -152,14 +158,16 @@ class ResBlockBackward:
         self._by_input = _buffer(self._head, rows, width1)
         self._inputs: Floats = self._by_input
 
-    def forward(self, inputs: Floats) -> Floats:
+    def forward(self, inputs: Floats, *, same: bool = False) -> Floats:
         """See `Backward.forward`."""
         rows = len(inputs)
         self._inputs = inputs
         concat1, concat2 = self._concat1[:rows], self._concat2[:rows]
-        dense.join(self._layer2.forward(self._layer1.forward(inputs)), inputs, self._slope, concat1)
-        dense.join(self._layer4.forward(self._layer3.forward(concat1)), concat1, self._slope, concat2)
-        return self._head.forward(concat2)
+        hidden = self._layer2.forward(self._layer1.forward(inputs, same), same)
+        dense.join(hidden, inputs, self._slope, concat1)
+        hidden = self._layer4.forward(self._layer3.forward(concat1, same), same)
+        dense.join(hidden, concat1, self._slope, concat2)
+        return self._head.forward(concat2, same)
 
     def backward(self, by_output: Floats, *, add: bool = False) -> None:
         """See `Backward.backward`."""

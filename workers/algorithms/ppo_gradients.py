@@ -92,13 +92,13 @@ class WrittenPpo:
             some = slice(first, first + self._rows)
             inputs, add = observations[some], first > 0
             by_logits, by_values = self._by_logits[: len(inputs)], self._by_values[: len(inputs)]
-            logits = self._policy.forward(inputs)
+            logits = self._policy.forward(inputs, same=add)
             differentiate_policy_loss(
                 logits, actions[some], log_probs[some], advantages[some], self._log_std, self._clip_range, 1.0 / size,
                 by_logits, by_log_std, statistics,
             )  # fmt: skip
             self._policy.backward(by_logits, add=add)
-            values = self._critic.forward(inputs)
+            values = self._critic.forward(inputs, same=add)
             differentiate_value_loss(values, returns[some], 1.0 / size, by_values, statistics)
             self._critic.backward(by_values, add=add)
         self._by_log_std[:] = by_log_std
