@@ -45,10 +45,9 @@ endef
 .venv/.dev: requirements-dev.txt .venv/.run
 	$(call install,requirements-dev.txt)
 
-.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py) workers/dense.py \
-    workers/algorithms/adam.py workers/algorithms/ppo_loss.py .venv/.run
-	@echo "Compiling the simulator and the networks' backward passes ..."
-	@rm -rf sim/kernels/__pycache__
+.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py workers/kernels/*.py) .venv/.run
+	@echo "Compiling the simulator and the networks' passes ..."
+	@rm -rf sim/kernels/__pycache__ workers/kernels/__pycache__
 	@$(BIN)/python -m workers.precompile
 	@touch $@
 

@@ -9,38 +9,47 @@ import numba
 
 _config: Any = numba.config
 _njit: Any = numba.njit  # whose stubs leave out what is private
-_HERE = Path(__file__).parent
-_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))).hexdigest()[:16]
-_FOLDER = str(Path(_config.CACHE_DIR or _HERE / "__pycache__") / _SOURCES)
 
 
-def kernel(
-    *, fastmath: Collection[str] = (), inline: Literal["never", "always"] = "never", allocates: bool = False
-) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function, and keep the compiled code for the next process.
+def kernels_in(folder: Path) -> Callable[..., Callable[[Callable[..., Any]], Any]]:
+    """The decorator `kernel` for the kernels of a folder, which may call one another."""
+    # Compiled code holds the functions that it calls. Numba compiles anew when the file of a function has changed, but
+    # does not look at those of what it calls: kept by all sources, code is never older than any of them.
+    sources = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))).hexdigest()[:16]
+    kept = str(Path(_config.CACHE_DIR or folder / "__pycache__") / sources)
 
-    Args:
-        fastmath: floating-point freedoms.
-        inline: "always" for what is called for each robot or shape: a call hands over at least seven numbers for each array.
-        allocates: whether it makes arrays, or calls what does. For all others Numba need not count references to their
-            arrays, which it does atomically and at every call: a good part of the time of what is called that often.
-    """
+    def kernel(
+        *, fastmath: Collection[str] = (), inline: Literal["never", "always"] = "never", allocates: bool = False
+    ) -> Callable[[Callable[..., Any]], Any]:
+        """Compile a function, and keep the compiled code for the next process.
 
-    def compiled(function: Callable[..., Any]) -> Any:
-        # Compiled code holds the functions that it calls. Numba compiles anew when the file of a function has changed, but
-        # does not look at those of what it calls: kept by all sources, code is never older than any of them.
-        usual, _config.CACHE_DIR = _config.CACHE_DIR, _FOLDER
-        try:
-            return _njit(
-                function,
-                cache=True,
-                nogil=True,
-                error_model="numpy",
-                fastmath=set(fastmath),
-                inline=inline,
-                _nrt=allocates,
-            )
-        finally:
-            _config.CACHE_DIR = usual
+        Args:
+            fastmath: floating-point freedoms.
+            inline: "always" for what is called for each robot or shape: a call hands over at least seven numbers for each
+                array.
+            allocates: whether it makes arrays or returns any, or calls what does. For all others Numba need not count
+                references to their arrays, which it does atomically and at every call: a good part of the time of what is
+                called that often.
+        """
 
-    return compiled
+        def compiled(function: Callable[..., Any]) -> Any:
+            usual, _config.CACHE_DIR = _config.CACHE_DIR, kept
+            try:
+                return _njit(
+                    function,
+                    cache=True,
+                    nogil=True,
+                    error_model="numpy",
+                    fastmath=set(fastmath),
+                    inline=inline,
+                    _nrt=allocates,
+                )
+            finally:
+                _config.CACHE_DIR = usual
+
+        return compiled
+
+    return kernel
+
+
+kernel = kernels_in(Path(__file__).parent)

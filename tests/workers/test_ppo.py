@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from workers.algorithms.ppo import Ppo, build_ppo
 from workers.algorithms.ppo_gradients import AutogradPpo, WrittenPpo, entropy, log_prob
 from workers.algorithms.return_scaler import ReturnScaler
-from workers.algorithms.rollout import Minibatch, generalized_advantages
-from workers.backward import rows_at_once
+from workers.algorithms.rollout import Samples, generalized_advantages
+from workers.backward import ROWS_AT_ONCE
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
 from workers.networks import GaussianActor, build_network
 
@@ -106,12 +106,12 @@ def test_log_probability_and_entropy_are_those_of_a_normal() -> None:
     assert entropy(log_std).item() == pytest.approx(expected)
 
 
-def batch_with_ratio(actor: GaussianActor, ratios: list[float], advantages: list[float]) -> Minibatch:
+def batch_with_ratio(actor: GaussianActor, ratios: list[float], advantages: list[float]) -> Samples:
     rows = len(ratios)
     observations, actions = torch.rand(rows, 16), torch.rand(rows, 2)
     with torch.no_grad():
         now = log_prob((actions - actor(observations)) / actor.log_std.exp(), actor.log_std)
-    return Minibatch(observations, actions, now - torch.tensor(ratios).log(), torch.tensor(advantages), torch.randn(rows))
+    return Samples(observations, actions, now - torch.tensor(ratios).log(), torch.tensor(advantages), torch.randn(rows))
 
 
 def test_clipped_surrogate_by_hand() -> None:
@@ -124,7 +124,7 @@ def test_clipped_surrogate_by_hand() -> None:
     actor = GaussianActor(build_network(MlpNetwork(), 16, 2), (0.2, 0.4))
     critic = build_network(MlpNetwork(), 16, 1)
     batch = batch_with_ratio(actor, [1.5, 0.5, 1.5, 0.5, 1.1], [1.0, 1.0, -1.0, -2.0, 1.0])
-    losses = AutogradPpo(actor, critic, 0.2, 0.0)(batch)
+    losses = AutogradPpo(actor, critic, 0.2, 0.0)(batch, torch.arange(5))
     assert losses[0].item() == pytest.approx(-(1.2 + 0.5 - 1.5 - 1.6 + 1.1) / 5, abs=1e-5)
     assert losses[3].item() == pytest.approx(4 / 5)
     kl = sum(r - 1 - math.log(r) for r in (1.5, 0.5, 1.5, 0.5, 1.1)) / 5
@@ -133,21 +133,21 @@ def test_clipped_surrogate_by_hand() -> None:
 
 @pytest.mark.parametrize("network", [ResBlockNetwork(), MlpNetwork(), MlpNetwork(activation="tanh")], ids=repr)
 def test_written_out_gradients_equal_autograd(network: Network) -> None:
-    rows = 600  # more than go through any of the networks at once
-    config = PpoConfig(network=network, robots=8, rollout_steps=75, minibatch_size=rows, entropy_coefficient=0.01)
+    rows = 3 * ROWS_AT_ONCE
+    config = PpoConfig(network=network, robots=8, rollout_steps=rows // 8, minibatch_size=64, entropy_coefficient=0.01)
     ppo = build_ppo(config, 16, 0, CPU)
-    assert rows_at_once(ppo.critic) < rows
     with torch.no_grad():
         ppo.actor.network.head.weight.normal_(0.0, 0.3)
     generator = torch.Generator().manual_seed(1)
     ratios = (torch.rand(rows, generator=generator) + 0.5).tolist()
-    batch = batch_with_ratio(ppo.actor, ratios, torch.randn(rows, generator=generator).tolist())
+    samples = batch_with_ratio(ppo.actor, ratios, torch.randn(rows, generator=generator).tolist())
+    minibatch = torch.randperm(rows, generator=generator)[: 2 * ROWS_AT_ONCE + 50]
     flat = ppo._optimizer
 
-    reference = AutogradPpo(ppo.actor, ppo.critic, 0.2, 0.01)(batch)
+    reference = AutogradPpo(ppo.actor, ppo.critic, 0.2, 0.01)(samples, minibatch)
     expected = flat.gradients.clone()
     flat.gradients.fill_(float("nan"))
-    written = WrittenPpo(ppo.actor, ppo.critic, 0.2, 0.01)(batch)
+    written = WrittenPpo(ppo.actor, ppo.critic, 0.2, 0.01)(samples, minibatch)
 
     assert torch.allclose(written.float(), reference, rtol=1e-4, atol=1e-6)
     assert expected.abs().max() > 0.01

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.replay import Transitions
-from workers.backward import TensorBackward, backward_of
+from workers.backward import TensorPasses
 from workers.networks import Body, DeterministicActor, bound_actions
 
 
@@ -47,7 +47,7 @@ def differentiate_critics(
 
 
 @torch.no_grad()
-def write_critic_gradients(critics: Sequence[TensorBackward], batch: Transitions, targets: Tensor) -> Tensor:
+def write_critic_gradients(critics: Sequence[TensorPasses], batch: Transitions, targets: Tensor) -> Tensor:
     """The same, written out."""
     inputs = torch.cat((batch.observations, batch.actions), dim=1)
     loss = torch.zeros((), device=targets.device)
@@ -90,8 +90,8 @@ class WrittenActorCritic:
 
     def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int, logit_penalty: float) -> None:
         self._penalty = logit_penalty
-        self._actor = TensorBackward(backward_of(actor.network, batch_size))
-        self._critics = [TensorBackward(backward_of(critic, batch_size)) for critic in critics]
+        self._actor = TensorPasses(actor.network, batch_size)
+        self._critics = [TensorPasses(critic, batch_size) for critic in critics]
 
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `ActorCriticGradients.critics`."""

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from workers.algorithms.adam import BETA1, BETA2, EPSILON, adam_step, clip_norm
+from workers.kernels.adam import BETA1, BETA2, EPSILON, adam_step, clip_norm
 
 
 class FlatParameters:

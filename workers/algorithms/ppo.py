@@ -90,12 +90,13 @@ class Ppo:
         returns = advantages + values[:-1]
         explained_variance = 1.0 - (advantages.var() / (returns.var() + _EPSILON)).item()
         normalised = (advantages - advantages.mean()) / (advantages.std() + _EPSILON)
-        log_probs = log_prob(storage.noise, self.actor.log_std)
+        samples = storage.samples(log_prob(storage.noise, self.actor.log_std), normalised, returns)
 
         totals, minibatches = torch.zeros(4, dtype=torch.float64, device=storage.device), 0
         for _ in range(config.epochs):
-            for batch in storage.minibatches(log_probs, normalised, returns, config.minibatch_size, self._generator):
-                totals += self._gradients(batch)
+            order = torch.randperm(len(samples.returns), generator=self._generator, device=storage.device)
+            for minibatch in order.split(config.minibatch_size):
+                totals += self._gradients(samples, minibatch)
                 self._optimizer.clip_gradients(config.max_grad_norm)
                 self._optimizer.step()
                 self.actor.log_std.clamp_(*LOG_STD_RANGE)

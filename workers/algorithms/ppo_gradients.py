@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from workers.algorithms.ppo_loss import LOG_SQRT_2PI, STATISTICS, differentiate_policy_loss, differentiate_value_loss
-from workers.algorithms.rollout import Minibatch
-from workers.backward import backward_of, rows_at_once
+from workers.algorithms.rollout import Samples
+from workers.backward import ROWS_AT_ONCE, passes_of
+from workers.kernels.ppo import LOG_SQRT_2PI, STATISTICS, differentiate
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, GaussianActor
 
@@ -24,8 +24,12 @@ from workers.networks import Body, GaussianActor
 class PpoGradients(Protocol):
     """Fills the `.grad` of the actor's and the critic's parameters."""
 
-    def __call__(self, batch: Minibatch) -> Tensor:
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """Overwrites the gradients.
+
+        Args:
+            samples: a rollout's.
+            rows: (n,) int64, those that are in the minibatch.
 
         Returns:
             (4,): policy loss (without the entropy bonus), value loss, estimate of KL(old, new), clipped fraction.
@@ -50,8 +54,9 @@ class AutogradPpo:
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
 
     @torch.enable_grad()
-    def __call__(self, batch: Minibatch) -> Tensor:
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
+        batch = Samples(*(column[rows] for column in samples))
         for parameter in (*self._actor.parameters(), *self._critic.parameters()):
             if parameter.grad is not None:
                 parameter.grad.zero_()
@@ -77,29 +82,15 @@ class WrittenPpo:
         assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
         self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
-        self._rows = rows = min(rows_at_once(actor.network), rows_at_once(critic))
-        self._policy, self._critic = backward_of(actor.network, rows), backward_of(critic, rows)
-        self._by_logits = np.empty((rows, ACTION_SIZE), np.float32)
-        self._by_values = np.empty((rows, 1), np.float32)
+        self._actor, self._critic = passes_of(actor.network, ROWS_AT_ONCE), passes_of(critic, ROWS_AT_ONCE)
 
-    def __call__(self, batch: Minibatch) -> Tensor:
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
-        observations, actions = batch.observations.numpy(), batch.actions.numpy()
-        log_probs, advantages, returns = batch.log_probs.numpy(), batch.advantages.numpy(), batch.returns.numpy()
-        size = len(observations)
         statistics, by_log_std = np.zeros(STATISTICS), np.full(ACTION_SIZE, -self._entropy_coefficient)
-        for first in range(0, size, self._rows):
-            some = slice(first, first + self._rows)
-            inputs, add = observations[some], first > 0
-            by_logits, by_values = self._by_logits[: len(inputs)], self._by_values[: len(inputs)]
-            logits = self._policy.forward(inputs, same=add)
-            differentiate_policy_loss(
-                logits, actions[some], log_probs[some], advantages[some], self._log_std, self._clip_range, 1.0 / size,
-                by_logits, by_log_std, statistics,
-            )  # fmt: skip
-            self._policy.backward(by_logits, add=add)
-            values = self._critic.forward(inputs, same=add)
-            differentiate_value_loss(values, returns[some], 1.0 / size, by_values, statistics)
-            self._critic.backward(by_values, add=add)
+        arrays = tuple(column.numpy() for column in samples)
+        differentiate(
+            self._actor, self._critic, arrays, rows.numpy(), ROWS_AT_ONCE,
+            self._log_std, self._clip_range, by_log_std, statistics,
+        )  # fmt: skip
         self._by_log_std[:] = by_log_std
         return torch.from_numpy(statistics)

@@ -1,7 +1,6 @@
 """What PPO remembers of one rollout, and the advantages that follow from it."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -11,9 +10,8 @@ from torch import Tensor
 from workers.layout import ACTION_SIZE
 
 
-@dataclass(frozen=True, slots=True)
-class Minibatch:
-    """Samples of a rollout: n rows each, in the same order.
+class Samples(NamedTuple):
+    """What PPO learns from, a row for each step of each robot.
 
     Attributes:
         observations: (n, size).
@@ -85,22 +83,10 @@ class RolloutStorage:
         observations = np.concatenate([observations for _, _, observations in self._truncations])
         return steps, robots, torch.from_numpy(observations).to(self.device)
 
-    def minibatches(
-        self, log_probs: Tensor, advantages: Tensor, returns: Tensor, size: int, generator: torch.Generator
-    ) -> Iterator[Minibatch]:
-        """The rollout once, in random order, `size` rows at a time (the last may be smaller)."""
-        rows = self.steps * self.robots
-        # One gather for the whole pass, then slices: a fifth of the calls that a gather for each minibatch takes.
-        order = torch.randperm(rows, generator=generator, device=self.device)
-        columns = (
-            self.observations[:-1].flatten(0, 1)[order],
-            self.actions.flatten(0, 1)[order],
-            log_probs.flatten()[order],
-            advantages.flatten()[order],
-            returns.flatten()[order],
-        )
-        for start in range(0, rows, size):
-            yield Minibatch(*(column[start : start + size] for column in columns))
+    def samples(self, log_probs: Tensor, advantages: Tensor, returns: Tensor) -> Samples:
+        """The rollout's rows, step by step, with what is known of them (steps, robots) after it."""
+        observations, actions = self.observations[:-1].flatten(0, 1), self.actions.flatten(0, 1)
+        return Samples(observations, actions, log_probs.flatten(), advantages.flatten(), returns.flatten())
 
 
 def generalized_advantages(

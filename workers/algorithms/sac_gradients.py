@@ -16,7 +16,7 @@ from workers.algorithms.actor_critic_gradients import action_value, differentiat
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.ppo_gradients import log_prob
 from workers.algorithms.replay import Transitions
-from workers.backward import TensorBackward, backward_of
+from workers.backward import TensorPasses
 from workers.layout import ACTION_SIZE
 from workers.networks import Body, bound_actions
 
@@ -94,8 +94,8 @@ class WrittenSac:
     """The same gradients without autograd, on a CPU; a test compares them with `AutogradSac`'s."""
 
     def __init__(self, actor: Body, critics: Sequence[Body], batch_size: int) -> None:
-        self._actor = TensorBackward(backward_of(actor, batch_size))
-        self._critics = [TensorBackward(backward_of(critic, batch_size)) for critic in critics]
+        self._actor = TensorPasses(actor, batch_size)
+        self._critics = [TensorPasses(critic, batch_size) for critic in critics]
 
     def critics(self, batch: Transitions, targets: Tensor) -> Tensor:
         """See `SacGradients.critics`."""

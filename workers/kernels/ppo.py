@@ -1,22 +1,59 @@
-"""PPO's losses and their derivatives by the networks' outputs, in one compiled pass over samples of a minibatch.
+"""The gradients of PPO's losses over a minibatch, in one compiled call.
 
-These are so few that some thirty tensor operations cost more in calls than in arithmetic. `ppo_gradients` has the
-formulas, and the reference by autograd that a test compares this with.
+`workers.algorithms.ppo_gradients` has the formulas, and the reference by autograd that a test compares this with.
 """
 
 import math
 
-import numba as nb
 import numpy as np
+
+from workers.kernels.networks import backward, forward
+from workers.kernels.options import kernel
 
 LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _ONE, _TWO = np.float32(1.0), np.float32(2.0)
 
 STATISTICS = 4
-"""Numbers that both functions add up to: policy loss, value loss, estimate of KL(old, new), clipped fraction."""
+"""Numbers that are added up: policy loss, value loss, estimate of KL(old, new), clipped fraction."""
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
+def differentiate(actor, critic, samples, minibatch, at_once, log_std, clip_range, by_log_std, statistics):
+    """Overwrite the gradients of both networks' parameters.
+
+    Some rows at a time are gathered, and go through both networks forward and backward while a core's cache holds them.
+
+    Args:
+        actor: `workers.kernels.networks.Passes`.
+        critic: likewise.
+        samples: the arrays of `workers.algorithms.rollout.Samples`, in their order.
+        minibatch: (n,) rows of the samples.
+        at_once: rows, at most as many as both networks have buffers for.
+        log_std: (2,).
+        clip_range: how far the ratio may go from 1.
+        by_log_std: (2,) float64, added to: derivative of the loss by the log deviations.
+        statistics: (4,) float64, added to: `STATISTICS`.
+    """
+    all_observations, all_actions, all_log_probs, all_advantages, all_returns = samples
+    size = minibatch.shape[0]
+    share = 1.0 / size
+    by_logits, by_values = np.empty((at_once, 2), np.float32), np.empty((at_once, 1), np.float32)
+    for first in range(0, size, at_once):
+        some = minibatch[first : first + at_once]
+        rows, again = some.shape[0], first > 0
+        observations = all_observations[some]
+        logits = forward(actor, observations, again)
+        differentiate_policy_loss(
+            logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, clip_range, share,
+            by_logits, by_log_std, statistics,
+        )  # fmt: skip
+        backward(actor, observations, by_logits[:rows], again)
+        values = forward(critic, observations, again)
+        differentiate_value_loss(values, all_returns[some], share, by_values, statistics)
+        backward(critic, observations, by_values[:rows], again)
+
+
+@kernel()
 def differentiate_policy_loss(
     logits, actions, log_probs, advantages, log_std, clip_range, share, by_logits, by_log_std, statistics
 ):
@@ -30,7 +67,7 @@ def differentiate_policy_loss(
         log_std: (2,).
         clip_range: how far the ratio may go from 1.
         share: what a sample counts: one over the minibatch's size.
-        by_logits: (n, 2), written: derivative of the loss by the logits.
+        by_logits: (n or more, 2), written: derivative of the loss by the logits.
         by_log_std: (2,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: all of `STATISTICS` but the value loss.
     """
@@ -68,7 +105,7 @@ def differentiate_policy_loss(
     statistics[3] += share * clips
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def differentiate_value_loss(values, returns, share, by_values, statistics):
     """The squared error of Eq. 9 of some of a minibatch's samples.
 
@@ -76,7 +113,7 @@ def differentiate_value_loss(values, returns, share, by_values, statistics):
         values: (n, 1) the critic's outputs.
         returns: (n,) its targets.
         share: what a sample counts: one over the minibatch's size.
-        by_values: (n, 1), written: derivative of the loss by the values.
+        by_values: (n or more, 1), written: derivative of the loss by the values.
         statistics: (4,) float64, added to: the value loss.
     """
     scale = _TWO * np.float32(share)

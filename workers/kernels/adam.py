@@ -2,14 +2,15 @@
 
 import math
 
-import numba as nb
 import numpy as np
+
+from workers.kernels.options import kernel
 
 BETA1, BETA2 = 0.9, 0.999
 EPSILON = 1e-8
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel()
 def adam_step(values, gradients, mean, square, rate, epsilon):
     """Update moments and values (n,), given the rate and epsilon that both bias corrections leave."""
     keep1, keep2 = np.float32(BETA1), np.float32(BETA2)
@@ -23,7 +24,7 @@ def adam_step(values, gradients, mean, square, rate, epsilon):
 
 
 # The order of a sum is free, or it would be added up one by one; NaN stays NaN.
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc"})
+@kernel(fastmath={"reassoc"})
 def clip_norm(gradients, max_norm):
     """Scale gradients (n,) to at most this 2-norm."""
     total = 0.0

@@ -1,0 +1,1 @@
+"""What the learners compute in compiled code; plain functions over arrays, with PyTorch nowhere in sight."""
