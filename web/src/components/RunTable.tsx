@@ -39,7 +39,7 @@ export function RunTable({ runs }: { runs: readonly Run[] }) {
               </Table.Td>
               <Table.Td className={ui.number}>
                 {count(run.step)}
-                <span className={ui.quiet}> of {count(run.total_steps)}</span>
+                {run.step < run.total_steps && <span className={ui.quiet}> of {count(run.total_steps)}</span>}
                 {isActive(run.state) && (
                   <ProgressBar
                     value={run.step / run.total_steps}

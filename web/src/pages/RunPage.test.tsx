@@ -35,6 +35,12 @@ test('a running run: how far it is, its curves, its robots', async () => {
   await waitFor(() => expect(screen.queryByTestId('live-overlay')).not.toBeInTheDocument())
 })
 
+test('a completed run went to the end of its last rollout: so many steps, of no number', async () => {
+  startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, state: 'completed', step: 303_104 } })
+  open('/runs/run1')
+  expect(await screen.findByTestId('vitals')).toHaveTextContent(/Steps303\s104(?! of)/)
+})
+
 test('its policies, the newest first, the best marked, each to take away', async () => {
   startServer(routes)
   open('/runs/run1')

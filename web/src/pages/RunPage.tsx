@@ -241,7 +241,11 @@ function RunActions({ run }: { run: RunDetail }) {
 function Vitals({ run }: { run: RunDetail }) {
   const progress = run.step / run.total_steps
   const figures: [label: string, value: string][] = [
-    ['Steps', `${count(run.step)} of ${count(run.total_steps)}`],
+    // The last rollout is whole, so that a completed run has some steps more than it was given.
+    [
+      'Steps',
+      run.step < run.total_steps ? `${count(run.step)} of ${count(run.total_steps)}` : count(run.step),
+    ],
     ...(run.seconds_left === null ? [] : [['Time left', duration(run.seconds_left)] as [string, string]]),
     ...(run.steps_per_second === null ? [] : [['Steps/s', count(run.steps_per_second)] as [string, string]]),
     ...(run.started_at !== null && run.finished_at !== null

@@ -20,7 +20,7 @@ export function PaperTables({ reproduction }: { reproduction: Reproduction }) {
 function OneTable({ table: paper, rows }: { table: PaperTable; rows: ReadonlyMap<string, CampaignRow> }) {
   return (
     <Panel title={paper.title} flush data-testid="paper-table">
-      <Table.ScrollContainer type="native" minWidth={1040}>
+      <Table.ScrollContainer type="native" minWidth={1160}>
         <Table layout="fixed" className={`${table.table} ${classes.table}`}>
           <Table.Thead>
             <Table.Tr>
