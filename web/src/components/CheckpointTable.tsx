@@ -23,19 +23,25 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={760} mah={420}>
+    <Table.ScrollContainer type="native" minWidth={320} mah={420}>
       <Table highlightOnHover className={classes.table} data-testid="checkpoints">
         <Table.Thead>
           <Table.Tr>
-            <Table.Th ta="right" w={110}>
+            <Table.Th ta="right" className={classes.step}>
               Step
             </Table.Th>
-            <Table.Th w={84} aria-label="Best" />
+            <Table.Th visibleFrom="sm" w={84} aria-label="Best" />
             <Table.Th>Success, 95 % interval</Table.Th>
-            <Table.Th ta="right">Steps to target</Table.Th>
-            <Table.Th ta="right">Size</Table.Th>
-            <Table.Th ta="right">Saved</Table.Th>
-            <Table.Th w={330} aria-label="Episodes and downloads" />
+            <Table.Th visibleFrom="md" ta="right">
+              Steps to target
+            </Table.Th>
+            <Table.Th visibleFrom="md" ta="right">
+              Size
+            </Table.Th>
+            <Table.Th visibleFrom="lg" ta="right">
+              Saved
+            </Table.Th>
+            <Table.Th className={classes.actions} aria-label="Episodes and downloads" />
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -49,7 +55,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
               <Table.Td ta="right" fw={550} className={ui.number}>
                 {count(checkpoint.step)}
               </Table.Td>
-              <Table.Td>
+              <Table.Td visibleFrom="sm">
                 {checkpoint.best && (
                   <Badge size="sm" variant="light" miw="fit-content">
                     Best
@@ -59,19 +65,24 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
               <Table.Td>
                 <SuccessEstimate estimate={checkpoint.evaluation?.success ?? null} episodes />
               </Table.Td>
-              <Table.Td ta="right" className={ui.number}>
+              <Table.Td visibleFrom="md" ta="right" className={ui.number}>
                 {checkpoint.evaluation?.steps_mean == null
                   ? '–'
                   : significant(checkpoint.evaluation.steps_mean, 3)}
               </Table.Td>
-              <Table.Td ta="right" className={ui.number} title={`SHA-256 ${checkpoint.sha256}`}>
+              <Table.Td
+                visibleFrom="md"
+                ta="right"
+                className={ui.number}
+                title={`SHA-256 ${checkpoint.sha256}`}
+              >
                 {fileSize(checkpoint.size)}
               </Table.Td>
-              <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`}>
+              <Table.Td visibleFrom="lg" ta="right" className={`${ui.number} ${ui.quiet}`}>
                 {dateTime(checkpoint.created_at)}
               </Table.Td>
               <Table.Td>
-                <Group gap={6} justify="flex-end" wrap="nowrap">
+                <Group gap={6} justify="flex-end" className={classes.buttons}>
                   {checkpoint.evaluation && (
                     <Button
                       size="compact-sm"
