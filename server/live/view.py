@@ -1,5 +1,6 @@
 """The scene of one watched run on a viser server of its own, drawn by one thread thirty times a second."""
 
+import logging
 import threading
 import time
 
@@ -13,6 +14,11 @@ from server.live.themes import Theme
 from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.mover_config import MAX_MOVERS
 from workers.frames import Frame, FrameError
+
+logger = logging.getLogger(__name__)
+
+COMPLAIN_SECONDS = 10.0
+"""Between two messages of a view that cannot draw."""
 
 
 class LiveView:
@@ -38,6 +44,7 @@ class LiveView:
         self._settings = settings
         self._connected = False
         self._arrived = float("-inf")
+        self._positions: list[tuple[float, float]] = []
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._draw, name="live-view", daemon=True)
         self._thread.start()
@@ -85,19 +92,29 @@ class LiveView:
 
     def _draw(self) -> None:
         tick = time.monotonic()
-        positions: list[tuple[float, float]] = []
+        complained = float("-inf")
         while not self._stopping.wait(max(0.0, tick - time.monotonic())):
             now = time.monotonic()
             tick = max(tick + 1.0 / FRAMES_PER_SECOND, now)
-            with self._lock:
-                frame = self._buffer.take()
-                settings = self._settings
-                if frame is not None:
-                    self._scoreboard.update(frame)
-            with self._server.atomic():
-                self._scene.show_rays(settings.rays)
-                self._camera.follow(settings.follow, now)
-                if frame is not None:
-                    positions = [(float(x), float(y)) for x, y, _ in frame.poses]
-                    self._scene.update(frame, now)
-                self._scene.centre_on(*self._camera.centre(positions, now))
+            try:
+                self._tick(now)
+            except Exception:
+                # The next frame may be drawn: a view that stood still for ever would look as if the robots did.
+                if now - complained > COMPLAIN_SECONDS:
+                    logger.exception("a frame could not be drawn")
+                    complained = now
+
+    def _tick(self, now: float) -> None:
+        """Draws what is due."""
+        with self._lock:
+            frame = self._buffer.take()
+            settings = self._settings
+            if frame is not None:
+                self._scoreboard.update(frame)
+        with self._server.atomic():
+            self._scene.show_rays(settings.rays)
+            self._camera.follow(settings.follow, now)
+            if frame is not None:
+                self._positions = [(float(x), float(y)) for x, y, _ in frame.poses]
+                self._scene.update(frame, now)
+            self._scene.centre_on(*self._camera.centre(self._positions, now))

@@ -23,6 +23,7 @@ from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
 from server.live.quiet import start_viser, stop_viser
 from server.live.robots import RobotNodes
+from server.live.scene import Scene
 from server.live.settings import LiveSettings
 from server.live.themes import COLOURS, Theme
 from server.live.view import LiveView
@@ -212,6 +213,27 @@ def test_a_scene_shows_frames_and_counts_what_happened(theme: Theme) -> None:
         assert [robot.reward for robot in score.robots] == [12.0, 12.0]
     finally:
         view.close()
+
+
+def test_a_frame_that_cannot_be_drawn_is_not_the_last(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    drawn: list[Frame] = []
+
+    def draw(_: Scene, frame: Frame, now: float) -> None:
+        drawn.append(frame)
+        if len(drawn) <= 3:
+            raise RuntimeError("no more memory")
+
+    monkeypatch.setattr(Scene, "update", draw)
+    view = LiveView(TaskConfig(), "light", LiveSettings())
+    try:
+        assert asyncio.run(_play(view))
+    finally:
+        view.close()
+    assert len(drawn) > 3
+    complaints = [record for record in caplog.records if record.name == "server.live.view"]
+    assert len(complaints) == 1  # not thirty a second
 
 
 async def _play(view: LiveView) -> bool:
