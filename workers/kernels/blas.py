@@ -1,8 +1,8 @@
 """Matrix products in compiled code, by the BLAS that SciPy comes with.
 
-The smaller, the quicker: OpenBLAS multiplies matrices with up to `SMALL_PRODUCT` multiplications by kernels that read them
-where they lie, and larger ones after copying them. On a core with AVX-512 the former do 110 billion operations a second
-where the latter do 54 to 90. The small ones are slow only where rows are multiplied by rows, A B^T.
+On processors with AVX-512 the smaller is the quicker: there OpenBLAS multiplies matrices with up to `SMALL_PRODUCT`
+multiplications by kernels that read them where they lie, which do 110 billion operations a second, and larger ones after
+copying them, with 54 to 90. The small ones are slow only where rows are multiplied by rows, A B^T. Elsewhere all are copied.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from llvmlite.binding import add_symbol
 from numba import types
 from numba.core import cgutils
 from numba.extending import get_cython_function_address, intrinsic
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from workers.kernels.options import kernel
 
@@ -21,9 +21,12 @@ SMALL_PRODUCT = 1_000_000
 """Multiplications of a matrix product that OpenBLAS counts as small."""
 
 _FEWEST_ROWS = 16  # Wider matrices are multiplied faster all at once than in slices as thin as this.
+_CORES_WITH_SMALL_KERNELS = {"skylakex", "cooperlake", "sapphirerapids"}
 
 # Threads that wait for one another over matrices this small take ten times the processor time that they save.
 threadpool_limits(limits=1, user_api="blas")
+
+_SLICES = any(library.get("architecture", "").lower() in _CORES_WITH_SMALL_KERNELS for library in threadpool_info())
 
 
 # Kept code must not hold addresses, so it finds the routine by this name. Fortran takes addresses only.
@@ -51,11 +54,11 @@ _address: Any = intrinsic(_on_stack)
 def multiply(a, transposed, b, add, product):
     """Writes product (m, n) = A (m, k) B (k, n), or adds to it with `add`; A is a, or a^T where `transposed`.
 
-    All are float32 with contiguous rows, at least one. Computed in small products, as equal as can be, by slices of the rows
-    of a: rows of the product, or where a is transposed parts of each of its sums.
+    All are float32 with contiguous rows, at least one. Where that pays, computed in small products, as equal as can be, by
+    slices of the rows of a: rows of the product, or where a is transposed parts of each of its sums.
     """
     rows = a.shape[0]
-    most = SMALL_PRODUCT // (product.shape[1] * a.shape[1])
+    most = SMALL_PRODUCT // (product.shape[1] * a.shape[1]) if _SLICES else rows
     pieces = (rows + most - 1) // most if most >= _FEWEST_ROWS else 1
     each = (rows + pieces - 1) // pieces
     for first in range(0, rows, each):
