@@ -84,6 +84,11 @@ class Movers:
         self._crowd.steps[0] = 0
         place_movers(self._crowd)
 
+    def write_places(self, state: NDArray[np.float64]) -> None:
+        """Write where all of them are in the Space to their rows (tiles * K, 3) of `sim.physics.TiledSpace.state`."""
+        places = np.stack([self._records["x"], self._records["y"]], axis=1)
+        state[:, :2] = np.repeat(self._crowd.origins, self.discs.shape[1], axis=0) + places
+
     def of(self, tile: int) -> NDArray[np.float32]:
         """(n, 3) x, y, radius of the movers in a tile, metres."""
         discs = self.discs[tile]

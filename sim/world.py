@@ -190,6 +190,7 @@ class World:
         self._parameters["closing"] = (task.robot.max_linear_speed + self.movers.fastest) * task.control_period
         self.robots.records["replica"] = np.arange(robots) // (ROBOTS_PER_TILE * len(self.arenas))
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
+        self._placed = np.zeros(robots, dtype=np.int32)
         self.seed(seed)
 
     def __len__(self) -> int:
@@ -226,7 +227,10 @@ class World:
         self.robots.records["map"] = maps
         self.robots.records["parked"] = 0
         self.movers.place()
-        reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, self._space.state)
+        space = self._space
+        self.movers.write_places(space.state[len(self) : -1])
+        reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, space.state)
+        space.put_all()
 
     def reset_with(self, options: Mapping[str, ArrayLike] | None) -> None:
         """`reset`, with its arguments as Gymnasium passes them.
@@ -287,7 +291,9 @@ class World:
         if len(self.movers):
             self.movers.step(space.command, len(self))
         space.step(self.task.control_period)
-        step_robots(space.state, self.robots, self.geometry, self._parameters)
+        count = step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
+        if count:
+            space.put(self._placed[:count])
 
     @property
     def fields_of_view(self) -> NDArray[np.float64]:
@@ -336,3 +342,4 @@ class World:
                 )
         for name, target in targets.items():
             target[...] = state[name]
+        self._space.put_all()

@@ -281,7 +281,7 @@ def move_movers(crowd, period, between, command, robots):
         crowd: `sim.kernels.bundles.Crowd`, whose records, discs and steps are updated.
         period: seconds of this step.
         between: steps from one decision to the next.
-        command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the rows after the first `robots` are written.
+        command: (bodies, 3) vx, vy, angular velocity; the rows after the first `robots` are written.
         robots: how many bodies are robots.
     """
     records = crowd.records
@@ -295,11 +295,8 @@ def move_movers(crowd, period, between, command, robots):
         for k in range(slots):
             m = tile * slots + k
             record = records[m]
-            row = robots + m
-            command[row, 0] = crowd.origins[tile, 0] + record.x
-            command[row, 1] = crowd.origins[tile, 1] + record.y
-            command[row, 3] = record.vx
-            command[row, 4] = record.vy
+            command[robots + m, 0] = record.vx
+            command[robots + m, 1] = record.vy
             record.x += period * record.vx
             record.y += period * record.vy
             discs[tile, k, 0] = record.x
