@@ -177,17 +177,22 @@ def _sense(i, robots, geometry, p):
     """Scan from robot i's pose; returns the clearance of its centre, metres."""
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
-    heading = robots.poses[i, 2]
+    cos_heading = np.float32(math.cos(robots.poses[i, 2]))
+    sin_heading = np.float32(math.sin(robots.poses[i, 2]))
     index = robots.records[i].map
     own = _scanner_of(i, robots)
     clearance = sense(
-        x, y, heading, index, geometry.bounds, geometry.circles, geometry.boxes, robots.ray_cos[own], robots.ray_sin[own],
-        p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y,
+        x, y, cos_heading, sin_heading, index, geometry.bounds, geometry.circles, geometry.boxes, robots.ray_cos[own],
+        robots.ray_sin[own], p.range, p.looks_ahead, geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near,
     )  # fmt: skip
     tile = robots.records[i].replica * p.replica_stride + index
-    return sense_discs(
-        x, y, tile, geometry.discs, p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y, clearance
-    )
+    clearance = sense_discs(
+        x, y, cos_heading, sin_heading, tile, geometry.discs, p.range, p.looks_ahead,
+        geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near, clearance,
+    )  # fmt: skip
+    for k in range(robots.ranges.shape[1]):
+        robots.ranges[i, k] = geometry.scan[k]
+    return clearance
 
 
 @kernel(fastmath=FAST, inline="always")
