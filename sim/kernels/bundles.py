@@ -52,6 +52,8 @@ class Crowd(NamedTuple):
         waypoints: (W, 2) float64 of all patrols, metres.
         maps: (tiles,) the arena of each tile.
         bounds, circles, boxes, origins: see `Geometry`.
+        hulls: (M, 3, C + B) float64 x, y, radius of a disc round every circle and box; far away for an empty slot.
+        near, met: (C + B + 1,) and (K + 1,) scratch for the obstacles and for the others that one mover has to look at.
         steps: (1,) taken since all were placed.
         lines, chosen: scratch for half-planes, (2, n, 3), and for the velocities of a tile's movers, (K + 1, 2).
     """
@@ -64,6 +66,9 @@ class Crowd(NamedTuple):
     circles: Floats
     boxes: Floats
     origins: Doubles
+    hulls: Doubles
+    near: Integers
+    met: Integers
     steps: NDArray[np.int64]
     lines: Doubles
     chosen: Doubles
