@@ -44,7 +44,7 @@ def clearance_at(x, y, index, bounds, circles, boxes):
     return distance
 
 
-@kernel(fastmath=FAST)
+@kernel(fastmath=FAST, inline="always")
 def nearest_of(ranges, row, first, last):
     """The smallest of ranges[row, first:last], which is not empty."""
     nearest = ranges[row, first]
@@ -71,7 +71,7 @@ def _shorten_by_circle(fx, fy, radius, limit, ranges, dx, dy):
         ranges[i] = min(ranges[i], hit if (square >= ZERO and hit >= ZERO) else limit)
 
 
-@kernel(fastmath=FAST)
+@kernel(fastmath=FAST, inline="always")
 def sense(
     x, y, cos_heading, sin_heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, dx, dy, near
 ):
@@ -79,9 +79,10 @@ def sense(
 
     `limit` is the LiDAR's range, which a ray without a hit reads. A ray that starts inside an obstacle reads 0.
 
-    `ray_cos`, `ray_sin`, `ranges` and the scratch `dx`, `dy` are float32 and as long as `padded` says; a ray beyond the
-    scanner's has direction (0, 0), and what it reads means nothing. `near` is int32 scratch, as long as there are circles
-    or boxes. Which of these can be seen is found out first, without a branch: nobody could foretell them.
+    `ray_cos`, `ray_sin`, `ranges` and the scratch `dx`, `dy` are float32, and filled up as `sim.lidar.padded` does it; what
+    a ray beyond the scanner's reads means nothing. `near` is int32 scratch for as many circles or boxes as there are. Which
+    of these can be seen is listed first, without a branch, since no processor can foretell it: with thousands of robots,
+    branches took more time than the rays.
     """
     rays = ray_cos.shape[0]
     half_width = bounds[index, 0]
