@@ -79,14 +79,14 @@ def kernel_only(robots: int) -> Callable[[], None]:
     """The same without the physics: commands integrated in NumPy, free of contact."""
     _, world = ours(robots)
     space, parameters = world._space, world._parameters  # noqa: SLF001 (what is left out is not public)
-    actions = random_actions(robots)
+    actions, placed = random_actions(robots), np.zeros(robots, dtype=np.int32)
     count = 0
 
     def step() -> None:
         nonlocal count
         write_commands(actions[count % ACTIONS], world.robots, space.state, space.command, parameters)
-        space.state[:robots] = space.command[:robots, :3] + TASK.control_period * space.command[:robots, 3:]
-        step_robots(space.state, world.robots, world.geometry, parameters)
+        space.state[:robots] += TASK.control_period * space.command[:robots]
+        step_robots(space.state, placed, world.robots, world.geometry, parameters)
         count += 1
 
     return step

@@ -5,6 +5,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.config import LidarConfig
 
+LANES = 16
+"""The kernels work on so many rays at a time; what was left over of others would go one by one."""
+
 
 def ray_angles(lidar: LidarConfig) -> NDArray[np.float64]:
     """Angles of the rays against the heading, (rays,) radians, from right to left.
@@ -14,6 +17,11 @@ def ray_angles(lidar: LidarConfig) -> NDArray[np.float64]:
     """
     half = np.radians(lidar.field_of_view) / 2.0
     return np.linspace(-half, half, lidar.rays, endpoint=lidar.field_of_view < 360.0)
+
+
+def padded(directions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Cosines or sines of rays (n, rays), with zeros up to a multiple of `LANES` behind them, as the kernels want them."""
+    return np.pad(directions, ((0, 0), (0, -directions.shape[1] % LANES))).astype(np.float32)
 
 
 def drawn_ray_angles(lidar: LidarConfig, fields_of_view: ArrayLike) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from sim.kernels.movers import DECISION, move_movers, place_movers
 from sim.kernels.random import seed_streams
 from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
 from sim.mover_config import MoverKind
-from sim.shapes import Shapes
+from sim.shapes import Shapes, hulls
 
 _KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}
 # Other streams than the robots', for the same seed.
@@ -63,6 +63,9 @@ class Movers:
             circles=circles,
             boxes=boxes,
             origins=origins,
+            hulls=hulls(circles, boxes),
+            near=np.empty(1 + circles.shape[1] + boxes.shape[1], dtype=np.int32),
+            met=np.empty(slots + 1, dtype=np.int32),
             steps=np.zeros(1, dtype=np.int64),
             lines=np.empty((2, 4 + circles.shape[1] + boxes.shape[1] + 2 * slots, 3)),
             chosen=np.empty((slots + 1, 2)),
@@ -83,6 +86,11 @@ class Movers:
         """Draw where all of them start."""
         self._crowd.steps[0] = 0
         place_movers(self._crowd)
+
+    def write_places(self, state: NDArray[np.float64]) -> None:
+        """Write where all of them are in the Space to their rows (tiles * K, 3) of `sim.physics.TiledSpace.state`."""
+        places = np.stack([self._records["x"], self._records["y"]], axis=1)
+        state[:, :2] = np.repeat(self._crowd.origins, self.discs.shape[1], axis=0) + places
 
     def of(self, tile: int) -> NDArray[np.float32]:
         """(n, 3) x, y, radius of the movers in a tile, metres."""

@@ -25,11 +25,12 @@ GAP = 2.0
 """Metres between two tiles."""
 
 _WALL = 0.05  # half the thickness of the outer walls, whose inner faces stand on the arena's bounds
-_HASH_CELL = 3.0  # m; the spatial hash at this size is 1.3 times as fast as Chipmunk's tree
+_HASH_CELL = 1.5  # m; in larger cells too many robots of a tile meet, of smaller ones each needs several
 _HASH_SLOTS_PER_SHAPE = 2
 _ROBOT, _OBSTACLE = 0b01, 0b10
-_READ = batch.BodyFields.POSITION | batch.BodyFields.ANGLE
-_WRITE = _READ | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_POSES = batch.BodyFields.POSITION | batch.BodyFields.ANGLE
+_VELOCITIES = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_FEW = 20  # up to one body in so many is put by itself, which takes so many times as long as one in bulk
 
 
 def tile_origins(arenas: Sequence[Arena], replicas: int) -> NDArray[np.float64]:
@@ -82,8 +83,8 @@ class TiledSpace:
     Attributes:
         space: the pymunk Space.
         state: (bodies, 3) float64 x, y, angle in the Space, in the order robots, movers, static body. `step` refills it;
-            what is written to it stands after the next `step` with the command for that body.
-        command: (bodies, 6) float64 x, y, angle, vx, vy, angular velocity that the next `step` starts from.
+            what is written to it stands once it is `put`.
+        command: (bodies, 3) float64 vx, vy, angular velocity of the next `step`.
     """
 
     def __init__(
@@ -100,29 +101,47 @@ class TiledSpace:
         space.use_spatial_hash(_HASH_CELL, _HASH_SLOTS_PER_SHAPE * shapes)
         for tile, (x, y) in enumerate(origins.tolist()):
             add_arena(space, arenas[tile % len(arenas)], x, y)
+        self._bodies: list[pymunk.Body] = []
         for _ in range(robots):
             body, shape = robot_body(robot)
             shape.filter = pymunk.ShapeFilter(group=1, categories=_ROBOT, mask=_OBSTACLE)
             space.add(body, shape)
+            self._bodies.append(body)
         for _ in range(movers):
-            space.add(pymunk.Body(body_type=pymunk.Body.KINEMATIC))
+            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            space.add(body)
+            self._bodies.append(body)
         self.space = space
 
         # Rows follow the order of insertion, the static body last; they stay so since no body is ever removed.
         rows = robots + movers + 1
-        self.command: NDArray[np.float64] = np.zeros((rows, 6))
+        self.command: NDArray[np.float64] = np.zeros((rows, 3))
         self._written = batch.Buffer()
         self._written.set_float_buf(self.command)
         self._read = batch.Buffer()
-        batch.get_space_bodies(space, _READ, self._read)
+        batch.get_space_bodies(space, _POSES, self._read)
         # A view of pymunk's own memory, which stays where it is while the number of rows does.
         self.state: NDArray[np.float64] = np.frombuffer(self._read.float_buf(), np.float64).reshape(-1, 3)
         if self.state.shape != (rows, 3):
             raise AssertionError(f"pymunk.batch gave {self.state.shape[0]} bodies instead of {rows}")
 
     def step(self, period: float) -> None:
-        """Put every body where `command` says, let it drive for `period` seconds, and read `state`."""
-        batch.set_space_bodies(self.space, _WRITE, self._written)
+        """Let every body drive for `period` seconds as `command` says, and read `state`."""
+        batch.set_space_bodies(self.space, _VELOCITIES, self._written)
         self.space.step(period)
         self._read.clear()
-        batch.get_space_bodies(self.space, _READ, self._read)
+        batch.get_space_bodies(self.space, _POSES, self._read)
+
+    def put(self, rows: NDArray[np.int32]) -> None:
+        """Put the bodies of these rows where `state` says; it says where all others are, too."""
+        if _FEW * len(rows) > len(self.state):
+            self.put_all()
+            return
+        for row in rows.tolist():
+            x, y, angle = self.state[row].tolist()
+            self._bodies[row].position = x, y
+            self._bodies[row].angle = angle
+
+    def put_all(self) -> None:
+        """Put every body where `state` says."""
+        batch.set_space_bodies(self.space, _POSES, self._read)

@@ -9,7 +9,7 @@ from sim.arenas import Arena
 from sim.config import AnyRobotConfig, LidarConfig
 from sim.kernels.footprint import rectangle_clearances
 from sim.kernels.sensing import clearance_points, scan_poses
-from sim.lidar import drawn_ray_angles
+from sim.lidar import drawn_ray_angles, padded
 from sim.shapes import pack_shapes
 
 
@@ -44,8 +44,8 @@ def scan(
         where,
         np.zeros(len(where), dtype=np.int32),
         *pack_shapes((scene,)),
-        np.cos(angles).astype(np.float32),
-        np.sin(angles).astype(np.float32),
+        padded(np.cos(angles)),
+        padded(np.sin(angles)),
         np.float32(lidar.range),
         np.int32(fields.max(initial=0.0) <= 180.0),
         ranges,

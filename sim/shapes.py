@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from sim.arenas import Arena
 from sim.kernels.records import BOX_COLUMNS, CIRCLE_COLUMNS
 
+_ROUNDING = 1e-5  # m by which a hull is larger than what it holds
+_FAR = 1e6  # m
+
 Shapes = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
 """Bounds, circles and boxes of a pool of arenas, as `sim.kernels.bundles.Geometry` has them."""
 
@@ -23,3 +26,12 @@ def pack_shapes(arenas: Sequence[Arena]) -> Shapes:
         boxes[k, : len(arena.boxes), 4] = np.cos(arena.boxes[:, 4])
         boxes[k, : len(arena.boxes), 5] = np.sin(arena.boxes[:, 4])
     return bounds, circles, boxes
+
+
+def hulls(circles: NDArray[np.float32], boxes: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Discs round all circles (M, C, 3) and boxes (M, B, 6): (M, 3, C + B) x, y, radius, far away for an empty slot."""
+    radii = np.concatenate([circles[..., 2], np.hypot(boxes[..., 2], boxes[..., 3])], axis=1)
+    centres = np.concatenate([circles[..., :2], boxes[..., :2]], axis=1)
+    present = np.concatenate([circles[..., 2], boxes[..., 2]], axis=1) > 0.0
+    x = np.where(present, centres[..., 0], _FAR)
+    return np.stack([x, centres[..., 1], radii + _ROUNDING], axis=1).astype(np.float64)

@@ -35,7 +35,7 @@ from sim.kernels.records import (
     ROBOT,
 )
 from sim.kernels.step import reset_robots, step_robots
-from sim.lidar import drawn_ray_angles, ray_angles
+from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.movers import Movers
 from sim.observations import near_distance, observation_size
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
@@ -145,6 +145,11 @@ class World:
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
         bounds, circles, boxes = shapes = pack_shapes(self.arenas)
         self.movers = Movers(self.arenas, shapes, origins, task.control_period, alike=not respawn)
+        spans = quantity_spans(task)
+        fields = np.full(robots if task.randomisation.field_of_view else 1, spans[FIELD_OF_VIEW, 0])
+        angles = drawn_ray_angles(task.lidar, fields)
+        ray_cos, ray_sin = padded(np.cos(angles)), padded(np.sin(angles))
+        ray_x, ray_y, scan = np.empty((3, ray_cos.shape[1]), dtype=np.float32)
         self.geometry = Geometry(
             bounds=bounds,
             circles=circles,
@@ -155,15 +160,14 @@ class World:
             target_offsets=np.cumsum([0, *(len(space.targets) for space in spaces)], dtype=np.int32),
             origins=origins,
             ray_angles=ray_angles(task.lidar),
-            ray_x=np.empty(task.lidar.rays, dtype=np.float32),
-            ray_y=np.empty(task.lidar.rays, dtype=np.float32),
+            ray_x=ray_x,
+            ray_y=ray_y,
+            scan=scan,
+            near=np.empty(1 + max(table.shape[1] for table in (*shapes[1:], self.movers.discs)), dtype=np.int32),
             discs=self.movers.discs,
         )
         numbers = observation_size(task)
-        spans = quantity_spans(task)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
-        fields = np.full(robots if task.randomisation.field_of_view else 1, spans[FIELD_OF_VIEW, 0])
-        angles = drawn_ray_angles(task.lidar, fields)
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
             poses=np.zeros((robots, 3), dtype=np.float32),
@@ -177,8 +181,8 @@ class World:
             truncations=np.zeros(robots, dtype=np.bool_),
             outcomes=np.zeros(robots, dtype=np.uint8),
             drawn=np.tile(spans[:, 0], (robots, 1)),
-            ray_cos=np.cos(angles).astype(np.float32),
-            ray_sin=np.sin(angles).astype(np.float32),
+            ray_cos=ray_cos,
+            ray_sin=ray_sin,
             ahead=np.array([rays_ahead(row, 1.0) for row in angles], dtype=np.int32),
             drift=np.zeros((robots if drifts else 0, 3)),
             pending=np.zeros((robots, longest_delay(task), 2), dtype=np.float32),
@@ -190,6 +194,7 @@ class World:
         self._parameters["closing"] = (task.robot.max_linear_speed + self.movers.fastest) * task.control_period
         self.robots.records["replica"] = np.arange(robots) // (ROBOTS_PER_TILE * len(self.arenas))
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
+        self._placed = np.zeros(robots, dtype=np.int32)
         self.seed(seed)
 
     def __len__(self) -> int:
@@ -226,7 +231,10 @@ class World:
         self.robots.records["map"] = maps
         self.robots.records["parked"] = 0
         self.movers.place()
-        reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, self._space.state)
+        space = self._space
+        self.movers.write_places(space.state[len(self) : -1])
+        reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, space.state)
+        space.put_all()
 
     def reset_with(self, options: Mapping[str, ArrayLike] | None) -> None:
         """`reset`, with its arguments as Gymnasium passes them.
@@ -287,7 +295,9 @@ class World:
         if len(self.movers):
             self.movers.step(space.command, len(self))
         space.step(self.task.control_period)
-        step_robots(space.state, self.robots, self.geometry, self._parameters)
+        count = step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
+        if count:
+            space.put(self._placed[:count])
 
     @property
     def fields_of_view(self) -> NDArray[np.float64]:
@@ -312,6 +322,8 @@ class World:
         constant = {"records"} if drawn != RandomisationConfig() else {"records", "drawn"}
         constant |= set() if drawn.field_of_view else {"ray_cos", "ray_sin", "ahead"}
         arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
+        rays = self.task.lidar.rays
+        arrays |= {"ray_cos": self.robots.ray_cos[:, :rays], "ray_sin": self.robots.ray_sin[:, :rays]}
         state |= {name: array for name, array in arrays.items() if array.size and name not in constant}
         state["bodies"] = self._space.state
         return state | self.movers.state()
@@ -336,3 +348,4 @@ class World:
                 )
         for name, target in targets.items():
             target[...] = state[name]
+        self._space.put_all()

@@ -21,7 +21,9 @@ class Geometry(NamedTuple):
         start_offsets, target_offsets: (M + 1,) where each arena's cells begin.
         origins: (tiles, 2) float64, centre of each tile in the Space.
         ray_angles: (rays,) float64 where the rays point that the policy believes in, radians against the heading.
-        ray_x, ray_y: (rays,) scratch for those of one robot's rays in its arena.
+        ray_x, ray_y: (rays or some more, see `sim.lidar.padded`) scratch for those of one robot's rays in its arena.
+        scan: likewise, for what they read.
+        near: (most shapes of a kind + 1,) scratch for those that one robot may see.
         discs: (tiles, K, 5) movers as they are now, see `DISC_COLUMNS`.
     """
 
@@ -36,6 +38,8 @@ class Geometry(NamedTuple):
     ray_angles: Doubles
     ray_x: Floats
     ray_y: Floats
+    scan: Floats
+    near: Integers
     discs: Floats
 
 
@@ -48,6 +52,8 @@ class Crowd(NamedTuple):
         waypoints: (W, 2) float64 of all patrols, metres.
         maps: (tiles,) the arena of each tile.
         bounds, circles, boxes, origins: see `Geometry`.
+        hulls: (M, 3, C + B) float64 x, y, radius of a disc round every circle and box; far away for an empty slot.
+        near, met: (C + B + 1,) and (K + 1,) scratch for the obstacles and for the others that one mover has to look at.
         steps: (1,) taken since all were placed.
         lines, chosen: scratch for half-planes, (2, n, 3), and for the velocities of a tile's movers, (K + 1, 2).
     """
@@ -60,6 +66,9 @@ class Crowd(NamedTuple):
     circles: Floats
     boxes: Floats
     origins: Doubles
+    hulls: Doubles
+    near: Integers
+    met: Integers
     steps: NDArray[np.int64]
     lines: Doubles
     chosen: Doubles
@@ -80,7 +89,8 @@ class Robots(NamedTuple):
         terminations, truncations: (N,) bool.
         outcomes: (N,) how the attempt that ended in this step ended; 0 where none did.
         drawn: (N, 10) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
-        ray_cos, ray_sin: (N, rays) directions of each robot's rays against its heading; (1, rays) where all are alike.
+        ray_cos, ray_sin: (N, rays or some more) directions of each robot's rays against its heading, then zeros, see
+            `sim.lidar.padded`; one row where all are alike.
         ahead: (N, 2) first, and one past the last, of the rays that tell how free the way ahead is; (1, 2) likewise.
         drift: (N, 3) how far the believed pose is from the true one; (0, 3) where it never is.
         pending: (N, delay, 2) actions that wait to be followed, the next one first; none where nothing is delayed.

@@ -44,7 +44,7 @@ def write_commands(actions, robots, state, command, parameters):
         actions: (N, 2) linear in [0, 1] and angular in [-1, 1], as fractions of the limits; clipped.
         robots: `sim.kernels.bundles.Robots`, whose velocities and pending actions are updated.
         state: (bodies, 3) x, y, angle in the Space.
-        command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the first N rows are written.
+        command: (bodies, 3) vx, vy, angular velocity; the first N rows are written.
         parameters: (1,) PARAMETERS.
 
     Returns:
@@ -53,10 +53,8 @@ def write_commands(actions, robots, state, command, parameters):
     p = parameters[0]
     records = robots.records
     for i in range(actions.shape[0]):
-        for k in range(3):
-            command[i, k] = state[i, k]
-            command[i, 3 + k] = 0.0
         if records[i].parked:
+            command[i, :] = 0.0
             continue
         linear = actions[i, 0]
         angular = actions[i, 1]
@@ -80,7 +78,7 @@ def write_commands(actions, robots, state, command, parameters):
         chord = math.sin(half) / half if abs(half) > _SERIES else 1.0 - half * half / 6.0
         speed = max_linear * linear * chord
         direction = state[i, 2] + half
-        command[i, 3] = speed * math.cos(direction)
-        command[i, 4] = speed * math.sin(direction)
-        command[i, 5] = turn
+        command[i, 0] = speed * math.cos(direction)
+        command[i, 1] = speed * math.sin(direction)
+        command[i, 2] = turn
     return -1

@@ -52,7 +52,9 @@ def _draw_goal(m, index, crowd, furthest):
         angle = 2.0 * math.pi * uniform(records, m)
         dx = math.cos(angle)
         dy = math.sin(angle)
-        length = free_length(record.x, record.y, dx, dy, keep, index, crowd.bounds, crowd.circles, crowd.boxes)
+        length = free_length(
+            record.x, record.y, dx, dy, keep, index, crowd.bounds, crowd.circles, crowd.boxes, crowd.hulls, crowd.near
+        )
         if length > longest:
             longest = length
             record.goal_x = dx
@@ -161,48 +163,46 @@ def place_movers(crowd):
 
 
 @kernel(fastmath=EXACT, inline="always")
-def _dividing_lines(m, first, slots, records, interval, lines, n):
+def _dividing_lines(m, first, slots, records, interval, lines, n, met):
     """Write, from row n on, the half-planes that keep mover m on its side of the others for `interval` seconds.
 
-    Returns how many rows there are then.
+    Returns how many rows there are then, and how many of the others are listed in `met`: those that it could touch within
+    `HORIZON` seconds.
     """
     record = records[m]
+    count = 0
     for other in range(first, first + slots):
         if other == m or not records[other].present:
             continue
         px = records[other].x - record.x
         py = records[other].y - record.y
-        near = record.radius + records[other].radius + SKIN
-        far = near + 2.0 * record.speed * interval
+        apart = record.radius + records[other].radius
         squared = px * px + py * py
+        far = apart + (record.speed + records[other].speed) * HORIZON
+        met[count] = other
+        count += (apart * apart < squared) & (squared < far * far)
+        near = apart + SKIN
+        far = near + 2.0 * record.speed * interval
         if squared < far * far:
             distance = max(math.sqrt(squared), 1e-9)
             lines[n, 0] = px / distance
             lines[n, 1] = py / distance
             lines[n, 2] = max(distance - near, 0.0) / (2.0 * interval)
             n += 1
-    return n
+    return n, count
 
 
 @kernel(fastmath=EXACT, inline="always")
-def _orca_lines(m, first, slots, records, lines, n):
-    """Write, from row n on, the half-planes that keep mover m and the others apart for `HORIZON` seconds; likewise."""
+def _orca_lines(m, met, count, records, lines, n):
+    """Write, from row n on, the half-planes that keep mover m and `count` others in `met` apart for `HORIZON` seconds."""
     record = records[m]
-    for other in range(first, first + slots):
-        if other == m or not records[other].present:
-            continue
-        px = records[other].x - record.x
-        py = records[other].y - record.y
-        near = record.radius + records[other].radius
-        far = near + (record.speed + records[other].speed) * HORIZON
-        squared = px * px + py * py
-        if near * near < squared < far * far:
-            orca_line(
-                px, py, record.vx - records[other].vx, record.vy - records[other].vy, near, HORIZON,
-                0.5 if records[other].kind == PEDESTRIAN else 1.0, record.vx, record.vy, lines, n,
-            )  # fmt: skip
-            n += 1
-    return n
+    for k in range(count):
+        other = records[met[k]]
+        orca_line(
+            other.x - record.x, other.y - record.y, record.vx - other.vx, record.vy - other.vy,
+            record.radius + other.radius, HORIZON, 0.5 if other.kind == PEDESTRIAN else 1.0,
+            record.vx, record.vy, lines, n + k,
+        )  # fmt: skip
 
 
 @kernel(fastmath=EXACT, inline="always")
@@ -220,9 +220,9 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
             continue
         hard = obstacle_lines(
             record.x, record.y, record.radius, record.speed * interval, interval, index,
-            crowd.bounds, crowd.circles, crowd.boxes, lines,
+            crowd.bounds, crowd.circles, crowd.boxes, crowd.hulls, crowd.near, lines,
         )  # fmt: skip
-        hard = _dividing_lines(m, first, slots, records, interval, lines, hard)
+        hard, met = _dividing_lines(m, first, slots, records, interval, lines, hard, crowd.met)
 
         if record.kind == WALKER:
             part = free_part(lines, hard, record.speed * record.goal_x, record.speed * record.goal_y)
@@ -262,8 +262,8 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
             chosen[k, 1] = part * vy
             continue
 
-        count = _orca_lines(m, first, slots, records, lines, hard)
-        choose_velocity(lines, hard, count, record.speed, vx, vy, scratch, velocity)
+        _orca_lines(m, crowd.met, met, records, lines, hard)
+        choose_velocity(lines, hard, hard + met, record.speed, vx, vy, scratch, velocity)
         part = free_part(lines, hard, velocity[0], velocity[1])
         chosen[k, 0] = part * velocity[0]
         chosen[k, 1] = part * velocity[1]
@@ -281,7 +281,7 @@ def move_movers(crowd, period, between, command, robots):
         crowd: `sim.kernels.bundles.Crowd`, whose records, discs and steps are updated.
         period: seconds of this step.
         between: steps from one decision to the next.
-        command: (bodies, 6) x, y, angle, vx, vy, angular velocity; the rows after the first `robots` are written.
+        command: (bodies, 3) vx, vy, angular velocity; the rows after the first `robots` are written.
         robots: how many bodies are robots.
     """
     records = crowd.records
@@ -295,11 +295,8 @@ def move_movers(crowd, period, between, command, robots):
         for k in range(slots):
             m = tile * slots + k
             record = records[m]
-            row = robots + m
-            command[row, 0] = crowd.origins[tile, 0] + record.x
-            command[row, 1] = crowd.origins[tile, 1] + record.y
-            command[row, 3] = record.vx
-            command[row, 4] = record.vy
+            command[robots + m, 0] = record.vx
+            command[robots + m, 1] = record.vy
             record.x += period * record.vx
             record.y += period * record.vy
             discs[tile, k, 0] = record.x

@@ -13,7 +13,6 @@ from sim.kernels.options import kernel
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 FAR = np.float32(1e6)  # m; the fast floating-point rules below do without infinities
-MARGIN = np.float32(0.01)  # m
 TINY = np.float32(1e-12)  # keeps divisions by a direction finite; far below any direction that a float32 angle gives
 
 FAST = {"nnan", "ninf", "nsz", "arcp", "contract", "afn", "reassoc"}
@@ -45,7 +44,7 @@ def clearance_at(x, y, index, bounds, circles, boxes):
     return distance
 
 
-@kernel(fastmath=FAST)
+@kernel(fastmath=FAST, inline="always")
 def nearest_of(ranges, row, first, last):
     """The smallest of ranges[row, first:last], which is not empty."""
     nearest = ranges[row, first]
@@ -55,33 +54,37 @@ def nearest_of(ranges, row, first, last):
 
 
 @kernel(fastmath=FAST)
-def _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy):
-    """Shorten the rays (dx, dy) that meet a circle whose centre is (fx, fy) away and whose surface `gap`."""
+def _shorten_by_circle(fx, fy, radius, limit, ranges, dx, dy):
+    """Shorten the rays (dx, dy) that meet a circle whose centre is (fx, fy) away."""
     rays = dx.shape[0]
-    if gap <= ZERO:
-        for i in range(rays):
-            ranges[row, i] = ZERO
-        return
     radius_squared = radius * radius
+    if fx * fx + fy * fy <= radius_squared:
+        for i in range(rays):
+            ranges[i] = ZERO
+        return
     for i in range(rays):
         ahead = fx * dx[i] + fy * dy[i]
         # The perpendicular distance as a cross product: |f|² - ahead² would cancel.
         aside = fx * dy[i] - fy * dx[i]
         square = radius_squared - aside * aside
         hit = ahead - math.sqrt(max(square, ZERO))
-        ranges[row, i] = min(ranges[row, i], hit if (square >= ZERO and hit >= ZERO) else limit)
+        ranges[i] = min(ranges[i], hit if (square >= ZERO and hit >= ZERO) else limit)
 
 
-@kernel(fastmath=FAST)
-def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, row, dx, dy):
-    """Fill row `row` of `ranges` (n, rays) with the scan from a pose and return the clearance of the point, metres.
+@kernel(fastmath=FAST, inline="always")
+def sense(
+    x, y, cos_heading, sin_heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges, dx, dy, near
+):
+    """Fill `ranges` with the scan from a pose and return the clearance of the point, metres.
 
-    `dx` and `dy` are scratch rows, (rays,) float32; `limit` is the LiDAR's range, which a ray without a hit reads.
-    A ray that starts inside an obstacle reads 0.
+    `limit` is the LiDAR's range, which a ray without a hit reads. A ray that starts inside an obstacle reads 0.
+
+    `ray_cos`, `ray_sin`, `ranges` and the scratch `dx`, `dy` are float32, and filled up as `sim.lidar.padded` does it; what
+    a ray beyond the scanner's reads means nothing. `near` is int32 scratch for as many circles or boxes as there are. Which
+    of these can be seen is listed first, without a branch, since no processor can foretell it: with thousands of robots,
+    branches took more time than the rays.
     """
     rays = ray_cos.shape[0]
-    cos_heading = np.float32(math.cos(heading))
-    sin_heading = np.float32(math.sin(heading))
     half_width = bounds[index, 0]
     half_height = bounds[index, 1]
     clearance = min(half_width - abs(x), half_height - abs(y))
@@ -92,23 +95,46 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
         dy[i] = uy
         to_side = (half_width - (x if ux > ZERO else -x)) / max(abs(ux), TINY)
         to_end = (half_height - (y if uy > ZERO else -y)) / max(abs(uy), TINY)
-        ranges[row, i] = max(min(limit, min(to_side, to_end)), ZERO)
+        ranges[i] = max(min(limit, min(to_side, to_end)), ZERO)
+    # What ends further behind than this is out of sight.
+    back = ZERO if looks_ahead else -FAR
+    count = 0
     for j in range(circles.shape[1]):
         radius = circles[index, j, 2]
-        if radius <= ZERO:
-            continue
         fx = circles[index, j, 0] - x
         fy = circles[index, j, 1] - y
-        squared = fx * fx + fy * fy
-        gap = math.sqrt(squared) - radius
+        gap = math.sqrt(fx * fx + fy * fy) - radius if radius > ZERO else FAR
         clearance = min(clearance, gap)
-        if gap >= limit or (looks_ahead and cos_heading * fx + sin_heading * fy < -radius):
-            continue
-        _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy)
+        near[count] = j
+        count += (gap < limit) & (cos_heading * fx + sin_heading * fy + radius >= back)
+    for k in range(count):
+        j = near[k]
+        _shorten_by_circle(circles[index, j, 0] - x, circles[index, j, 1] - y, circles[index, j, 2], limit, ranges, dx, dy)
+    count = 0
+    nearest = FAR
+    deepest = ZERO
     for j in range(boxes.shape[1]):
         half_length = boxes[index, j, 2]
-        if half_length <= ZERO:
-            continue
+        half_breadth = boxes[index, j, 3]
+        cos = boxes[index, j, 4]
+        sin = boxes[index, j, 5]
+        gx = x - boxes[index, j, 0]
+        gy = y - boxes[index, j, 1]
+        along = abs(cos * gx + sin * gy) - half_length
+        across = abs(cos * gy - sin * gx) - half_breadth
+        px = max(along, ZERO)
+        py = max(across, ZERO)
+        squared = px * px + py * py if half_length > ZERO else FAR
+        nearest = min(nearest, squared)
+        deepest = min(deepest, max(along, across))
+        ahead = -cos_heading * gx - sin_heading * gy
+        near[count] = j
+        visible = (ahead >= back) | (ahead * ahead <= half_length * half_length + half_breadth * half_breadth)
+        count += (squared < limit * limit) & visible
+    clearance = min(clearance, math.sqrt(nearest) + deepest)
+    for k in range(count):
+        j = near[k]
+        half_length = boxes[index, j, 2]
         half_breadth = boxes[index, j, 3]
         cos = boxes[index, j, 4]
         sin = boxes[index, j, 5]
@@ -117,18 +143,6 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
         # The robot in the box's frame.
         lx = cos * gx + sin * gy
         ly = cos * gy - sin * gx
-        along = abs(lx) - half_length
-        across = abs(ly) - half_breadth
-        px = max(along, ZERO)
-        py = max(across, ZERO)
-        gap = math.sqrt(px * px + py * py) + min(max(along, across), ZERO)
-        clearance = min(clearance, gap)
-        if gap >= limit:
-            continue
-        if looks_ahead:
-            reach = math.sqrt(half_length * half_length + half_breadth * half_breadth)
-            if cos_heading * gx + sin_heading * gy > reach:
-                continue
         for i in range(rays):
             ux = cos * dx[i] + sin * dy[i]
             uy = cos * dy[i] - sin * dx[i]
@@ -140,7 +154,7 @@ def sense(x, y, heading, index, bounds, circles, boxes, ray_cos, ray_sin, limit,
             my = -ly * iy
             enter = max(mx - ex, my - ey)
             leave = min(mx + ex, my + ey)
-            ranges[row, i] = min(ranges[row, i], max(enter, ZERO) if (leave >= enter and leave >= ZERO) else limit)
+            ranges[i] = min(ranges[i], max(enter, ZERO) if (leave >= enter and leave >= ZERO) else limit)
     return clearance
 
 
@@ -177,33 +191,26 @@ def swept_clearance(x, y, dx, dy, tile, discs):
 
 
 @kernel(fastmath=FAST, inline="always")
-def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy, clearance):
-    """Shorten row `row` of `ranges` by a tile's movers; return `clearance` or, where it is smaller, that from them.
+def sense_discs(x, y, cos_heading, sin_heading, tile, discs, limit, looks_ahead, ranges, dx, dy, near, clearance):
+    """Shorten `ranges` by a tile's movers; return `clearance` or, where it is smaller, that from them.
 
-    `dx` and `dy` are the rays' directions as `sense` leaves them.
+    The arrays are those of `sense`, after it.
     """
     if discs.shape[1] == 0:
         return clearance
-    # The middle of the field of view, at most as long as 1: what is behind it is out of sight of rays that look ahead.
-    middle = dx.shape[0] // 2
-    ahead_x = np.float32(0.5) * (dx[middle] + dx[dx.shape[0] - 1 - middle])
-    ahead_y = np.float32(0.5) * (dy[middle] + dy[dx.shape[0] - 1 - middle])
+    back = ZERO if looks_ahead else -FAR
+    count = 0
     for j in range(discs.shape[1]):
         radius = discs[tile, j, 2]
-        if radius <= ZERO:
-            continue
         fx = discs[tile, j, 0] - x
         fy = discs[tile, j, 1] - y
-        squared = fx * fx + fy * fy
-        # Most are out of reach, which takes no root to see; the margin is far above rounding.
-        reach = max(limit, clearance) + radius + MARGIN
-        if squared >= reach * reach:
-            continue
-        gap = math.sqrt(squared) - radius
+        gap = math.sqrt(fx * fx + fy * fy) - radius if radius > ZERO else FAR
         clearance = min(clearance, gap)
-        if gap >= limit or (looks_ahead and ahead_x * fx + ahead_y * fy < -radius):
-            continue
-        _shorten_by_circle(fx, fy, radius, gap, limit, ranges, row, dx, dy)
+        near[count] = j
+        count += (gap < limit) & (cos_heading * fx + sin_heading * fy + radius >= back)
+    for k in range(count):
+        j = near[k]
+        _shorten_by_circle(discs[tile, j, 0] - x, discs[tile, j, 1] - y, discs[tile, j, 2], limit, ranges, dx, dy)
     return clearance
 
 
@@ -211,16 +218,20 @@ def sense_discs(x, y, tile, discs, limit, looks_ahead, ranges, row, dx, dy, clea
 def scan_poses(poses, maps, bounds, circles, boxes, ray_cos, ray_sin, limit, looks_ahead, ranges):
     """Fill `ranges` (n, rays) with the scans from `poses` (n, 3), each in the arena that `maps` (n,) names.
 
-    `ray_cos` and `ray_sin` are (n, rays), or (1, rays) where all scanners are alike.
+    `ray_cos` and `ray_sin` are (n, padded(rays)), or (1, padded(rays)) where all scanners are alike.
     """
     dx = np.empty(ray_cos.shape[1], np.float32)
     dy = np.empty(ray_cos.shape[1], np.float32)
+    scan = np.empty(ray_cos.shape[1], np.float32)
+    near = np.empty(max(circles.shape[1], boxes.shape[1]) + 1, np.int32)
     for i in range(poses.shape[0]):
         own = min(i, ray_cos.shape[0] - 1)
         sense(
-            poses[i, 0], poses[i, 1], poses[i, 2], maps[i], bounds, circles, boxes, ray_cos[own], ray_sin[own],
-            limit, looks_ahead, ranges, i, dx, dy,
+            poses[i, 0], poses[i, 1], np.float32(math.cos(poses[i, 2])), np.float32(math.sin(poses[i, 2])), maps[i],
+            bounds, circles, boxes, ray_cos[own], ray_sin[own], limit, looks_ahead, scan, dx, dy, near,
         )  # fmt: skip
+        for k in range(ranges.shape[1]):
+            ranges[i, k] = scan[k]
 
 
 @kernel()

@@ -36,6 +36,9 @@ MAX_RATIO = np.float32(8.0)
 MOVER_ROOM = np.float32(1.1)
 """Metres that a robot's centre starts away from every mover's surface."""
 
+MOST_TURNED = 100.0
+"""Radians from which on a robot's angle in the Space, where it adds up over an episode, is brought back to [-pi, pi]."""
+
 SPAWN_TRIES = 200
 """Draws before a start or target is taken as it is; the cells are free, so one in three or so is good."""
 
@@ -174,17 +177,22 @@ def _sense(i, robots, geometry, p):
     """Scan from robot i's pose; returns the clearance of its centre, metres."""
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
-    heading = robots.poses[i, 2]
+    cos_heading = np.float32(math.cos(robots.poses[i, 2]))
+    sin_heading = np.float32(math.sin(robots.poses[i, 2]))
     index = robots.records[i].map
     own = _scanner_of(i, robots)
     clearance = sense(
-        x, y, heading, index, geometry.bounds, geometry.circles, geometry.boxes, robots.ray_cos[own], robots.ray_sin[own],
-        p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y,
+        x, y, cos_heading, sin_heading, index, geometry.bounds, geometry.circles, geometry.boxes, robots.ray_cos[own],
+        robots.ray_sin[own], p.range, p.looks_ahead, geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near,
     )  # fmt: skip
     tile = robots.records[i].replica * p.replica_stride + index
-    return sense_discs(
-        x, y, tile, geometry.discs, p.range, p.looks_ahead, robots.ranges, i, geometry.ray_x, geometry.ray_y, clearance
-    )
+    clearance = sense_discs(
+        x, y, cos_heading, sin_heading, tile, geometry.discs, p.range, p.looks_ahead,
+        geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near, clearance,
+    )  # fmt: skip
+    for k in range(robots.ranges.shape[1]):
+        robots.ranges[i, k] = geometry.scan[k]
+    return clearance
 
 
 @kernel(fastmath=FAST, inline="always")
@@ -247,17 +255,22 @@ def _reward(i, outcome, before, robots, p):
 
 
 @kernel(fastmath=FAST)
-def step_robots(state, robots, geometry, parameters):
+def step_robots(state, placed, robots, geometry, parameters):
     """Everything that follows the physics of a step.
 
     Args:
-        state: (bodies, 3) x, y, angle in the Space; rows of robots that start anew are overwritten.
+        state: (bodies, 3) x, y, angle in the Space; rows of robots that start anew, or have turned far, are overwritten.
+        placed: (N,) int32, written: which rows were.
         robots: `sim.kernels.bundles.Robots`, whose arrays are updated.
         geometry: `sim.kernels.bundles.Geometry`.
         parameters: (1,) PARAMETERS.
+
+    Returns:
+        How many rows of `state` were overwritten.
     """
     p = parameters[0]
     records = robots.records
+    count = 0
     for i in range(records.shape[0]):
         if records[i].parked:
             _nothing_happened(i, robots)
@@ -267,14 +280,18 @@ def step_robots(state, robots, geometry, parameters):
         tile = records[i].replica * p.replica_stride + records[i].map
         x = np.float32(state[i, 0] - geometry.origins[tile, 0])
         y = np.float32(state[i, 1] - geometry.origins[tile, 1])
-        if abs(state[i, 2]) > math.pi:
-            state[i, 2] -= 2.0 * math.pi * math.floor((state[i, 2] + math.pi) / (2.0 * math.pi))
+        heading = state[i, 2]
+        if abs(heading) > math.pi:
+            heading -= 2.0 * math.pi * math.floor((heading + math.pi) / (2.0 * math.pi))
+        overwritten = abs(state[i, 2]) > MOST_TURNED
+        if overwritten:
+            state[i, 2] = heading
         last_x = robots.poses[i, 0]
         last_y = robots.poses[i, 1]
         last_heading = robots.poses[i, 2]
         robots.poses[i, 0] = x
         robots.poses[i, 1] = y
-        robots.poses[i, 2] = np.float32(state[i, 2])
+        robots.poses[i, 2] = np.float32(heading)
         if p.drifts:
             turn = robots.drawn[i, MAX_ANGULAR] * records[i].angular * p.period
             drift(i, np.float64(x - last_x), np.float64(y - last_y), turn, robots)
@@ -322,9 +339,14 @@ def step_robots(state, robots, geometry, parameters):
             for k in range(robots.observations.shape[1]):
                 robots.final_observations[i, k] = robots.observations[i, k]
             _draw_start(i, robots, geometry, p, state)
+            overwritten = True
             _draw_target(i, robots, geometry, p)
             begin_episode(i, robots, geometry, p)
             _sense(i, robots, geometry, p)
             if p.perceives:
                 perceive(i, robots, p)
             observe_first(i, robots, geometry, p)
+        if overwritten:
+            placed[count] = i
+            count += 1
+    return count

@@ -17,6 +17,7 @@ SKIN = 0.005
 """Metres that movers keep from obstacles and from one another."""
 
 _TINY = 1e-12  # keeps divisions by a direction finite
+_DIAGONAL = 1.4143  # of a unit square, and a little more
 
 
 @kernel(fastmath=EXACT)
@@ -44,10 +45,37 @@ def gap(x, y, index, bounds, circles, boxes):
 
 
 @kernel(fastmath=EXACT, inline="always")
-def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes, lines):
+def _within(x, y, reach, index, hulls, near):
+    """List in `near` the obstacles of arena `index` whose hulls are nearer than `reach`; returns how many."""
+    count = 0
+    for j in range(hulls.shape[2]):
+        fx = hulls[index, 0, j] - x
+        fy = hulls[index, 1, j] - y
+        far = hulls[index, 2, j] + reach
+        near[count] = j
+        count += fx * fx + fy * fy < far * far
+    return count
+
+
+@kernel(fastmath=EXACT, inline="always")
+def _in_the_way(x, y, dx, dy, length, margin, index, hulls, near):
+    """The same for those whose hulls come nearer than `margin` to the first `length` metres in direction (dx, dy)."""
+    count = 0
+    for j in range(hulls.shape[2]):
+        fx = hulls[index, 0, j] - x
+        fy = hulls[index, 1, j] - y
+        far = hulls[index, 2, j] + margin
+        ahead = fx * dx + fy * dy
+        near[count] = j
+        count += (abs(fx * dy - fy * dx) < far) & (ahead > -far) & (ahead - far < length)
+    return count
+
+
+@kernel(fastmath=EXACT, inline="always")
+def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes, hulls, near, lines):
     """Write the half-planes that obstacles nearer than `reach` leave to a disc; returns how many.
 
-    `interval` is the time for which they hold, seconds.
+    `interval` is the time for which they hold, seconds; `near` is scratch, as long as there are hulls.
     """
     n = 0
     for axis in range(2):
@@ -61,31 +89,25 @@ def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes,
             lines[n, 2] = max(half - sign * place, 0.0) / interval
             n += 1
     keep = radius + SKIN
-    for j in range(circles.shape[1]):
-        size = np.float64(circles[index, j, 2])
-        if size <= 0.0:
+    for k in range(_within(x, y, keep + reach, index, hulls, near)):
+        j = near[k]
+        if j < circles.shape[1]:
+            size = np.float64(circles[index, j, 2])
+            fx = circles[index, j, 0] - x
+            fy = circles[index, j, 1] - y
+            squared = fx * fx + fy * fy
+            far = size + keep + reach
+            if squared >= far * far:
+                continue
+            distance = max(math.sqrt(squared), 1e-9)
+            lines[n, 0] = fx / distance
+            lines[n, 1] = fy / distance
+            lines[n, 2] = max(distance - size - keep, 0.0) / interval
+            n += 1
             continue
-        fx = circles[index, j, 0] - x
-        fy = circles[index, j, 1] - y
-        squared = fx * fx + fy * fy
-        far = size + keep + reach
-        if squared >= far * far:
-            continue
-        distance = max(math.sqrt(squared), 1e-9)
-        lines[n, 0] = fx / distance
-        lines[n, 1] = fy / distance
-        lines[n, 2] = max(distance - size - keep, 0.0) / interval
-        n += 1
-    far = keep + reach
-    for j in range(boxes.shape[1]):
-        if boxes[index, j, 2] <= 0.0:
-            continue
+        j -= circles.shape[1]
         gx = x - boxes[index, j, 0]
         gy = y - boxes[index, j, 1]
-        # No further from the box's middle than this is any of its corners.
-        beyond = far + boxes[index, j, 2] + boxes[index, j, 3]
-        if gx * gx + gy * gy >= beyond * beyond:
-            continue
         cos = np.float64(boxes[index, j, 4])
         sin = np.float64(boxes[index, j, 5])
         lx = cos * gx + sin * gy
@@ -95,6 +117,7 @@ def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes,
         px = max(along, 0.0)
         py = max(across, 0.0)
         squared = px * px + py * py
+        far = keep + reach
         if squared >= far * far:
             continue
         distance = math.sqrt(squared)
@@ -112,37 +135,31 @@ def obstacle_lines(x, y, radius, reach, interval, index, bounds, circles, boxes,
 
 
 @kernel(fastmath=EXACT, inline="always")
-def free_length(x, y, dx, dy, keep, index, bounds, circles, boxes):
+def free_length(x, y, dx, dy, keep, index, bounds, circles, boxes, hulls, near):
     """Metres that a disc which needs `keep` around its centre can go in direction (dx, dy); boxes count with square corners.
 
-    Where it is too near to something already, it may go away from it.
+    Where it is too near to something already, it may go away from it. `near` is scratch, as long as there are hulls.
     """
     to_side = (bounds[index, 0] - keep - (x if dx > 0.0 else -x)) / max(abs(dx), _TINY)
     to_end = (bounds[index, 1] - keep - (y if dy > 0.0 else -y)) / max(abs(dy), _TINY)
     length = max(min(to_side, to_end), 0.0)
-    for j in range(circles.shape[1]):
-        if circles[index, j, 2] <= 0.0:
+    for k in range(_in_the_way(x, y, dx, dy, length, _DIAGONAL * keep, index, hulls, near)):
+        j = near[k]
+        if j < circles.shape[1]:
+            fx = circles[index, j, 0] - x
+            fy = circles[index, j, 1] - y
+            ahead = fx * dx + fy * dy
+            aside = fx * dy - fy * dx
+            far = circles[index, j, 2] + keep
+            square = far * far - aside * aside
+            if square > 0.0 and ahead > 0.0:
+                length = min(length, max(ahead - math.sqrt(square), 0.0))
             continue
-        fx = circles[index, j, 0] - x
-        fy = circles[index, j, 1] - y
-        ahead = fx * dx + fy * dy
-        aside = fx * dy - fy * dx
-        far = circles[index, j, 2] + keep
-        square = far * far - aside * aside
-        if square > 0.0 and ahead > 0.0 and ahead - far < length:
-            length = min(length, max(ahead - math.sqrt(square), 0.0))
-    for j in range(boxes.shape[1]):
-        if boxes[index, j, 2] <= 0.0:
-            continue
+        j -= circles.shape[1]
         half_length = boxes[index, j, 2] + keep
         half_width = boxes[index, j, 3] + keep
         gx = x - boxes[index, j, 0]
         gy = y - boxes[index, j, 1]
-        # No further from the box's middle than this is any of its corners.
-        reach = half_length + half_width
-        ahead = -(gx * dx + gy * dy)
-        if abs(gx * dy - gy * dx) >= reach or ahead <= -reach or ahead - reach >= length:
-            continue
         cos = np.float64(boxes[index, j, 4])
         sin = np.float64(boxes[index, j, 5])
         lx = cos * gx + sin * gy

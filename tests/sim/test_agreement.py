@@ -97,6 +97,18 @@ def test_free_motion_stays_on_the_exact_arc(linear: float, angular: float, headi
     assert math.cos(state[2] - angle) == pytest.approx(1.0, abs=1e-12)
 
 
+def test_a_heading_stays_true_however_often_a_robot_turns() -> None:
+    task = TaskConfig(step_limit=10_000)
+    world = World(task, (Arena("hall"),), 30, seed=0)
+    world.reset(poses=(0.0, 0.0, 1.0), targets=(3.0, 3.0))
+    action = np.tile(np.array([0.0, -1.0], dtype=np.float32), (30, 1))
+    for _ in range(1_200):  # 240 rad
+        world.step(action)
+    assert np.abs(world.robots.poses[:, 2]).max() <= math.pi
+    assert np.cos(world.robots.poses[:, 2] - (1.0 - 240.0)) == pytest.approx(1.0, abs=1e-6)
+    assert np.abs(world.get_state()["bodies"][:, 2]).max() < 110.0
+
+
 @settings(max_examples=30, deadline=None)
 @given(arenas, st.integers(0, 2**32 - 1))
 def test_collision_flags_are_those_of_chipmunk(arena: Arena, seed: int) -> None:

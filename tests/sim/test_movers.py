@@ -13,11 +13,12 @@ from sim.baselines import go_to_goal
 from sim.config import ArenaConfig, JackalConfig, LidarConfig, RandomisationConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
+from sim.kernels.surroundings import free_length, obstacle_lines
 from sim.mover_config import MoverKind, MoversConfig
 from sim.movers import Movers
 from sim.physics import add_arena, robot_body, tile_origins
 from sim.scenarios import draw_scenarios, scenario_world
-from sim.shapes import pack_shapes
+from sim.shapes import hulls, pack_shapes
 from sim.suites import load_suite
 from sim.vector_env import NavigationVectorEnv
 from sim.world import World
@@ -51,7 +52,7 @@ def alone(arena: Arena, *, seed: int = 0, period: float = 0.2) -> Movers:
 
 def ways(movers: Movers, steps: int) -> np.ndarray:
     """(steps + 1, K, 2) where the movers of the first tile are after every step."""
-    command = np.zeros((len(movers), 6))
+    command = np.zeros((len(movers), 3))
     places = [movers.discs[0, :, :2].copy()]
     for _ in range(steps):
         movers.step(command, 0)
@@ -322,3 +323,31 @@ def test_the_velocity_chosen_is_the_best_there_is(seed: int) -> None:
 def test_too_many_movers_are_refused() -> None:
     with pytest.raises(ArenaError, match="at most 16"):
         Arena("crowd", movers=(Mover("walker", 0.2, 1.0),) * 17)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_what_movers_leave_out_of_sight_makes_no_difference(seed: int) -> None:
+    arenas = (random_arena(seed), random_arena(seed + 1))
+    bounds, circles, boxes = pack_shapes(arenas)
+    near_ones = hulls(circles, boxes)
+    all_of_them = near_ones.copy()
+    all_of_them[:, 2][all_of_them[:, 0] < 1e5] = 1e3
+    rng = np.random.default_rng(seed)
+    index, angle, keep = rng.integers(2), rng.uniform(-np.pi, np.pi), rng.uniform(0.1, 0.6)
+    x, y = rng.uniform(-1.0, 1.0, 2) * bounds[index]
+    near, found = np.empty(near_ones.shape[2] + 1, dtype=np.int32), []
+    for discs in (near_ones, all_of_them):
+        lines = np.zeros((near_ones.shape[2] + 4, 3))
+        count = obstacle_lines(x, y, keep, 1.5 * keep, 0.6, index, bounds, circles, boxes, discs, near, lines)
+        length = free_length(x, y, np.cos(angle), np.sin(angle), keep, index, bounds, circles, boxes, discs, near)
+        found.append((count, length, lines.tolist()))
+    assert found[0] == found[1]
+
+
+def test_hulls_hold_what_they_stand_for() -> None:
+    circles = np.array([[(1.0, 2.0, 0.5), (-1.0, -1.0, -1.0)]], dtype=np.float32)
+    boxes = np.array([[(-2.0, 0.0, 0.3, 0.4, 1.0, 0.0)]], dtype=np.float32)
+    discs = hulls(circles, boxes)[0].T
+    assert discs[[0, 2]] == pytest.approx(np.array([(1.0, 2.0, 0.5), (-2.0, 0.0, 0.5)]), abs=1e-4)
+    assert discs[1, 0] > 1e5
