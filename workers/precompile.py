@@ -3,6 +3,9 @@
 `make` runs it when the sources have changed; without it the first training on a machine would take a minute more.
 """
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import numpy as np
 import torch
 
@@ -20,6 +23,12 @@ def warm_up() -> None:
     task = TaskConfig()
     run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
     NavigationVectorEnv(task, 1, seed=0).reset()
+    _update_all()
+
+
+def _update_all() -> None:
+    """Both kinds of networks, once."""
+    task = TaskConfig()
     networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork())
     for network in networks:
         _update_once(PpoConfig(network=network, robots=4, rollout_steps=4, minibatch_size=16, epochs=1), task)
@@ -38,5 +47,9 @@ def _update_once(config: PpoConfig, task: TaskConfig) -> None:
 
 
 if __name__ == "__main__":
-    sim.precompile.main()
+    # The learners' kernels beside the simulator's: they know nothing of each other, and compiling is half a minute of each.
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        learners = pool.submit(_update_all)
+        sim.precompile.main()
+        learners.result()
     warm_up()
