@@ -16,9 +16,10 @@ from workers.algorithms.flat import FlatAdam
 from workers.algorithms.ppo_gradients import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
 from workers.algorithms.return_scaler import ReturnScaler
 from workers.algorithms.rollout import RolloutStorage, generalized_advantages
+from workers.backward import inference
 from workers.config import PpoConfig
 from workers.layout import ACTION_SIZE
-from workers.networks import Body, GaussianActor, build_network
+from workers.networks import Body, GaussianActor, bound_actions, build_network
 
 # A deviation between 1.8 % and 270 % of the action's unit: beyond either, exploration is none or all.
 LOG_STD_RANGE = (-4.0, 1.0)
@@ -53,6 +54,7 @@ class Ppo:
         self._generator = generator
         self._optimizer = FlatAdam(actor, critic, learning_rate=config.learning_rate)
         self._gradients = gradients or fastest_gradients(config, actor, critic)
+        self._logits, self._values = inference(actor.network, config.robots), inference(critic, config.robots)
         self._scaler = ReturnScaler(config.robots, config.gamma)
 
     @torch.no_grad()
@@ -61,7 +63,7 @@ class Ppo:
         storage, step = self.storage, self.storage.step
         storage.observations[step] = torch.from_numpy(observations)
         storage.noise[step].normal_(generator=self._generator)
-        mean = self.actor(storage.observations[step])
+        mean = bound_actions(self._logits(storage.observations[step]))
         torch.addcmul(mean, storage.noise[step], torch.exp(self.actor.log_std), out=storage.actions[step])
         actions: NDArray[np.float32] = storage.actions[step].cpu().numpy()
         return actions
@@ -128,7 +130,7 @@ class Ppo:
         if steps.size:
             rewards[steps, robots] += np.float32(config.gamma) * self.critic(final_observations)[:, 0].cpu().numpy()
         # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
-        values = torch.stack([self.critic(observations)[:, 0] for observations in storage.observations])
+        values = torch.stack([self._values(observations)[:, 0].clone() for observations in storage.observations])
         advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.ends, config.gamma, config.gae_lambda)
         return values, torch.from_numpy(advantages).to(storage.device)
 
