@@ -121,13 +121,12 @@ _PLACES: TypeAdapter[tuple[Place, ...]] = TypeAdapter(tuple[Place, ...])
 
 
 def suite_places(
-    family: FamilyName, difficulty: float, maps: int, movers: MoversConfig | None = None
+    family: FamilyName, difficulty: float, maps: int, movers: MoversConfig | None = None, *, first: int = 0
 ) -> tuple[GeneratedPlace, ...]:
-    """The maps of a family at a difficulty on which suites are driven."""
+    """The maps of a family at a difficulty on which suites are driven; from `first` on, to have others than they have."""
     movers = movers or MoversConfig()
-    return tuple(
-        GeneratedPlace(family=family, difficulty=difficulty, seed=seed, movers=movers) for seed in SUITE_SEEDS[:maps]
-    )
+    seeds = SUITE_SEEDS[first : first + maps]
+    return tuple(GeneratedPlace(family=family, difficulty=difficulty, seed=seed, movers=movers) for seed in seeds)
 
 
 def build_places(places: Iterable[Place], *, clearance: float = CLEARANCE) -> tuple[Arena, ...]:
@@ -209,6 +208,13 @@ def suite_of(name: str, documents: Sequence[ArenaFile], task: TaskConfig | None 
         PlacementError: an arena has no start or target, the robot does not fit there, or there is no way between them.
     """
     arenas, scenarios = build_places(documents), own_scenarios(documents, task)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+
+
+def suite_in(name: str, places: Sequence[GeneratedPlace], count: int) -> Suite:
+    """A suite of scenarios spread evenly over places, drawn as those of a frozen suite of this name would be."""
+    arenas = build_places(places)
+    scenarios = draw_scenarios(name, arenas, count)
     return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
 
 

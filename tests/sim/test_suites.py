@@ -27,8 +27,10 @@ from sim.suites import (
     run_controller,
     run_suite,
     suite_for,
+    suite_in,
     suite_names,
     suite_of,
+    suite_places,
 )
 from sim.vector_env import NavigationVectorEnv
 
@@ -49,6 +51,16 @@ def test_a_suite_is_what_it_was_and_its_procedure_makes_it_again(name: str) -> N
     suite = load_suite(name)
     assert suite.hash == HASHES[name]
     assert build_suite(name) == (Path(sim.__path__[0]) / "suite_data" / f"{name}.json").read_text("utf-8")
+
+
+def test_a_suite_of_other_maps_is_drawn_as_the_frozen_one_was() -> None:
+    movers = MoversConfig(count=4, kind="pedestrian", speed=1.0)
+    places = suite_places("clutter", 0.3, 40, movers)
+    assert suite_in("crowd-200", places, 200).hash == HASHES["crowd-200"]
+    others = suite_places("clutter", 0.3, 4, movers, first=40)
+    assert not {place.seed for place in others} & {place.seed for place in places}
+    suite = suite_in("others", others, 8)
+    assert suite.arena_indices.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
 
 
 @pytest.mark.parametrize("name", HASHES)
