@@ -11,6 +11,9 @@ class Schema(BaseModel):
     )
 
 
+UNREADABLE = "Settings that another version stored and this one can't read, dotted: the defaults are shown in their place."
+
+
 class Estimate(Schema):
     """A measured number, its 95 % interval, and what stands behind it."""
 

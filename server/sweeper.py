@@ -8,16 +8,15 @@ from collections import defaultdict
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from server.doorbell import CeleryDoorbell, prepare_broker
+from server.experiments.stored import training_of
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
 from server.worker_api.links import OpenLinks
 from server.worker_api.service import WorkerService
-from workers.config import TrainingConfig
 from workers.protocol import HEARTBEAT_SECONDS, queue_of
 
 logger = logging.getLogger(__name__)
@@ -69,12 +68,7 @@ class Sweeper:
             idle = WorkerRepository(session).idle_by_queue(now - _HEARTBEATS * HEARTBEAT_SECONDS)
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
-            try:
-                queue = queue_of(TrainingConfig.model_validate(run.experiment.training))
-            except ValidationError:
-                if everybody:
-                    logger.warning("run %s waits with settings that this version does not know", run.id)
-                continue
+            queue = queue_of(training_of(run.experiment))
             quiet_since = max(run.queued_at, self._rung_at.get(run.id, 0.0))
             overdue = now - quiet_since >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)
             if everybody or overdue:

@@ -3,10 +3,10 @@
 import numpy as np
 
 from server.diagnoses.schemas import Diagnoses
+from server.experiments.stored import training_of
 from server.metrics.repository import MetricRepository
 from server.runs.repository import RunRepository
 from server.services import Services
-from workers.config import TrainingConfig
 from workers.diagnoses import History, Series, diagnose
 
 
@@ -24,7 +24,7 @@ class DiagnosisService:
         """
         with self._services.database.read() as session:
             run = RunRepository(session).get(run_id)
-            training = TrainingConfig.model_validate(run.experiment.training)
+            training = training_of(run.experiment)
             series = MetricRepository(session).read(run_id)
         curves = {name: Series(points.steps, points.values.astype(np.float64)) for name, points in series.items()}
         history = History(training, curves)

@@ -6,7 +6,7 @@ from pydantic import Field, StringConstraints, field_validator
 
 from server.models import RunState
 from server.runs.schemas import Run
-from server.schemas import Estimate, Schema
+from server.schemas import UNREADABLE, Estimate, Schema
 from sim.config import Frozen
 from workers.config import TrainingConfig
 from workers.presets import Preset
@@ -54,6 +54,7 @@ class Experiment(Schema):
     name: str
     created_at: float
     training: TrainingConfig
+    unreadable: list[str] = Field(description=UNREADABLE)
     state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
     runs: list[Run] = Field(description="One a seed, by seed.")
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")

@@ -12,13 +12,13 @@ from server.errors import ConflictError
 from server.events.bus import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.experiments.schemas import Experiment, ExperimentCreate, ExperimentPage, ExperimentPatch, ExperimentState
+from server.experiments.stored import read_training
 from server.ids import new_id
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
 from server.services import Services
-from workers.config import TrainingConfig
 from workers.protocol import queue_of
 
 
@@ -151,15 +151,16 @@ def _views(session: Session, experiments: Sequence[models.Experiment]) -> list[E
     final = CheckpointRepository(session).final_evaluations(run_ids)
     views = []
     for experiment in experiments:
-        training = TrainingConfig.model_validate(experiment.training)
+        stored = read_training(experiment.training)
         views.append(
             Experiment(
                 id=experiment.id,
                 name=experiment.name,
                 created_at=experiment.created_at,
-                training=training,
+                training=stored.training,
+                unreadable=list(stored.unreadable),
                 state=aggregate_state([run.state for run in experiment.runs]),
-                runs=[run_view(run, training, latest.get(run.id, {})) for run in experiment.runs],
+                runs=[run_view(run, stored.training, latest.get(run.id, {})) for run in experiment.runs],
                 campaign=experiment.campaign,
                 success=success_over_runs([final[run.id] for run in experiment.runs if run.id in final]),
             )

@@ -8,12 +8,12 @@ from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.service import CheckpointService
 from server.checkpoints.views import best_checkpoint
+from server.experiments.stored import training_of
 from server.policies.service import find
 from server.runs.repository import RunRepository
 from server.runs.states import FINISHED
 from server.services import Services
 from sim.config import TaskConfig
-from workers.config import TrainingConfig
 
 # No run's id has a hyphen.
 _POLICY = "policy-"
@@ -50,7 +50,7 @@ def watched(services: Services, identifier: str) -> Watched:
         return Watched(identifier, policy.card.training.task, lambda path: _copy(policy.archive, path))
     with services.database.read() as session:
         run = RunRepository(session).get(identifier)
-        training = TrainingConfig.model_validate(run.experiment.training)
+        training = training_of(run.experiment)
         kept = CheckpointRepository(session).of_run(identifier) if run.state in FINISHED else []
         best = best_checkpoint(kept)
     task = with_geometry(training, services.arenas).task

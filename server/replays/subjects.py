@@ -6,11 +6,11 @@ from pathlib import Path
 from server.checkpoints.repository import CheckpointRepository, evaluation_result
 from server.checkpoints.service import CheckpointService
 from server.errors import NotFoundError
+from server.experiments.stored import training_of
 from server.policies.service import find
 from server.replays.subject import Subject
 from server.runs.repository import RunRepository
 from server.services import Services
-from workers.config import TrainingConfig
 from workers.errors import UnknownPolicyError
 
 
@@ -26,7 +26,7 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
         run = RunRepository(session).get(checkpoint.run_id)
         recorded = evaluation_result(checkpoints.evaluation(checkpoint_id))
         title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
-        training = TrainingConfig.model_validate(run.experiment.training)
+        training = training_of(run.experiment)
     download = CheckpointService(services).download(checkpoint_id)
     return Subject(title, download.file_name, training.task, download.sha256, None, recorded, download.save)
 

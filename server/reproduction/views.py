@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from server import models
 from server.experiments.repository import UNFINISHED, aggregate_state
+from server.experiments.stored import training_of
 from server.metrics.points import Points
 from server.reproduction.schemas import (
     Campaign,
@@ -99,7 +100,7 @@ _ENDED = frozenset({"stopped", "failed", "stopping"})
 
 def _share(run: models.Run, experiment: models.Experiment, now: float) -> Share:
     row = _row(experiment)
-    done = _progress(run, TrainingConfig.model_validate(experiment.training))
+    done = _progress(run, training_of(experiment))
     # A run that was taken up more than once has waited in between.
     timed = run.started_at is not None and run.attempt == 1 and run.state in ("running", "completed")
     spent = (run.finished_at or now) - run.started_at if timed and run.started_at is not None else None
@@ -114,7 +115,7 @@ def _row(experiment: models.Experiment) -> Row | None:
 
 def _effort(experiment: models.Experiment) -> float:
     row = _row(experiment)
-    return TrainingConfig.model_validate(experiment.training).steps / row.training.steps if row else 1.0
+    return training_of(experiment).steps / row.training.steps if row else 1.0
 
 
 def _progress(run: models.Run, training: TrainingConfig) -> float:
@@ -124,7 +125,7 @@ def _progress(run: models.Run, training: TrainingConfig) -> float:
 def _results(experiment: models.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
     if experiment is None:
         return []
-    steps = TrainingConfig.model_validate(experiment.training).steps
+    steps = training_of(experiment).steps
     results = []
     for run in experiment.runs:
         measured = _measured(run, latest)
@@ -141,7 +142,7 @@ def _measured(run: models.Run, latest: Latest) -> TableRow | None:
 
 
 def _row_view(row: Row, experiment: models.Experiment | None, latest: Latest, results: Sequence[SeedResult]) -> CampaignRow:
-    training = TrainingConfig.model_validate(experiment.training) if experiment else row.training
+    training = training_of(experiment) if experiment else row.training
     return CampaignRow(
         id=row.id,
         method=row.method,

@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from server.models import RunState
-from server.schemas import Schema
+from server.schemas import UNREADABLE, Schema
 from workers.config import TrainingConfig
 from workers.reporting import EventLevel
 
@@ -34,6 +34,7 @@ class RunDetail(Run):
 
     experiment_name: str
     training: TrainingConfig
+    unreadable: list[str] = Field(description=UNREADABLE)
 
 
 class RunEvent(Schema):

@@ -6,11 +6,11 @@ from sqlalchemy.orm import Session
 
 from server import models
 from server.events.bus import Change
+from server.experiments.stored import training_of
 from server.runs import states, views
 from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail, RunEvent
 from server.services import Services
-from workers.config import TrainingConfig
 from workers.protocol import queue_of
 
 
@@ -78,7 +78,7 @@ class RunService:
 
     def announce_queued(self, run: models.Run) -> None:
         """After the commit of a run that waits for a worker: wake one, and tell whoever looks on."""
-        queue = queue_of(TrainingConfig.model_validate(run.experiment.training))
+        queue = queue_of(training_of(run.experiment))
         self._services.doorbell.ring(run.id, run.attempt, queue)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
 

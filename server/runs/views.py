@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from server import models
+from server.experiments.stored import read_training
 from server.runs.schemas import Run, RunDetail
 from workers.config import TrainingConfig
 
@@ -38,6 +39,10 @@ def run_view(run: models.Run, training: TrainingConfig, latest: Mapping[str, flo
 
 def run_detail(run: models.Run, latest: Mapping[str, float]) -> RunDetail:
     """The run in JSON with what it trains."""
-    training = TrainingConfig.model_validate(run.experiment.training)
-    view = run_view(run, training, latest)
-    return RunDetail(**view.model_dump(), experiment_name=run.experiment.name, training=training)
+    stored = read_training(run.experiment.training)
+    return RunDetail(
+        **run_view(run, stored.training, latest).model_dump(),
+        experiment_name=run.experiment.name,
+        training=stored.training,
+        unreadable=list(stored.unreadable),
+    )

@@ -10,6 +10,7 @@ from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.errors import ConflictError, NotFoundError
 from server.events.bus import Change, ChangeKind
+from server.experiments.stored import read_training
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs.repository import RunRepository
@@ -19,7 +20,6 @@ from server.system.repository import WorkerRepository
 from server.worker_api import attempts
 from server.worker_api.attempts import FencedError
 from server.worker_api.errors import TooEarlyError
-from workers.config import TrainingConfig
 from workers.protocol import (
     Batch,
     CheckpointReference,
@@ -56,16 +56,20 @@ class WorkerService:
             NotFoundError: there is no such run.
             ConflictError: it is not to be had at this attempt, or can't be trained any more.
         """
-        missing: str | None = None
+        problem: str | None = None
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
             checkpoint = attempts.begin(session, run, request.worker, request.published_attempt, self._lease_seconds)
-            training = TrainingConfig.model_validate(run.experiment.training)
+            stored = read_training(run.experiment.training)
+            training = stored.training
+            if stored.unreadable:
+                problem = f"This version can't read {', '.join(stored.unreadable)}: launch the training anew."
             try:
                 training = with_geometry(training, self._services.arenas)
             except NotFoundError as error:
-                missing = f"The arena is gone: {error.message}"
-                attempts.end(session, run, Final(outcome="failed", error=missing))
+                problem = f"The arena is gone: {error.message}"
+            if problem is not None:
+                attempts.end(session, run, Final(outcome="failed", error=problem))
             claim = Claim(
                 attempt=run.attempt,
                 seed=run.seed,
@@ -77,8 +81,8 @@ class WorkerService:
                 lease_seconds=self._lease_seconds,
             )
         self._publish(run, "run")
-        if missing is not None:
-            raise ConflictError(missing)
+        if problem is not None:
+            raise ConflictError(problem)
         return claim
 
     def receive(self, run_id: str, attempt: int, batch: Batch) -> Orders:

@@ -1844,6 +1844,11 @@ export interface components {
             /** @description Success rate of its runs' last evaluated checkpoints; null before the first evaluation. */
             success: components["schemas"]["Estimate"] | null;
             training: components["schemas"]["TrainingConfig-Output"];
+            /**
+             * Unreadable
+             * @description Settings that another version stored and this one can't read, dotted: the defaults are shown in their place.
+             */
+            unreadable: string[];
         };
         /**
          * ExperimentCreate
@@ -3500,6 +3505,11 @@ export interface components {
             /** Total Steps */
             total_steps: number;
             training: components["schemas"]["TrainingConfig-Output"];
+            /**
+             * Unreadable
+             * @description Settings that another version stored and this one can't read, dotted: the defaults are shown in their place.
+             */
+            unreadable: string[];
             /**
              * Worker
              * @description The worker that has it, or had it last.

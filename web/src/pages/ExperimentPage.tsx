@@ -12,6 +12,7 @@ import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
+import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Page, Panel, QueryError, StateLabel, SuccessEstimate } from '../components/ui'
 import { summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
@@ -124,6 +125,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
       }
     >
       <Stack gap="md">
+        <UnreadableSettings names={experiment.unreadable} />
         <Panel
           flush
           title={plural(experiment.runs.length, 'run')}

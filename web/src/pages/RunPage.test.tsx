@@ -41,6 +41,12 @@ test('a completed run went to the end of its last rollout: so many steps, of no 
   expect(await screen.findByTestId('vitals')).toHaveTextContent(/Steps303\s104(?! of)/)
 })
 
+test('settings that another version stored are named', async () => {
+  startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, unreadable: ['algorithm.magic'] } })
+  open('/runs/run1')
+  expect(await screen.findByTestId('unreadable')).toHaveTextContent('algorithm.magic')
+})
+
 test('its policies, the newest first, the best marked, each to take away', async () => {
   startServer(routes)
   open('/runs/run1')

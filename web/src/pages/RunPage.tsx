@@ -19,6 +19,7 @@ import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunLiveView } from '../components/LiveView'
 import { canResume, canStop } from '../components/states'
+import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
@@ -106,6 +107,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Text>
           </Notice>
         )}
+        <UnreadableSettings names={run.unreadable} />
         <Diagnoses runId={run.id} state={run.state} />
         <div className={classes.stage}>
           <Panel flush>

@@ -66,6 +66,7 @@ export const experiment: Experiment = {
   name: 'Corridor',
   created_at: NOW - 7200,
   training,
+  unreadable: [],
   state: 'running',
   campaign: null,
   runs: [
@@ -83,7 +84,7 @@ export const experiment: Experiment = {
   success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
 }
 
-export const runDetail: RunDetail = { ...run, experiment_name: 'Corridor', training }
+export const runDetail: RunDetail = { ...run, experiment_name: 'Corridor', training, unreadable: [] }
 
 export const live: LiveState = {
   mode: 'policy',
