@@ -106,7 +106,9 @@ def test_closing_the_terminal_stops_everything_in_order(tmp_path: Path) -> None:
     terminal, inside = os.openpty()
     shell = f"exec {sys.executable} -m server up --workers 0 --port 0 --data-dir {tmp_path} <>{os.ttyname(inside)} >&0 2>&0"
     # A session without a terminal takes the first one that it opens for its own, and is hung up on when that is closed.
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under `nohup` it would be ignored, and rightly so
     up = subprocess.Popen(["sh", "-c", shell], cwd=ROOT, env=environment(), start_new_session=True)
+    signal.signal(signal.SIGHUP, before)
     try:
         with os.fdopen(terminal, "rb", buffering=0) as screen:
             while b"Ctrl-C" not in screen.readline():  # the last that it says
