@@ -15,7 +15,10 @@ from sim.observations import observation_layout
 from sim.suites import run_suite, suite_for
 from sim.vector_env import NavigationVectorEnv
 from workers.algorithms import build_algorithm
+from workers.algorithms.flat import FlatParameters
+from workers.backward import TensorPasses
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
+from workers.networks import build_network
 
 
 def warm_up() -> None:
@@ -27,11 +30,15 @@ def warm_up() -> None:
 
 
 def _update_all() -> None:
-    """Both kinds of networks, once."""
+    """Everything that learns, once."""
     task = TaskConfig()
     networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork())
     for network in networks:
         _update_once(PpoConfig(network=network, robots=4, rollout_steps=4, minibatch_size=16, epochs=1), task)
+    critic = build_network(MlpNetwork(), 1, 1)
+    FlatParameters(critic)
+    # What only the off-policy algorithms need.
+    TensorPasses(critic, 1).input_gradient(torch.zeros(1, 1))
 
 
 def _update_once(config: PpoConfig, task: TaskConfig) -> None:
