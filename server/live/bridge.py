@@ -15,6 +15,7 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from server.live.gate import KEY
 from server.live.page import VISER_PROTOCOL
 
 ALLOWED_FROM_BROWSERS = frozenset({"ViewerCameraMessage"})
@@ -40,6 +41,7 @@ async def bridge(browser: WebSocket, port: int) -> None:
     async with connect(
         f"ws://127.0.0.1:{port}",
         subprotocols=[VISER_PROTOCOL],  # type: ignore[list-item]
+        additional_headers=KEY,
         compression=None,
         max_size=None,
         # Frames pile up in the scene, which merges them, and not here.

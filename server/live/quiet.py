@@ -1,12 +1,25 @@
-"""viser servers that keep to themselves: on 127.0.0.1, silent on the console, and closed to wishes for a public tunnel."""
+"""viser servers that keep to themselves: for the bridge on 127.0.0.1 alone, silent, closed to wishes for a public tunnel."""
 
 import contextlib
 import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import rich
 import viser
+import websockets.datastructures
+import websockets.exceptions
 from viser import _messages
+from viser.infra import _infra
+
+from server.live.gate import GatedServe
+
+# viser lets nobody decide who may connect; what its module knows as `websockets` does it instead.
+_infra.websockets = SimpleNamespace(  # type: ignore[assignment, attr-defined]
+    asyncio=SimpleNamespace(server=SimpleNamespace(serve=GatedServe)),
+    datastructures=websockets.datastructures,
+    exceptions=websockets.exceptions,
+)
 
 _console = threading.Lock()
 
@@ -24,7 +37,7 @@ def _silence() -> Iterator[None]:
 
 
 def start_viser() -> viser.ViserServer:
-    """A server on a free port of 127.0.0.1."""
+    """A server on a free port of 127.0.0.1 that `gate.KEY` opens."""
     with _silence():
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):

@@ -7,6 +7,7 @@ import socket
 import time
 from typing import Any
 
+import httpx
 import msgspec
 import numpy as np
 import pytest
@@ -17,8 +18,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection
+from websockets.sync.client import connect as connect_websocket
+from websockets.typing import Subprotocol
 
 from server.live.bridge import may_pass
+from server.live.gate import KEY
 from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
 from server.live.quiet import start_viser, stop_viser
@@ -152,6 +158,33 @@ def test_a_scene_lives_as_long_as_somebody_watches_and_a_little_longer() -> None
         ]
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{}, {"Origin": "http://evil.example"}, {"Authorization": "Bearer guessed"}, {"Authorization": "Bearer ünïcode"}],
+)
+def test_a_scenes_own_port_opens_for_the_bridge_alone(headers: dict[str, str]) -> None:
+    view = LiveView(TaskConfig(), "light", LiveSettings())
+    try:
+        with pytest.raises(InvalidStatus) as refused, connect_directly(view.port, headers):
+            raise AssertionError("a stranger sees the scene")
+        assert refused.value.response.status_code == 403
+        page = httpx.get(
+            f"http://127.0.0.1:{view.port}/", headers=[(name.encode(), value.encode()) for name, value in headers.items()]
+        )
+        assert page.status_code == 403
+        with connect_directly(view.port, KEY) as bridge:
+            assert bridge.recv(timeout=10)
+    finally:
+        view.close()
+
+
+def connect_directly(port: int, headers: dict[str, str]) -> ClientConnection:
+    """Past the server, as any user of this machine could try."""
+    return connect_websocket(
+        f"ws://127.0.0.1:{port}", subprotocols=[Subprotocol(VISER_PROTOCOL)], additional_headers=headers, proxy=None
+    )
 
 
 def test_frames_for_nobody_are_dropped_unread() -> None:
