@@ -3,11 +3,16 @@
 The worker claims a run, opens its link, and then tells everything that the training reports as *items*: numbered from the
 claim's `last_seq` on, without a gap, sent again until the server has acknowledged that they are in the database. An item
 that comes twice is the same item. Binary messages on the link are frames (`workers.frames`), neither numbered nor kept.
+
+What the database could not hold, no message holds: the types below say so, and the worker builds its items with them, so
+that a fault shows where it is made. Should such an item reach the server all the same (a damaged spool, another version),
+it stores what stands before that item, and names it in `Orders.refused`; of a checkpoint's upload it says so with status
+422. Either is refused however often it comes: the worker ends the attempt instead of sending it again.
 """
 
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import BeforeValidator, Field, StringConstraints, TypeAdapter
 
 from sim.config import Frozen
 from workers.config import TrainingConfig
@@ -15,6 +20,9 @@ from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
 CLOSE_FENCED = 4409
 """WebSocket close code: this attempt is over for the server (a newer one runs, its lease ran out, the run ended)."""
+
+CLOSE_NOT_UNDERSTOOD = 1003
+"""WebSocket close code: what came is no message of this protocol, and would be none if it came again."""
 
 HEARTBEAT_SECONDS = 5.0
 """A worker tells this often that it is there, busy or not."""
@@ -25,6 +33,32 @@ MAX_MESSAGE_BYTES = 4 * 2**20
 """A message on the link, at most: a frame of 64 robots with 360 rays has 100 kB."""
 MAX_ITEM_VALUES = 256
 """Series in one item of metrics, at most."""
+
+MAX_INTEGER = 2**63 - 1
+"""Of steps and numbers of items: what both databases hold."""
+MAX_TEXT = 10_000
+"""Characters of an event's message, or of an error."""
+
+
+def _storable(text: object) -> object:
+    """Text for people: what no database holds is shown as a replacement character, and no reason to refuse the rest."""
+    if not isinstance(text, str):
+        return text
+    return text.encode("utf-8", "replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")
+
+
+Step = Annotated[int, Field(ge=0, le=MAX_INTEGER)]
+"""An environment step."""
+Seq = Annotated[int, Field(ge=1, le=MAX_INTEGER)]
+"""The number of an item."""
+EpochSeconds = Annotated[float, Field(ge=0.0, le=1e11)]
+"""A moment, up to the year 5138."""
+SeriesName = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]+$")]
+"""The name of a series of metrics."""
+WorkerName = Annotated[str, StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f]+$")]
+"""The name of a worker."""
+Text = Annotated[str, BeforeValidator(_storable), Field(max_length=MAX_TEXT)]
+"""A line for a person to read."""
 
 Queue = Literal["cpu", "gpu"]
 """The Celery queue that a worker listens to."""
@@ -50,7 +84,7 @@ class ClaimRequest(Frozen):
         published_attempt: the attempt that the message which woke it was published for.
     """
 
-    worker: str = Field(min_length=1, max_length=120)
+    worker: WorkerName
     published_attempt: int = Field(ge=0)
 
 
@@ -83,7 +117,7 @@ class Claim(Frozen):
 class Heartbeat(Frozen):
     """A worker is there, busy or not."""
 
-    worker: str = Field(min_length=1, max_length=120)
+    worker: WorkerName
     queue: Queue
 
 
@@ -91,21 +125,21 @@ class MetricItem(Frozen):
     """Numbers at an environment step; None stands for one that is not finite, which JSON cannot say."""
 
     kind: Literal["metrics"] = "metrics"
-    seq: int = Field(ge=1)
-    step: int = Field(ge=0)
-    at: float
-    values: dict[str, float | None] = Field(max_length=MAX_ITEM_VALUES)
+    seq: Seq
+    step: Step
+    at: EpochSeconds
+    values: dict[SeriesName, float | None] = Field(max_length=MAX_ITEM_VALUES)
 
 
 class EventItem(Frozen):
     """One line for the run's event log."""
 
     kind: Literal["event"] = "event"
-    seq: int = Field(ge=1)
-    step: int = Field(ge=0)
-    at: float
+    seq: Seq
+    step: Step
+    at: EpochSeconds
     level: EventLevel
-    message: str = Field(max_length=10_000)
+    message: Text
 
 
 Item = Annotated[MetricItem | EventItem, Field(discriminator="kind")]
@@ -116,7 +150,7 @@ class Final(Frozen):
     """The attempt is over, and everything it had to say has been said."""
 
     outcome: FinalOutcome
-    error: str | None = Field(None, max_length=10_000)
+    error: Text | None = None
 
 
 class Batch(Frozen):
@@ -126,17 +160,31 @@ class Batch(Frozen):
     final: Final | None = None
 
 
+class Refusal(Frozen):
+    """An item that can never be stored: the same item would be refused again, and with it everything behind it.
+
+    Attributes:
+        seq: the item's number.
+        reason: what is wrong with it, for the run's log.
+    """
+
+    seq: Seq
+    reason: Text
+
+
 class Orders(Frozen):
     """Server to worker: how things stand, whole in every message.
 
     Attributes:
         ack: the number of the last item that is in the database.
+        refused: the first item that can never be; None while all is well. The link stays open for the final message.
         stop: write a checkpoint and end.
         watch: what somebody wants to see; None while nobody watches.
         over: the final message is in the database.
     """
 
     ack: int
+    refused: Refusal | None = None
     stop: bool = False
     watch: WatchRequest | None = None
     over: bool = False
@@ -151,6 +199,6 @@ class CheckpointUpload(Frozen):
         evaluation: of exactly these weights.
     """
 
-    after_seq: int = Field(ge=0)
+    after_seq: int = Field(ge=0, le=MAX_INTEGER)
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
     evaluation: EvaluationResult | None = None

@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Annotated, Literal, Protocol
+
+from pydantic import Field
 
 from sim.config import Frozen
 from workers.frames import Frame, ViewMode
 
 EventLevel = Literal["info", "warning", "error"]
 Outcome = Literal["arrival", "collision", "timeout"]
+Figure = Annotated[float, Field(ge=-1e30, le=1e30)]
+"""A number of an episode; sums over episodes stay finite."""
 
 
 class WatchRequest(Frozen):
@@ -38,19 +42,19 @@ class EpisodeResult(Frozen):
     """
 
     outcome: Outcome
-    steps: int
-    reward: float
-    path_length: float
-    shortest_path: float
-    min_clearance: float
+    steps: int = Field(ge=0, le=2**31 - 1)
+    reward: Figure
+    path_length: Figure
+    shortest_path: Figure
+    min_clearance: Figure
 
 
 class EvaluationResult(Frozen):
     """A policy on a suite: one row per episode, in the suite's order."""
 
-    suite: str
-    suite_hash: str
-    episodes: tuple[EpisodeResult, ...]
+    suite: str = Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]+$")
+    suite_hash: str = Field(min_length=1, max_length=64, pattern=r"^[!-~]+$")
+    episodes: tuple[EpisodeResult, ...] = Field(min_length=1)
 
     @property
     def success_rate(self) -> float:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, WebSocket
+from fastapi import APIRouter, Depends, Path, Query, Request, WebSocket
 from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
@@ -16,16 +16,24 @@ from server.errors import TooLargeError
 from server.ids import new_id
 from server.services import Services, ServicesDep
 from server.worker_api.attempts import FencedError
+from server.worker_api.batches import read_batch
 from server.worker_api.errors import MalformedUploadError
 from server.worker_api.links import OpenLink, OpenLinks
 from server.worker_api.service import WorkerService
 from workers.frames import FrameError
-from workers.protocol import CLOSE_FENCED, Batch, CheckpointUpload, Claim, ClaimRequest, Heartbeat
+from workers.protocol import (
+    CLOSE_FENCED,
+    CLOSE_NOT_UNDERSTOOD,
+    MAX_INTEGER,
+    Batch,
+    CheckpointUpload,
+    Claim,
+    ClaimRequest,
+    Heartbeat,
+)
 
 # Pages have no business here, so the routes stay out of the OpenAPI description that their types are made from.
 router = APIRouter(prefix="/api/worker", tags=["worker"], include_in_schema=False)
-
-_UNSUPPORTED_DATA = 1003
 
 
 def _service(services: ServicesDep) -> WorkerService:
@@ -33,7 +41,8 @@ def _service(services: ServicesDep) -> WorkerService:
 
 
 WorkerServiceDep = Annotated[WorkerService, Depends(_service)]
-AttemptQuery = Annotated[int, Query(ge=1)]
+AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
+StepPath = Annotated[int, Path(ge=0, le=MAX_INTEGER)]
 
 
 @router.post("/heartbeat", status_code=204)
@@ -51,7 +60,7 @@ def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep) -> Cla
 # The file store has a cap of its own, which the settings say.
 @router.put("/runs/{run_id}/checkpoints/{step}", status_code=204, max_body_size=sys.maxsize)
 async def put_checkpoint(
-    run_id: str, step: int, attempt: AttemptQuery, request: Request, services: ServicesDep, service: WorkerServiceDep
+    run_id: str, step: StepPath, attempt: AttemptQuery, request: Request, services: ServicesDep, service: WorkerServiceDep
 ) -> None:
     """One line of JSON (`CheckpointUpload`), then the archive."""
     stream = request.stream()
@@ -108,15 +117,15 @@ async def _receive(websocket: WebSocket, run_id: str, attempt: int, services: Se
             if (frame := message.get("bytes")) is not None:
                 services.live.frames(run_id, frame)
             else:
-                batch = Batch.model_validate_json(message["text"])
-                opened.tell(await run_in_threadpool(service.receive, run_id, attempt, batch))
+                batch, refused = read_batch(message["text"])
+                opened.tell(await run_in_threadpool(service.receive, run_id, attempt, batch, refused))
     except FencedError:
         opened.fence()
         # The worker answers the close; waiting for that lets it arrive.
         while (await websocket.receive())["type"] != "websocket.disconnect":
             pass
     except (ValidationError, FrameError) as error:
-        await websocket.close(_UNSUPPORTED_DATA, str(error)[:100])
+        await websocket.close(CLOSE_NOT_UNDERSTOOD, str(error)[:100])
     except (WebSocketDisconnect, RuntimeError):
         return
 

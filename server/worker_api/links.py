@@ -22,8 +22,13 @@ class OpenLink:
         self._fenced = False
 
     def tell(self, orders: Orders) -> None:
-        """Pass on what a transaction has brought about; a stop is never taken back."""
-        self._set(ack=orders.ack, stop=self._orders.stop or orders.stop, over=orders.over)
+        """Pass on what a transaction has brought about; a stop and a refusal are never taken back."""
+        self._set(
+            ack=orders.ack,
+            refused=self._orders.refused or orders.refused,
+            stop=self._orders.stop or orders.stop,
+            over=orders.over,
+        )
         # Also where nothing has changed: the worker waits for this answer.
         self._changed.set()
 

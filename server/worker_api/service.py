@@ -19,6 +19,7 @@ from server.services import Services
 from server.system.repository import WorkerRepository
 from server.worker_api import attempts
 from server.worker_api.attempts import FencedError
+from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
 from workers.protocol import (
     Batch,
@@ -31,6 +32,7 @@ from workers.protocol import (
     Heartbeat,
     MetricItem,
     Orders,
+    Refusal,
 )
 
 # Compaction is looked at once in so many items: counting rows costs a query.
@@ -85,19 +87,28 @@ class WorkerService:
             raise ConflictError(problem)
         return claim
 
-    def receive(self, run_id: str, attempt: int, batch: Batch) -> Orders:
+    def receive(self, run_id: str, attempt: int, batch: Batch, refused: Refusal | None = None) -> Orders:
         """Store what a worker reports, once, and renew its lease.
+
+        Args:
+            run_id: the run.
+            attempt: the worker's.
+            batch: what it reports.
+            refused: what came behind the batch and can never be stored.
 
         Raises:
             FencedError: the attempt is over.
         """
         with self._services.database.write() as session:
             run = self._renewed(session, run_id, attempt)
-            fresh = [item for item in batch.items if item.seq > run.last_seq]
+            batch, gap = in_turn(batch, run.last_seq)
+            fresh = list(batch.items)
             self._store(session, run, fresh)
             if batch.final is not None:
                 attempts.end(session, run, batch.final)
-            orders = Orders(ack=run.last_seq, stop=run.state == "stopping", over=batch.final is not None)
+            orders = Orders(
+                ack=run.last_seq, refused=gap or refused, stop=run.state == "stopping", over=batch.final is not None
+            )
         if any(isinstance(item, MetricItem) for item in fresh):
             self._publish(run, "metrics")
         if batch.final is not None:

@@ -1,6 +1,7 @@
 """What workers may do: claim, report, bring checkpoints; and what happens to those that have lost their run."""
 
 import hashlib
+import json
 import math
 import time
 from typing import Any
@@ -16,6 +17,7 @@ from server.metrics.repository import MetricRepository
 from server.services import Services
 from workers.protocol import (
     CLOSE_FENCED,
+    CLOSE_NOT_UNDERSTOOD,
     Batch,
     CheckpointUpload,
     Claim,
@@ -363,6 +365,99 @@ def test_heartbeats_make_a_worker_visible_with_the_run_that_it_trains(
     assert workers == {"w": run_id, "idle": None}
 
 
+GOOD = {"kind": "metrics", "seq": 1, "step": 100, "at": 1.0, "values": {"train/return": 1.0}}
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"step": -5},
+        {"step": 10**30},
+        {"at": 1e300},
+        {"values": {"x" * 65: 1.0}},
+        {"values": {"": 1.0}},
+        {"values": {"nul \0": 1.0}},
+        {"values": {f"series {i}": 1.0 for i in range(257)}},
+        {"kind": "gossip"},
+        {"kind": "event", "level": "shout", "message": "x"},
+        {"kind": "event", "level": "info", "message": "x" * 10_001},
+    ],
+    ids=lambda damage: next(iter(damage)),
+)
+def test_an_item_that_can_never_be_stored_is_named_and_what_precedes_it_is_kept(
+    worker: TestClient, run_id: str, services: Services, damage: dict[str, Any]
+) -> None:
+    claim(worker, run_id)
+    bad = GOOD | {"seq": 2} | damage
+    if bad["kind"] == "event":
+        bad.pop("values")
+    with link(worker, run_id, 1) as socket:
+        hear(socket)
+        for _ in range(2):  # and again when it comes again
+            socket.send_text(json.dumps({"items": [GOOD, bad, GOOD | {"seq": 3, "step": 300}]}))
+            orders = hear(socket)
+            assert orders.ack == 1
+            assert orders.refused is not None
+            assert orders.refused.seq == 2
+            assert "Item 2 can't be stored" in orders.refused.reason
+        assert say(socket, Batch(final=Final(outcome="lost", error="item 2 was refused"))).over
+    assert steps_of(services, run_id) == [100]
+
+
+def test_an_item_behind_a_gap_is_refused(worker: TestClient, run_id: str, services: Services) -> None:
+    claim(worker, run_id)
+    with link(worker, run_id, 1) as socket:
+        hear(socket)
+        orders = say(socket, Batch(items=metrics((1, 100), (2, 200), (4, 400))))
+    assert (orders.ack, orders.refused and orders.refused.seq) == (2, 4)
+    assert steps_of(services, run_id) == [100, 200]
+
+
+def test_text_that_no_database_holds_is_shown_as_far_as_it_can_be(
+    client: TestClient, worker: TestClient, run_id: str
+) -> None:
+    claim(worker, run_id)
+    with link(worker, run_id, 1) as socket:
+        hear(socket)
+        item = {"kind": "event", "seq": 1, "step": 1, "at": 1.0, "level": "info", "message": "core\0dumped"}
+        socket.send_text(json.dumps({"items": [item]}))
+        assert hear(socket).ack == 1
+        say(socket, Batch(final=Final(outcome="failed", error="cut \ud800 off\0")))
+    assert "core\ufffddumped" in [event["message"] for event in client.get(f"/api/runs/{run_id}/events").json()]
+    assert state(client, run_id)["error"] == "cut ? off\ufffd"
+
+
+@pytest.mark.parametrize(
+    ("step", "evaluation"),
+    [
+        (-5, {}),
+        (10**30, {}),
+        (100, {"episodes": []}),
+        (100, {"suite": "x" * 65}),
+        (100, {"suite": "nul \0"}),
+        (100, {"episodes": [EVALUATION.episodes[0].model_dump() | {"reward": 1e300}]}),
+    ],
+)
+def test_a_checkpoint_that_can_never_be_registered_is_refused_at_once(
+    client: TestClient, worker: TestClient, run_id: str, services: Services, step: int, evaluation: dict[str, Any]
+) -> None:
+    claim(worker, run_id)
+    archive = b"an archive"
+    head = {
+        "after_seq": 0,
+        "sha256": hashlib.sha256(archive).hexdigest(),
+        "evaluation": EVALUATION.model_dump(mode="json") | evaluation,
+    }
+    response = worker.put(
+        f"/api/worker/runs/{run_id}/checkpoints/{step}",
+        params={"attempt": 1},
+        content=json.dumps(head).encode() + b"\n" + archive,
+    )
+    assert response.status_code == 422
+    assert client.get("/api/experiments").status_code == 200
+    assert services.files.ids() == set()
+
+
 def test_what_is_no_message_of_the_protocol_ends_the_link(worker: TestClient, run_id: str) -> None:
     claim(worker, run_id)
     with link(worker, run_id, 1) as socket:
@@ -370,4 +465,4 @@ def test_what_is_no_message_of_the_protocol_ends_the_link(worker: TestClient, ru
         socket.send_text('{"items": [{"kind": "gossip"}]}')
         with pytest.raises(WebSocketDisconnect) as closed:
             socket.receive_text()
-    assert closed.value.code == 1003
+    assert closed.value.code == CLOSE_NOT_UNDERSTOOD
