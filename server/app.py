@@ -29,6 +29,7 @@ from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
 from server.security.headers import SecurityHeadersMiddleware
+from server.security.proxies import ClientAddressMiddleware
 from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
@@ -108,6 +109,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )
     app.add_middleware(SecurityHeadersMiddleware)
+    app.add_middleware(ClientAddressMiddleware, trusted_proxies=services.settings.trusted_proxies)
     return app
 
 

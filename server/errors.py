@@ -27,13 +27,19 @@ class ErrorBody(BaseModel):
 
 
 class ServiceError(Exception):
-    """Base of everything that the service refuses; `status` is its HTTP status."""
+    """Base of everything that the service refuses; `status` is its HTTP status.
+
+    Args:
+        message: what is wrong, and what to do next.
+        retry_after: seconds after which trying again makes sense; None where it is not known.
+    """
 
     status = 500
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, *, retry_after: float | None = None) -> None:
         super().__init__(message)
         self.message = message
+        self.retry_after = retry_after
 
 
 class InvalidRequestError(ServiceError):

@@ -1,5 +1,6 @@
 """How the service's errors are described in OpenAPI and answered over HTTP."""
 
+import math
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -26,7 +27,8 @@ TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong 
 
 def error_response(error: ServiceError) -> JSONResponse:
     """The error as its HTTP response."""
-    return JSONResponse(ErrorBody(detail=error.message).model_dump(), status_code=error.status)
+    headers = {} if error.retry_after is None else {"Retry-After": str(max(1, math.ceil(error.retry_after)))}
+    return JSONResponse(ErrorBody(detail=error.message).model_dump(), status_code=error.status, headers=headers)
 
 
 def install_error_handlers(app: FastAPI) -> None:

@@ -58,6 +58,8 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             log_level="warning",
             access_log=False,
             server_header=False,
+            # The application asks its own settings whom to believe.
+            proxy_headers=False,
             # Frames are small and many: compressing each would cost more than it saves.
             ws="websockets-sansio",
             ws_per_message_deflate=False,

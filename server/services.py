@@ -15,7 +15,7 @@ from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
 from server.replays.recordings import RecordingStore
-from server.security.limits import LoginLimiter
+from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
 
@@ -35,7 +35,7 @@ class Services:
     links: Links = field(default_factory=NoLinks)
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
-    login_limiter: LoginLimiter = field(default_factory=LoginLimiter)
+    login_limiter: GuessLimiter = field(default_factory=GuessLimiter)
 
     def __post_init__(self) -> None:
         self.drivers = PolicyDrivers(self.live)

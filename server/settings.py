@@ -55,6 +55,11 @@ class Settings(BaseSettings):
     allowed_hosts: tuple[str, ...] = Field(
         (), description="More names under which browsers may reach the server (JSON list)."
     )
+    trusted_proxies: tuple[str, ...] = Field(
+        (),
+        description="Addresses or networks of proxies in front of the server (JSON list): what they say of a client's "
+        "address and of HTTPS is believed.",
+    )
 
     token: SecretStr | None = Field(None, description="Login token; generated and kept in the data directory if not given.")
     worker_token: SecretStr | None = Field(None, description="The workers' token; generated likewise.")
@@ -73,6 +78,17 @@ class Settings(BaseSettings):
     def _absolute(cls, path: Path) -> Path:
         """The processes that share it may have other working directories."""
         return path.resolve()
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _addresses(cls, proxies: tuple[str, ...]) -> tuple[str, ...]:
+        """A name would have to be looked up for every request, and somebody else may answer for it."""
+        for proxy in proxies:
+            try:
+                ipaddress.ip_network(proxy)
+            except ValueError as error:
+                raise ValueError(f"{proxy!r} is neither an address nor a network (10.0.0.5, 172.16.0.0/12)") from error
+        return proxies
 
     @model_validator(mode="after")
     def _closed_on_a_network(self) -> Self:

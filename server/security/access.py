@@ -18,7 +18,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from server.errors import ForbiddenError, InvalidRequestError, ServiceError, UnauthorizedError
 from server.problems import error_response
 from server.security.cookies import cookie_name, set_login_cookie
-from server.security.limits import LoginLimiter
+from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
 
@@ -34,7 +34,7 @@ _POLICY_VIOLATION = 1008
 class AccessMiddleware:
     """Refuses what may not come in; the rest passes on unchanged."""
 
-    def __init__(self, app: ASGIApp, *, settings: Settings, secrets: Secrets, limiter: LoginLimiter) -> None:
+    def __init__(self, app: ASGIApp, *, settings: Settings, secrets: Secrets, limiter: GuessLimiter) -> None:
         self._app = app
         self._settings = settings
         self._secrets = secrets
@@ -56,7 +56,7 @@ class AccessMiddleware:
             if scope["type"] == "http" and "token" in connection.query_params and not _is_protected(scope["path"]):
                 await self._login_by_url(connection, scope, receive, send)
                 return
-            self._check_token(connection)
+            await self._check_token(connection)
         except ServiceError as error:
             await _refuse(error, scope, receive, send)
             return
@@ -79,31 +79,48 @@ class AccessMiddleware:
         # Browsers always send an Origin along; programs don't, and have no cookie that could be abused.
         if not changes or origin is None:
             return
-        if urlsplit(origin).netloc.lower() != connection.headers.get("host", "").lower():
+        try:
+            site = urlsplit(origin).netloc.lower()
+        except ValueError:
+            site = ""
+        if site != connection.headers.get("host", "").lower():
             raise ForbiddenError("This request comes from another site's page.")
 
-    def _check_token(self, connection: HTTPConnection) -> None:
+    async def _check_token(self, connection: HTTPConnection) -> None:
         path: str = connection.scope["path"]
         if not _is_protected(path) or path in _OPEN_PATHS:
             return
         bearer = _bearer(connection)
         if path.startswith(_WORKER_PREFIX):
             if not _equal(bearer, self._secrets.worker_token):
+                self._count(connection, bearer)
                 raise UnauthorizedError("This needs the workers' token: set MAPLESS_WORKER_TOKEN to the server's.")
             return
         cookie = connection.cookies.get(cookie_name(self._settings))
-        if _equal(bearer, self._secrets.token) or _equal(cookie, self._secrets.cookie):
+        if _equal(cookie, self._secrets.cookie):
+            return
+        if bearer is not None:
+            await self._limiter.turn(connection)
+        if _equal(bearer, self._secrets.token):
             return
         if _equal(bearer, self._secrets.worker_token):
             raise ForbiddenError("The workers' token opens the worker API only.")
+        self._count(connection, bearer)
+        if cookie is not None:
+            self._limiter.failed(connection, cookie, once=True)
         raise UnauthorizedError("Log in first: open the URL that the server printed at start.")
+
+    def _count(self, connection: HTTPConnection, wrong: str | None) -> None:
+        """Who brings nothing has not guessed."""
+        if wrong is not None:
+            self._limiter.failed(connection, wrong)
 
     async def _login_by_url(self, connection: HTTPConnection, scope: Scope, receive: Receive, send: Send) -> None:
         """Set the cookie and go to the same page without the token, so that it stays in no history."""
         token = connection.query_params["token"]
-        self._limiter.check(connection)
+        await self._limiter.turn(connection)
         if not _equal(token, self._secrets.token):
-            self._limiter.failed(connection)
+            self._limiter.failed(connection, token)
             raise UnauthorizedError("Wrong token: open the URL that the server printed at its last start.")
         # Path and query only: the place to go to is never another host.
         url = URL(scope=scope).remove_query_params("token")
@@ -133,7 +150,7 @@ def _bearer(connection: HTTPConnection) -> str | None:
 
 def _equal(given: str | None, expected: str) -> bool:
     """In a time that does not tell how much of it is right."""
-    return given is not None and hmac.compare_digest(given.encode(), expected.encode())
+    return given is not None and hmac.compare_digest(given.encode(errors="surrogateescape"), expected.encode())
 
 
 async def _refuse(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:

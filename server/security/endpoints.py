@@ -16,8 +16,8 @@ router = APIRouter(tags=["login"])
 @router.post("/api/login", status_code=status.HTTP_204_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY)
 async def login(credentials: Login, request: Request, response: Response, services: ServicesDep) -> None:
     """Exchange the token that the server printed at start for a cookie."""
-    services.login_limiter.check(request)
+    await services.login_limiter.turn(request)
     if not hmac.compare_digest(credentials.token.encode(), services.secrets.token.encode()):
-        services.login_limiter.failed(request)
+        services.login_limiter.failed(request, credentials.token)
         raise UnauthorizedError("Wrong token: copy it from the URL that the server printed at start.")
     set_login_cookie(response, request, services.settings, services.secrets)

@@ -11,7 +11,6 @@ from starlette.websockets import WebSocketDisconnect
 
 from server.app import create_app
 from server.security.secrets import load_secrets
-from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN
 
@@ -98,19 +97,6 @@ def test_a_refused_login_does_not_repeat_what_was_typed(stranger: TestClient) ->
     assert "my secret" not in response.text
 
 
-def test_after_ten_wrong_tokens_even_the_right_one_has_to_wait(stranger: TestClient, services: Services) -> None:
-    now = 100.0
-    services.login_limiter._clock = lambda: now
-    for _ in range(5):
-        assert stranger.post("/api/login", json={"token": "wrong"}).status_code == 401
-        assert stranger.get("/?token=wrong").status_code == 401
-
-    assert stranger.post("/api/login", json={"token": TOKEN}).status_code == 429
-    assert stranger.get(f"/?token={TOKEN}").status_code == 429
-    now += 61.0
-    assert stranger.post("/api/login", json={"token": TOKEN}).status_code == 204
-
-
 def test_programs_log_in_by_header(stranger: TestClient) -> None:
     assert stranger.get("/api/status", headers=bearer(TOKEN)).status_code == 200
     assert stranger.get("/api/status", headers={"Authorization": f"bearer {TOKEN}"}).status_code == 200
@@ -158,6 +144,7 @@ def test_only_our_own_names_are_answered(settings: Settings, app: FastAPI, host:
         ("http://evil.example", 403),
         ("http://127.0.0.1:8400.evil.example", 403),
         ("null", 403),
+        ("http://[", 403),
     ],
 )
 def test_another_sites_page_changes_nothing(stranger: TestClient, origin: str | None, status: int) -> None:
