@@ -45,7 +45,7 @@ endef
 .venv/.dev: requirements-dev.txt .venv/.run
 	$(call install,requirements-dev.txt)
 
-.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py workers/kernels/*.py) .venv/.run
+.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py workers/kernels/*.py workers/networks/*.py) .venv/.run
 	@echo "Compiling the simulator and the networks' passes ..."
 	@rm -rf sim/kernels/__pycache__ workers/kernels/__pycache__
 	@$(BIN)/python -m workers.precompile

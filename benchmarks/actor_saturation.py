@@ -15,13 +15,13 @@ import torch
 
 from benchmarks.report import finish, parser
 from benchmarks.training_throughput import Silent
-from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.ddpg import Ddpg
+from workers.algorithms.gradients.actor_critic import action_value
 from workers.live.viewing import Unwatched
-from workers.networks import bound_actions
+from workers.networks.modules import bound_actions
 from workers.presets import paper_ddpg
 from workers.reproduction.rows import ROW_BY_ID
-from workers.trainer import REPORT_INTERVAL, Training
+from workers.training.trainer import REPORT_INTERVAL, Training
 
 ROW = "simple-basic-ddpg"
 EVERY = 2_000

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.config import TaskConfig
-from sim.vector_env import NavigationVectorEnv
+from sim.envs.vector import NavigationVectorEnv
 from workers.live.viewing import PolicyFunction
 
 EPISODES = 1_000

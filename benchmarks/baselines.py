@@ -8,11 +8,11 @@ Targets: what can be reached without training stays within reach.
 
 from benchmarks.report import finish, parser
 from sim.config import TaskConfig
-from sim.scores import barn_score
 from sim.suites import load_suite, suite_names
-from workers.evaluation import to_result
+from sim.suites.scores import barn_score
 from workers.reference.build import CONTROLLERS
 from workers.reference.figures import figures as figures_of
+from workers.training.evaluation import to_result
 
 # Least success in percent.
 TARGETS = {

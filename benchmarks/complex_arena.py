@@ -18,11 +18,11 @@ import torch
 from benchmarks.report import finish, parser
 from benchmarks.training_throughput import NEVER, Silent
 from workers.config import EvaluationConfig
-from workers.drives import drive
 from workers.live.viewing import Unwatched
 from workers.policy import torch_policy
 from workers.presets import COMPLEX
-from workers.trainer import REPORT_INTERVAL, Training
+from workers.training.drives import drive
+from workers.training.trainer import REPORT_INTERVAL, Training
 
 DRIVES = 20
 STEPS = 10_000

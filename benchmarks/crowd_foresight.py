@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from benchmarks.report import finish, parser
 from sim.config import LidarConfig, TaskConfig
 from sim.kernels.sensing import clearance_at
-from sim.scenarios import scenario_world
 from sim.shapes import pack_shapes
 from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller
+from sim.suites.scenarios import scenario_world
 from sim.world import World
 
 Floats = NDArray[np.float32]

@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 
 from benchmarks.report import finish, parser
 from benchmarks.service import get, running_service, wait_for
-from sim.vector_env import NavigationVectorEnv
+from sim.envs.vector import NavigationVectorEnv
 from workers.checkpoints import read_policy
 
 WORKERS = 2

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
-from sim.config import GeneratedArenaConfig, LidarConfig, TaskConfig
-from sim.dwa import dynamic_window
-from sim.mover_config import MoversConfig
+from sim.baselines.dwa import dynamic_window
+from sim.config import GeneratedArenaConfig, LidarConfig, MoversConfig, TaskConfig
 from sim.suites import Suite, load_suite, run_controller, run_suite, suite_for, suite_in, suite_places
 from workers.checkpoints import read_policy
 from workers.policy import torch_policy

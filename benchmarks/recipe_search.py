@@ -22,7 +22,7 @@ from sim.config import ArenaConfig, TaskConfig
 from workers.config import TrainingConfig
 from workers.live.viewing import Unwatched
 from workers.policy import torch_policy
-from workers.trainer import REPORT_INTERVAL, Training
+from workers.training.trainer import REPORT_INTERVAL, Training
 
 
 def learn(config: TrainingConfig, seed: int, parts: int, episodes_seed: int) -> tuple[list[Attempts], float]:

@@ -26,7 +26,7 @@ from sim.arenas import Arena, Mover
 from sim.config import TaskConfig
 from sim.kernels.commands import write_commands
 from sim.kernels.step import step_robots
-from sim.reference import ReferenceWorld
+from sim.plain import ReferenceWorld
 from sim.world import World
 
 TASK = TaskConfig()
@@ -93,7 +93,7 @@ def kernel_only(robots: int) -> Callable[[], None]:
 
 
 def plain() -> Callable[[], None]:
-    """One robot, one Space, public queries: `sim.reference`, with a reset when an attempt ends."""
+    """One robot, one Space, public queries: `sim.plain`, with a reset when an attempt ends."""
     _, start = ours(1)
     rng = np.random.default_rng(0)
     world: ReferenceWorld | None = None

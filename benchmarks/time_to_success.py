@@ -31,7 +31,7 @@ from sim.config import ArenaConfig, TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.live.viewing import PolicyFunction, Unwatched
 from workers.policy import torch_policy
-from workers.trainer import REPORT_INTERVAL, Training
+from workers.training.trainer import REPORT_INTERVAL, Training
 
 TASK = TaskConfig(arena=ArenaConfig(name="complex"))
 STEPS = {"ppo": 1_000_000, "ddpg": 100_000, "td3": 100_000, "sac": 60_000}

@@ -25,7 +25,7 @@ from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, 
 from workers.frames import Frame
 from workers.live.viewing import Unwatched
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.trainer import REPORT_INTERVAL, Training
+from workers.training.trainer import REPORT_INTERVAL, Training
 
 CASES: dict[str, PpoConfig | DdpgConfig] = {
     "ppo_mlp_64": PpoConfig(network=MlpNetwork(hidden_sizes=(64, 64))),

@@ -22,7 +22,7 @@ from workers.frames import Frame
 from workers.live.viewer import LiveViewer
 from workers.live.viewing import PolicyFunction
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.trainer import train
+from workers.training.trainer import train
 
 TURN_SECONDS = 2.0
 # The first moments of a turn still belong to the one before: threads start and end.

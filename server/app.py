@@ -11,7 +11,8 @@ from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
 from server.checkpoints import endpoints as checkpoints
 from server.comparison import endpoints as comparison
-from server.database import Database
+from server.database.engine import Database
+from server.database.migrate import upgrade
 from server.diagnoses import endpoints as diagnoses
 from server.events import endpoints as events
 from server.experiments import endpoints as experiments
@@ -19,7 +20,6 @@ from server.exports import endpoints as exports
 from server.files import FileStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
-from server.migrate import upgrade
 from server.policies import endpoints as policies
 from server.problems import UNAUTHORIZED, install_error_handlers
 from server.replays import endpoints as replays

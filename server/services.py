@@ -7,7 +7,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from server.arenas.store import ArenaStore
-from server.database import Database
+from server.database.engine import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
 from server.files import FileStore

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arenas import Arena
+from sim.config import MoverKind
 from sim.kernels.bundles import Crowd
 from sim.kernels.movers import DECISION, move_movers, place_movers
 from sim.kernels.random import seed_streams
 from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
-from sim.mover_config import MoverKind
 from sim.shapes import Shapes, hulls
 
 _KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pymunk import batch
 
 from sim.arenas import Arena
-from sim.robot_config import AnyRobotConfig, RectangularRobot
+from sim.config import AnyRobotConfig, RectangularRobot
 
 ROBOTS_PER_TILE = 64
 """Robots that share a tile: few enough that the broad phase finds few pairs, enough that thousands need few shapes."""

@@ -3,10 +3,9 @@
 import numpy as np
 
 from sim.arenas import build_arenas
-from sim.config import ArenaConfig, TaskConfig
-from sim.mover_config import MoversConfig
+from sim.config import ArenaConfig, MoversConfig, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.scan import clearances, scan
-from sim.vector_env import NavigationVectorEnv
 
 
 def main() -> None:

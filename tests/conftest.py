@@ -15,8 +15,8 @@ from sim.config import TaskConfig
 from sim.observations import observation_layout
 from workers.checkpoints import Checkpoint, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
-from workers.layout import layout, weight_shapes
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.networks.layout import layout, weight_shapes
 
 POSTGRES = ("127.0.0.1", 5432)
 

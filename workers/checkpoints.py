@@ -30,8 +30,8 @@ from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
 
 from workers.errors import ArchiveFormatError, ArchiveIntegrityError
-from workers.layout import weight_shapes
 from workers.manifest import MANIFEST, POLICY, STATE_ARRAYS, STATE_COUNTERS, FileEntry, Manifest, TrainingCounters
+from workers.networks.layout import weight_shapes
 from workers.policy import Policy
 
 Arrays = Mapping[str, NDArray[np.generic]]

@@ -115,7 +115,7 @@ def train(
     try:
         # Only now: torch and numba take two seconds to import, which `--help` should not.
         from workers.checkpoints import read_manifest
-        from workers.trainer import train as run
+        from workers.training.trainer import train as run
 
         if resume is not None:
             manifest = read_manifest(resume)
@@ -149,7 +149,7 @@ def evaluate(
     try:
         from sim.suites import load_suite, suite_for
         from workers.checkpoints import read_policy
-        from workers.evaluation import evaluate as run
+        from workers.training.evaluation import evaluate as run
 
         for checkpoint in checkpoints:
             manifest, policy = read_policy(checkpoint)

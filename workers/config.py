@@ -4,8 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from sim.config import ADVANCED, Frozen, TaskConfig
-from sim.schema import HIDDEN
+from sim.config import ADVANCED, HIDDEN, Frozen, TaskConfig
 
 
 class ResBlockNetwork(Frozen):

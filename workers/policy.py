@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workers.config import Network, ResBlockNetwork
-from workers.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 from workers.live.viewing import PolicyFunction
+from workers.networks.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 
 
 class Policy:
@@ -56,7 +56,7 @@ def torch_policy(network: Network, weights: Mapping[str, NDArray[np.float32]]) -
     """The same policy run by torch on the CPU: faster for many robots, and on as many threads as torch is told."""
     import torch
 
-    from workers.networks import bound_actions, build_network
+    from workers.networks.modules import bound_actions, build_network
 
     first = "layer1" if isinstance(network, ResBlockNetwork) else layout(network).layers[0]
     with torch.random.fork_rng(devices=[]):

@@ -11,14 +11,14 @@ import torch
 
 import sim.precompile
 from sim.config import TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout
 from sim.suites import run_suite, suite_for
-from sim.vector_env import NavigationVectorEnv
 from workers.algorithms import build_algorithm
 from workers.algorithms.flat import FlatParameters
-from workers.backward import TensorPasses
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
-from workers.networks import build_network
+from workers.networks.compiled import TensorPasses
+from workers.networks.modules import build_network
 
 
 def warm_up() -> None:

@@ -8,7 +8,7 @@ import typer
 
 if TYPE_CHECKING:
     from server.arenas.store import ArenaStore
-    from sim.arena_file import ArenaFile
+    from sim.config import ArenaFile
 
 app = typer.Typer(help="Import arenas from files, and look at them.", no_args_is_help=True)
 

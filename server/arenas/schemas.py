@@ -5,8 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from server.schemas import Schema
-from sim.arena_file import ArenaFile
-from sim.config import AnyArenaConfig
+from sim.config import AnyArenaConfig, ArenaFile
 
 MAX_FILES = 2
 """Of an upload: a ROS map has a YAML file and an image."""

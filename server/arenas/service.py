@@ -5,15 +5,14 @@ import binascii
 
 from sqlalchemy import func, select
 
-from server import models
 from server.arenas.schemas import ArenaSummary, ArenaUpload, ArenaView
+from server.database import tables
 from server.errors import ConflictError, UnusableArenaError
 from server.services import Services
-from sim.arena_file import ArenaFile
 from sim.arenas import build_arenas
 from sim.arenas.document import free_area, to_arena, to_document
 from sim.arenas.files import read_arena
-from sim.config import AnyArenaConfig, ArenaConfig, FamilyName, GeneratedArenaConfig, ImportedArenaConfig
+from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, FamilyName, GeneratedArenaConfig, ImportedArenaConfig
 from sim.errors import ArenaFileError
 
 _FIXED = (("Simple", ArenaConfig(name="simple")), ("Complex", ArenaConfig(name="complex")))
@@ -110,9 +109,9 @@ class ArenaService:
         self._store.delete(sha256)
 
     def _trainings(self, sha256: str) -> int:
-        used = models.Experiment.training["task"]["arena"]["sha256"].as_string()
+        used = tables.Experiment.training["task"]["arena"]["sha256"].as_string()
         with self._services.database.read() as session:
-            return session.scalar(select(func.count()).select_from(models.Experiment).where(used == sha256)) or 0
+            return session.scalar(select(func.count()).select_from(tables.Experiment).where(used == sha256)) or 0
 
     @staticmethod
     def _view(

@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from server.errors import ConflictError, NotFoundError
-from sim.arena_file import ArenaFile
+from sim.config import ArenaFile
 
 MAX_ARENAS = 1000
 """More than anybody looks through; an upload beyond it is refused."""

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
-from server import models
+from server.database import tables
 from server.errors import NotFoundError
 from server.files import StoredFile
 from server.ids import new_id
@@ -23,15 +23,15 @@ class CheckpointRepository:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def add(self, run_id: str, step: int, file: StoredFile, evaluation: EvaluationResult | None) -> models.Checkpoint:
+    def add(self, run_id: str, step: int, file: StoredFile, evaluation: EvaluationResult | None) -> tables.Checkpoint:
         """Register an archive that lies in the file store, under the store's id, with what its weights achieved."""
-        checkpoint = models.Checkpoint(id=file.id, run_id=run_id, step=step, size=file.size, sha256=file.sha256)
+        checkpoint = tables.Checkpoint(id=file.id, run_id=run_id, step=step, size=file.size, sha256=file.sha256)
         self._session.add(checkpoint)
         self._session.flush()
         if evaluation is not None:
             arrived = [episode.steps for episode in evaluation.episodes if episode.outcome == "arrival"]
             self._session.add(
-                models.Evaluation(
+                tables.Evaluation(
                     id=new_id(),
                     checkpoint_id=file.id,
                     suite=evaluation.suite,
@@ -45,83 +45,83 @@ class CheckpointRepository:
             )
         return checkpoint
 
-    def get(self, checkpoint_id: str) -> models.Checkpoint:
+    def get(self, checkpoint_id: str) -> tables.Checkpoint:
         """The checkpoint.
 
         Raises:
             NotFoundError: there is none.
         """
-        checkpoint = self._session.get(models.Checkpoint, checkpoint_id)
+        checkpoint = self._session.get(tables.Checkpoint, checkpoint_id)
         if checkpoint is None:
             raise NotFoundError.of("checkpoint", checkpoint_id)
         return checkpoint
 
-    def at_step(self, run_id: str, step: int) -> models.Checkpoint | None:
+    def at_step(self, run_id: str, step: int) -> tables.Checkpoint | None:
         """The run's checkpoint of exactly this step, if there is one."""
-        query = select(models.Checkpoint).where(models.Checkpoint.run_id == run_id, models.Checkpoint.step == step)
-        return self._session.scalars(query.order_by(models.Checkpoint.created_at.desc())).first()
+        query = select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id, tables.Checkpoint.step == step)
+        return self._session.scalars(query.order_by(tables.Checkpoint.created_at.desc())).first()
 
-    def last(self, run_id: str) -> models.Checkpoint | None:
+    def last(self, run_id: str) -> tables.Checkpoint | None:
         """The run's checkpoint of the highest step, from which it is resumed."""
-        query = select(models.Checkpoint).where(models.Checkpoint.run_id == run_id)
+        query = select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id)
         return self._session.scalars(
-            query.order_by(models.Checkpoint.step.desc(), models.Checkpoint.created_at.desc())
+            query.order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
         ).first()
 
-    def of_run(self, run_id: str) -> Sequence[tuple[models.Checkpoint, models.Evaluation | None]]:
+    def of_run(self, run_id: str) -> Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]:
         """The run's checkpoints by step, each with its evaluation (its episodes are left in the database)."""
         query = (
-            select(models.Checkpoint, models.Evaluation)
-            .outerjoin(models.Evaluation, models.Evaluation.checkpoint_id == models.Checkpoint.id)
-            .where(models.Checkpoint.run_id == run_id)
-            .options(defer(models.Evaluation.episodes))
-            .order_by(models.Checkpoint.step, models.Checkpoint.created_at)
+            select(tables.Checkpoint, tables.Evaluation)
+            .outerjoin(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
+            .where(tables.Checkpoint.run_id == run_id)
+            .options(defer(tables.Evaluation.episodes))
+            .order_by(tables.Checkpoint.step, tables.Checkpoint.created_at)
         )
         return [(checkpoint, evaluation) for checkpoint, evaluation in self._session.execute(query)]
 
-    def evaluation(self, checkpoint_id: str) -> models.Evaluation:
+    def evaluation(self, checkpoint_id: str) -> tables.Evaluation:
         """The checkpoint's evaluation.
 
         Raises:
             NotFoundError: it has none.
         """
-        query = select(models.Evaluation).where(models.Evaluation.checkpoint_id == checkpoint_id)
+        query = select(tables.Evaluation).where(tables.Evaluation.checkpoint_id == checkpoint_id)
         evaluation = self._session.scalars(query).first()
         if evaluation is None:
             raise NotFoundError(f"Checkpoint {checkpoint_id} has not been evaluated.")
         return evaluation
 
-    def final_evaluations(self, run_ids: Collection[str]) -> dict[str, models.Evaluation]:
+    def final_evaluations(self, run_ids: Collection[str]) -> dict[str, tables.Evaluation]:
         """The evaluation of each run's last evaluated checkpoint, by run (their episodes are left in the database)."""
         last = (
-            select(models.Checkpoint.run_id, func.max(models.Checkpoint.step).label("step"))
-            .join(models.Evaluation, models.Evaluation.checkpoint_id == models.Checkpoint.id)
-            .where(models.Checkpoint.run_id.in_(run_ids))
-            .group_by(models.Checkpoint.run_id)
+            select(tables.Checkpoint.run_id, func.max(tables.Checkpoint.step).label("step"))
+            .join(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
+            .where(tables.Checkpoint.run_id.in_(run_ids))
+            .group_by(tables.Checkpoint.run_id)
             .subquery()
         )
         query = (
-            select(models.Checkpoint.run_id, models.Evaluation)
-            .join(models.Evaluation, models.Evaluation.checkpoint_id == models.Checkpoint.id)
-            .join(last, (last.c.run_id == models.Checkpoint.run_id) & (last.c.step == models.Checkpoint.step))
-            .options(defer(models.Evaluation.episodes))
-            .order_by(models.Evaluation.created_at)
+            select(tables.Checkpoint.run_id, tables.Evaluation)
+            .join(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
+            .join(last, (last.c.run_id == tables.Checkpoint.run_id) & (last.c.step == tables.Checkpoint.step))
+            .options(defer(tables.Evaluation.episodes))
+            .order_by(tables.Evaluation.created_at)
         )
         return {row[0]: row[1] for row in self._session.execute(query)}
 
     def ids(self, run_ids: Collection[str] | None = None) -> set[str]:
         """The ids of the checkpoints of these runs, or of all."""
-        query = select(models.Checkpoint.id)
+        query = select(tables.Checkpoint.id)
         if run_ids is not None:
-            query = query.where(models.Checkpoint.run_id.in_(run_ids))
+            query = query.where(tables.Checkpoint.run_id.in_(run_ids))
         return set(self._session.scalars(query))
 
 
-def decode_episodes(evaluation: models.Evaluation) -> tuple[EpisodeResult, ...]:
+def decode_episodes(evaluation: tables.Evaluation) -> tuple[EpisodeResult, ...]:
     """The evaluation's episodes, in the suite's order."""
     return _EPISODES.validate_json(zlib.decompress(evaluation.episodes))
 
 
-def evaluation_result(evaluation: models.Evaluation) -> EvaluationResult:
+def evaluation_result(evaluation: tables.Evaluation) -> EvaluationResult:
     """The evaluation as it was reported."""
     return EvaluationResult(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=decode_episodes(evaluation))

@@ -3,8 +3,9 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from server import models, statistics
+from server import statistics
 from server.checkpoints.schemas import Checkpoint, Evaluation
+from server.database import tables
 from server.schemas import Estimate
 
 
@@ -13,7 +14,7 @@ def estimate(interval: statistics.Interval, *, seeds: int, episodes: int) -> Est
     return Estimate(value=interval.value, low=interval.low, high=interval.high, seeds=seeds, episodes=episodes)
 
 
-def success_over_runs(evaluations: Sequence[models.Evaluation]) -> Estimate | None:
+def success_over_runs(evaluations: Sequence[tables.Evaluation]) -> Estimate | None:
     """Success rate over runs, one evaluation each, of those on the suite that most of them were measured on."""
     if not evaluations:
         return None
@@ -24,7 +25,7 @@ def success_over_runs(evaluations: Sequence[models.Evaluation]) -> Estimate | No
     return estimate(interval, seeds=len(alike), episodes=sum(counts))
 
 
-def evaluation_view(evaluation: models.Evaluation) -> Evaluation:
+def evaluation_view(evaluation: tables.Evaluation) -> Evaluation:
     """A checkpoint's evaluation in JSON."""
     interval = statistics.wilson_interval(evaluation.arrivals, evaluation.episode_count)
     return Evaluation(
@@ -38,7 +39,7 @@ def evaluation_view(evaluation: models.Evaluation) -> Evaluation:
     )
 
 
-def checkpoint_views(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> list[Checkpoint]:
+def checkpoint_views(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> list[Checkpoint]:
     """A run's checkpoints in JSON, the best marked."""
     best = _best_evaluated(rows)
     return [
@@ -55,15 +56,15 @@ def checkpoint_views(rows: Sequence[tuple[models.Checkpoint, models.Evaluation |
     ]
 
 
-def best_checkpoint(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> str | None:
+def best_checkpoint(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
     """The id of a run's best checkpoint; of its last where none was evaluated, None where there is none."""
     return _best_evaluated(rows) or (rows[-1][0].id if rows else None)
 
 
-def _best_evaluated(rows: Sequence[tuple[models.Checkpoint, models.Evaluation | None]]) -> str | None:
+def _best_evaluated(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
     """The id with the highest success rate; of equal ones that with the fewest steps to the target, then the newest."""
 
-    def merit(row: tuple[models.Checkpoint, models.Evaluation]) -> tuple[float, float, int]:
+    def merit(row: tuple[tables.Checkpoint, tables.Evaluation]) -> tuple[float, float, int]:
         checkpoint, evaluation = row
         steps = evaluation.steps_mean if evaluation.steps_mean is not None else float("inf")
         return evaluation.arrivals / evaluation.episode_count, -steps, checkpoint.step

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
-from server import models, statistics
+from server import statistics
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.checkpoints.views import estimate
 from server.comparison.differences import differences
 from server.comparison.schemas import ComparedExperiment, Comparison, Curves, ExperimentCurves, SeedCurve
+from server.database import tables
 from server.experiments.repository import ExperimentRepository
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
@@ -80,7 +81,7 @@ def resample(points: Points, grid: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.interp(grid, points.steps[finite], points.values[finite].astype(np.float64), left=np.nan, right=np.nan)
 
 
-def _curves(experiment: models.Experiment, series: dict[str, Points], grid: NDArray[np.int64]) -> ExperimentCurves:
+def _curves(experiment: tables.Experiment, series: dict[str, Points], grid: NDArray[np.int64]) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     present = np.isfinite(values)
     count = present.sum(axis=0)
@@ -99,7 +100,7 @@ def _curves(experiment: models.Experiment, series: dict[str, Points], grid: NDAr
     )
 
 
-def _final_figures(session: Session, experiment: models.Experiment) -> ComparedExperiment:
+def _final_figures(session: Session, experiment: tables.Experiment) -> ComparedExperiment:
     evaluations = _alike(CheckpointRepository(session).final_evaluations([run.id for run in experiment.runs]))
     if not evaluations:
         return ComparedExperiment(
@@ -138,7 +139,7 @@ def _over_seeds(samples: list[NDArray[np.float64]]) -> Estimate | None:
     return estimate(statistics.seeds_estimate(samples), seeds=len(samples), episodes=sum(values.size for values in samples))
 
 
-def _alike(final: dict[str, models.Evaluation]) -> list[models.Evaluation]:
+def _alike(final: dict[str, tables.Evaluation]) -> list[tables.Evaluation]:
     """Those on the suite that most of the runs were measured on: others can't be counted together with them."""
     if not final:
         return []
@@ -147,7 +148,7 @@ def _alike(final: dict[str, models.Evaluation]) -> list[models.Evaluation]:
 
 
 def _warnings(
-    session: Session, experiments: Sequence[models.Experiment], compared: Sequence[ComparedExperiment]
+    session: Session, experiments: Sequence[tables.Experiment], compared: Sequence[ComparedExperiment]
 ) -> list[str]:
     warnings = []
     for experiment, figures in zip(experiments, compared, strict=True):

@@ -5,10 +5,10 @@ from collections.abc import Collection, Sequence
 from sqlalchemy import ColumnElement, case, func, select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
-from server import models
+from server.database import tables
+from server.database.tables import RunState
 from server.errors import NotFoundError
 from server.experiments.schemas import ExperimentState
-from server.models import RunState
 
 # While any run is in one of these, that is what the experiment is; the first that applies.
 UNFINISHED: tuple[RunState, ...] = ("running", "stopping", "queued")
@@ -25,8 +25,8 @@ def aggregate_state(states: Collection[RunState]) -> ExperimentState:
 
 def _aggregate_state_sql() -> ColumnElement[str]:
     """`aggregate_state` over the runs of a group."""
-    unfinished = [(func.sum(case((models.Run.state == state, 1), else_=0)) > 0, state) for state in UNFINISHED]
-    uniform = (func.min(models.Run.state) == func.max(models.Run.state), func.min(models.Run.state))
+    unfinished = [(func.sum(case((tables.Run.state == state, 1), else_=0)) > 0, state) for state in UNFINISHED]
+    uniform = (func.min(tables.Run.state) == func.max(tables.Run.state), func.min(tables.Run.state))
     return case(*unfinished, uniform, else_="mixed")
 
 
@@ -36,11 +36,11 @@ class ExperimentRepository:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def add(self, experiment: models.Experiment) -> None:
+    def add(self, experiment: tables.Experiment) -> None:
         """Add an experiment with its runs."""
         self._session.add(experiment)
 
-    def get(self, experiment_id: str) -> models.Experiment:
+    def get(self, experiment_id: str) -> tables.Experiment:
         """The experiment with its runs.
 
         Raises:
@@ -49,16 +49,16 @@ class ExperimentRepository:
         found = self.get_many([experiment_id])
         return found[0]
 
-    def get_many(self, experiment_ids: Sequence[str]) -> list[models.Experiment]:
+    def get_many(self, experiment_ids: Sequence[str]) -> list[tables.Experiment]:
         """The experiments with their runs, in the order asked for.
 
         Raises:
             NotFoundError: one of them is missing.
         """
         query = (
-            select(models.Experiment)
-            .where(models.Experiment.id.in_(experiment_ids))
-            .options(selectinload(models.Experiment.runs))
+            select(tables.Experiment)
+            .where(tables.Experiment.id.in_(experiment_ids))
+            .options(selectinload(tables.Experiment.runs))
         )
         found = {experiment.id: experiment for experiment in self._session.scalars(query)}
         for experiment_id in experiment_ids:
@@ -66,18 +66,18 @@ class ExperimentRepository:
                 raise NotFoundError.of("experiment", experiment_id)
         return [found[experiment_id] for experiment_id in experiment_ids]
 
-    def lock_runs(self, experiment_id: str) -> Sequence[models.Run]:
+    def lock_runs(self, experiment_id: str) -> Sequence[tables.Run]:
         """The experiment's runs with the experiment itself, by seed, locked where the database has row locks.
 
         Raises:
             NotFoundError: there is no such experiment.
         """
         query = (
-            select(models.Run)
-            .where(models.Run.experiment_id == experiment_id)
-            .options(joinedload(models.Run.experiment))
-            .order_by(models.Run.seed)
-            .with_for_update(of=models.Run)
+            select(tables.Run)
+            .where(tables.Run.experiment_id == experiment_id)
+            .options(joinedload(tables.Run.experiment))
+            .order_by(tables.Run.seed)
+            .with_for_update(of=tables.Run)
         )
         runs = self._session.scalars(query).all()
         if not runs:
@@ -86,38 +86,38 @@ class ExperimentRepository:
 
     def page(
         self, *, query: str, state: ExperimentState | None, limit: int, offset: int
-    ) -> tuple[Sequence[models.Experiment], int]:
+    ) -> tuple[Sequence[tables.Experiment], int]:
         """Experiments whose name contains `query` (in any case) and that are in `state`, newest first; how many in all."""
-        wanted = select(models.Experiment.id)
+        wanted = select(tables.Experiment.id)
         if query:
-            wanted = wanted.where(func.lower(models.Experiment.name).contains(query.lower(), autoescape=True))
+            wanted = wanted.where(func.lower(tables.Experiment.name).contains(query.lower(), autoescape=True))
         if state is not None:
             in_state = (
-                select(models.Run.experiment_id).group_by(models.Run.experiment_id).having(_aggregate_state_sql() == state)
+                select(tables.Run.experiment_id).group_by(tables.Run.experiment_id).having(_aggregate_state_sql() == state)
             )
-            wanted = wanted.where(models.Experiment.id.in_(in_state))
+            wanted = wanted.where(tables.Experiment.id.in_(in_state))
         total = self._session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
         rows = (
-            select(models.Experiment)
-            .where(models.Experiment.id.in_(wanted))
-            .options(selectinload(models.Experiment.runs))
-            .order_by(models.Experiment.created_at.desc(), models.Experiment.id)
+            select(tables.Experiment)
+            .where(tables.Experiment.id.in_(wanted))
+            .options(selectinload(tables.Experiment.runs))
+            .order_by(tables.Experiment.created_at.desc(), tables.Experiment.id)
             .limit(limit)
             .offset(offset)
         )
         return self._session.scalars(rows).all(), total
 
-    def campaign(self, campaign_id: str) -> Sequence[models.Experiment]:
+    def campaign(self, campaign_id: str) -> Sequence[tables.Experiment]:
         """The experiments of a campaign with their runs; those that were deleted are missing.
 
         Raises:
             NotFoundError: none is left.
         """
         query = (
-            select(models.Experiment)
-            .where(models.Experiment.campaign == campaign_id)
-            .options(selectinload(models.Experiment.runs))
-            .order_by(models.Experiment.created_at, models.Experiment.id)
+            select(tables.Experiment)
+            .where(tables.Experiment.campaign == campaign_id)
+            .options(selectinload(tables.Experiment.runs))
+            .order_by(tables.Experiment.created_at, tables.Experiment.id)
         )
         found = self._session.scalars(query).all()
         if not found:
@@ -126,24 +126,24 @@ class ExperimentRepository:
 
     def campaigns(self) -> list[tuple[str, float]]:
         """Every campaign of which an experiment is left, with the time of its launch, the newest first."""
-        launched = func.min(models.Experiment.created_at)
+        launched = func.min(tables.Experiment.created_at)
         query = (
-            select(models.Experiment.campaign, launched)
-            .where(models.Experiment.campaign.is_not(None))
-            .group_by(models.Experiment.campaign)
-            .order_by(launched.desc(), models.Experiment.campaign)
+            select(tables.Experiment.campaign, launched)
+            .where(tables.Experiment.campaign.is_not(None))
+            .group_by(tables.Experiment.campaign)
+            .order_by(launched.desc(), tables.Experiment.campaign)
         )
         return [(campaign, at) for campaign, at in self._session.execute(query) if campaign is not None]
 
     def unfinished_campaign(self) -> str | None:
         """A campaign with a run that has not ended."""
         query = (
-            select(models.Experiment.campaign)
-            .join(models.Run, models.Run.experiment_id == models.Experiment.id)
-            .where(models.Experiment.campaign.is_not(None), models.Run.state.in_(UNFINISHED))
+            select(tables.Experiment.campaign)
+            .join(tables.Run, tables.Run.experiment_id == tables.Experiment.id)
+            .where(tables.Experiment.campaign.is_not(None), tables.Run.state.in_(UNFINISHED))
         )
         return self._session.scalars(query).first()
 
-    def delete(self, experiment: models.Experiment) -> None:
+    def delete(self, experiment: tables.Experiment) -> None:
         """Remove the experiment with everything that hangs on it."""
         self._session.delete(experiment)

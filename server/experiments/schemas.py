@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, field_validator
 
-from server.models import RunState
+from server.database.tables import RunState
 from server.runs.schemas import Run
 from server.schemas import UNREADABLE, Estimate, Schema
 from sim.config import Frozen

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 
 from sqlalchemy.orm import Session
 
-from server import models
 from server.arenas.references import without_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
+from server.database import tables
 from server.errors import ConflictError
 from server.events.bus import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
@@ -36,8 +36,8 @@ class ExperimentService:
             UnusableArenaError: it trains on an imported arena that is not here.
         """
         training = without_geometry(request.training, self._services.arenas)
-        experiment = models.Experiment(id=new_id(), name=request.name, training=training.model_dump(mode="json"))
-        experiment.runs = [models.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
+        experiment = tables.Experiment(id=new_id(), name=request.name, training=training.model_dump(mode="json"))
+        experiment.runs = [tables.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
         with self._services.database.write() as session:
             ExperimentRepository(session).add(experiment)
         for run in experiment.runs:
@@ -125,7 +125,7 @@ class ExperimentService:
         """
         self._delete(lambda repository: repository.campaign(campaign_id))
 
-    def _delete(self, find: Callable[[ExperimentRepository], Sequence[models.Experiment]]) -> None:
+    def _delete(self, find: Callable[[ExperimentRepository], Sequence[tables.Experiment]]) -> None:
         with self._services.database.write() as session:
             repository = ExperimentRepository(session)
             experiments = find(repository)
@@ -145,7 +145,7 @@ class ExperimentService:
         self._services.bus.publish(Change.model_validate({"experiment_id": experiment_id, "run_id": None, "kind": kind}))
 
 
-def _views(session: Session, experiments: Sequence[models.Experiment]) -> list[Experiment]:
+def _views(session: Session, experiments: Sequence[tables.Experiment]) -> list[Experiment]:
     run_ids = [run.id for experiment in experiments for run in experiment.runs]
     latest = RunRepository(session).latest_metrics(run_ids, SHOWN)
     final = CheckpointRepository(session).final_evaluations(run_ids)

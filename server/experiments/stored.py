@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from server import models
+from server.database import tables
 from workers.config import TrainingConfig
 
 
@@ -43,7 +43,7 @@ def read_training(document: Mapping[str, Any]) -> StoredTraining:
             return StoredTraining(training, tuple(sorted(unreadable)))
 
 
-def training_of(experiment: models.Experiment) -> TrainingConfig:
+def training_of(experiment: tables.Experiment) -> TrainingConfig:
     """What can be read of an experiment's settings."""
     return read_training(experiment.training).training
 

@@ -14,9 +14,9 @@ from server.live.bridge import bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
-from server.live.themes import Theme
 from server.live.watched import Watched, policy_view, watched
 from server.problems import NOT_FOUND
+from server.scene.themes import Theme
 from server.services import Services, ServicesDep
 from sim.errors import ArenaError
 

@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeVar
 
 from server.live.scoreboard import Score
 from server.live.settings import RECEIVING_SECONDS, LiveSettings, LiveStatus
-from server.live.themes import Theme
+from server.scene.themes import Theme
 from sim.config import TaskConfig
 from workers.frames import Frame
 from workers.reporting import WatchRequest

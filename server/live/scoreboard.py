@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel
 
-from server.live.continuity import continues, ended
+from server.scene.continuity import continues, ended
 from workers.frames import Frame, ViewMode
 
 # More robots than this are summed up rather than listed.

@@ -4,15 +4,14 @@ import logging
 import threading
 import time
 
-from server.live.camera import CameraRig
 from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
-from server.live.quiet import start_viser, stop_viser
-from server.live.scene import Scene
 from server.live.scoreboard import Score, Scoreboard, ViewState
 from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
-from server.live.themes import Theme
-from sim.config import GeneratedArenaConfig, TaskConfig
-from sim.mover_config import MAX_MOVERS
+from server.scene.camera import CameraRig
+from server.scene.quiet import start_viser, stop_viser
+from server.scene.scene import Scene
+from server.scene.themes import Theme
+from sim.config import MAX_MOVERS, GeneratedArenaConfig, TaskConfig
 from workers.frames import Frame, FrameError
 
 logger = logging.getLogger(__name__)

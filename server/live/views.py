@@ -2,7 +2,7 @@
 
 from server.live.hub import View
 from server.live.settings import LiveSettings
-from server.live.themes import Theme
+from server.scene.themes import Theme
 from sim.config import TaskConfig
 
 

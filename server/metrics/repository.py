@@ -9,7 +9,7 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from server import models
+from server.database import tables
 from server.metrics.points import Points
 
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
@@ -44,13 +44,13 @@ class MetricRepository:
 
         `Run.last_seq` is left to the caller, who moves it in the same transaction once everything numbered so far is stored.
         """
-        last_seq = self._session.scalar(select(models.Run.last_seq).where(models.Run.id == run_id)) or 0
+        last_seq = self._session.scalar(select(tables.Run.last_seq).where(tables.Run.id == run_id)) or 0
         fresh = [row for row in rows if row.seq > last_seq and row.values]
         if not fresh:
             return
         for start in range(0, len(fresh), _INSERT_ROWS):
             self._session.execute(
-                self._insert(models.MetricRow).on_conflict_do_nothing(),
+                self._insert(tables.MetricRow).on_conflict_do_nothing(),
                 [
                     {
                         "run_id": run_id,
@@ -81,19 +81,19 @@ class MetricRepository:
                 self._session.delete(last)
                 self._session.flush()
             self._add_chunks(run_id, name, points)
-        self._session.execute(delete(models.MetricRow).where(models.MetricRow.run_id == run_id))
+        self._session.execute(delete(tables.MetricRow).where(tables.MetricRow.run_id == run_id))
         self._session.flush()
 
     def drop_beyond(self, run_id: str, step: int) -> None:
         """Forget every point after `step`: what a lost attempt did after the checkpoint from which the next one resumes."""
         self._session.execute(
-            delete(models.MetricRow).where(models.MetricRow.run_id == run_id, models.MetricRow.step > step)
+            delete(tables.MetricRow).where(tables.MetricRow.run_id == run_id, tables.MetricRow.step > step)
         )
         self._session.execute(
-            delete(models.MetricChunk).where(models.MetricChunk.run_id == run_id, models.MetricChunk.first_step > step)
+            delete(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.first_step > step)
         )
-        straddling = select(models.MetricChunk).where(
-            models.MetricChunk.run_id == run_id, models.MetricChunk.last_step > step
+        straddling = select(tables.MetricChunk).where(
+            tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step > step
         )
         for chunk in self._session.scalars(straddling).all():
             points = _decode(chunk)
@@ -101,9 +101,9 @@ class MetricRepository:
             chunk.last_step, chunk.count, chunk.points = int(kept.steps[-1]), len(kept), kept.encode()
         self._session.flush()
         self._session.execute(
-            delete(models.LatestMetric).where(models.LatestMetric.run_id == run_id, models.LatestMetric.step > step)
+            delete(tables.LatestMetric).where(tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step)
         )
-        known = self._session.scalars(select(models.LatestMetric.name).where(models.LatestMetric.run_id == run_id)).all()
+        known = self._session.scalars(select(tables.LatestMetric.name).where(tables.LatestMetric.run_id == run_id)).all()
         newest = {}
         for name, points in self.read(run_id).items():
             finite = [i for i in range(len(points) - 1, -1, -1) if math.isfinite(points.values[i])][:1]
@@ -113,9 +113,9 @@ class MetricRepository:
 
     def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
         """The run's series by name, all or those of `names` that it has."""
-        query = select(models.MetricChunk).where(models.MetricChunk.run_id == run_id).order_by(models.MetricChunk.first_step)
+        query = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id).order_by(tables.MetricChunk.first_step)
         if names is not None:
-            query = query.where(models.MetricChunk.name.in_(names))
+            query = query.where(tables.MetricChunk.name.in_(names))
         parts: dict[str, list[Points]] = defaultdict(list)
         for chunk in self._session.scalars(query):
             parts[chunk.name].append(_decode(chunk))
@@ -124,23 +124,23 @@ class MetricRepository:
                 parts[name].append(points)
         return {name: Points.joined(parts[name]) for name in sorted(parts)}
 
-    def _rows(self, run_id: str) -> Sequence[models.MetricRow]:
-        query = select(models.MetricRow).where(models.MetricRow.run_id == run_id).order_by(models.MetricRow.seq)
+    def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
+        query = select(tables.MetricRow).where(tables.MetricRow.run_id == run_id).order_by(tables.MetricRow.seq)
         return self._session.scalars(query).all()
 
     def _count_rows(self, run_id: str) -> int:
-        query = select(func.count()).select_from(models.MetricRow).where(models.MetricRow.run_id == run_id)
+        query = select(func.count()).select_from(tables.MetricRow).where(tables.MetricRow.run_id == run_id)
         return self._session.scalar(query) or 0
 
-    def _last_chunk(self, run_id: str, name: str) -> models.MetricChunk | None:
-        query = select(models.MetricChunk).where(models.MetricChunk.run_id == run_id, models.MetricChunk.name == name)
-        return self._session.scalars(query.order_by(models.MetricChunk.first_step.desc()).limit(1)).first()
+    def _last_chunk(self, run_id: str, name: str) -> tables.MetricChunk | None:
+        query = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.name == name)
+        return self._session.scalars(query.order_by(tables.MetricChunk.first_step.desc()).limit(1)).first()
 
     def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
         for start in range(0, len(points), _CHUNK_POINTS):
             part = points[start : start + _CHUNK_POINTS]
             self._session.add(
-                models.MetricChunk(
+                tables.MetricChunk(
                     run_id=run_id,
                     name=name,
                     first_step=int(part.steps[0]),
@@ -153,7 +153,7 @@ class MetricRepository:
     def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
         if not newest:
             return
-        insert = self._insert(models.LatestMetric)
+        insert = self._insert(tables.LatestMetric)
         self._session.execute(
             insert.on_conflict_do_update(
                 index_elements=["run_id", "name"], set_={"step": insert.excluded.step, "value": insert.excluded.value}
@@ -162,11 +162,11 @@ class MetricRepository:
         )
 
 
-def _decode(chunk: models.MetricChunk) -> Points:
+def _decode(chunk: tables.MetricChunk) -> Points:
     return Points.decode(chunk.points, chunk.count)
 
 
-def _series(rows: Sequence[models.MetricRow]) -> dict[str, Points]:
+def _series(rows: Sequence[tables.MetricRow]) -> dict[str, Points]:
     """Rows in order as one series a name."""
     columns: dict[str, tuple[list[int], list[float], list[float | None]]] = defaultdict(lambda: ([], [], []))
     for row in rows:

@@ -2,8 +2,8 @@
 
 from alembic import context
 
-from server.database import Database
-from server.models import Base
+from server.database.engine import Database
+from server.database.tables import Base
 
 
 def run() -> None:

@@ -6,12 +6,12 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from server.live.page import HEADERS
-from server.live.themes import Theme
 from server.problems import NOT_FOUND, REPLAY_FAILED
 from server.replays.schemas import Replay
 from server.replays.service import ReplayService
 from server.replays.subject import Subject
 from server.replays.subjects import checkpoint_subject, policy_subject
+from server.scene.themes import Theme
 from server.services import ServicesDep
 
 router = APIRouter(tags=["replays"])

@@ -6,11 +6,11 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from server.live.camera import CameraRig
-from server.live.meshes import ring
-from server.live.quiet import start_viser, stop_viser
-from server.live.scene import Scene
-from server.live.themes import COLOURS, OUTCOMES, ROBOTS, Theme, linear
+from server.scene.camera import CameraRig
+from server.scene.meshes import ring
+from server.scene.quiet import start_viser, stop_viser
+from server.scene.scene import Scene
+from server.scene.themes import COLOURS, OUTCOMES, ROBOTS, Theme, linear
 from sim.config import ImportedArenaConfig, TaskConfig
 from workers.frames import Frame
 from workers.replays.recording import Track

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.live.page import asset, viser_page
-from server.live.themes import Theme
+from server.scene.themes import Theme
 from workers.reporting import EpisodeResult
 
 _DIRECTORY = Path(__file__).parent / "assets"

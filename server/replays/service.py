@@ -1,11 +1,11 @@
 """What a person may do with the episodes of an evaluation: look at any of them, and take it away."""
 
 from server.errors import NotFoundError
-from server.live.themes import Theme
 from server.replays.page import Caption, replay_page
 from server.replays.recordings import RecordingStore
 from server.replays.schemas import Replay
 from server.replays.subject import Subject
+from server.scene.themes import Theme
 from workers.replays.recording import Recording
 
 

@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
+from server.database.tables import RunState
 from server.experiments.schemas import ExperimentState
-from server.models import RunState
 from server.schemas import Schema
 from workers.reproduction.results import RowSpread
 from workers.reproduction.table import TableRow

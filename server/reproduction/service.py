@@ -6,7 +6,7 @@ from threading import Lock
 
 from sqlalchemy.orm import Session
 
-from server import models
+from server.database import tables
 from server.errors import ConflictError
 from server.events.bus import Change
 from server.experiments.repository import ExperimentRepository
@@ -117,8 +117,8 @@ class ReproductionService:
         ExperimentService(self._services).delete_campaign(campaign_id)
 
     def _move(
-        self, campaign_id: str, occasion: Occasion, move: Callable[[Session, models.Run], None], refusal: str
-    ) -> Sequence[models.Run]:
+        self, campaign_id: str, occasion: Occasion, move: Callable[[Session, tables.Run], None], refusal: str
+    ) -> Sequence[tables.Run]:
         """The runs that were moved, by seed and then by row."""
         with self._services.database.write() as session:
             repository = ExperimentRepository(session)
@@ -136,14 +136,14 @@ class ReproductionService:
         return runs
 
 
-def _experiment(row: Row, campaign: str, request: CampaignCreate) -> models.Experiment:
-    return models.Experiment(
+def _experiment(row: Row, campaign: str, request: CampaignCreate) -> tables.Experiment:
+    return tables.Experiment(
         id=new_id(),
         name=f"Paper: {title(row)}",
         training=scaled(row.training, request.effort).model_dump(mode="json"),
         campaign=campaign,
         campaign_row=row.id,
-        runs=[models.Run(id=new_id(), seed=seed) for seed in range(request.seeds)],
+        runs=[tables.Run(id=new_id(), seed=seed) for seed in range(request.seeds)],
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from server import models
+from server.database import tables
 from server.experiments.repository import UNFINISHED, aggregate_state
 from server.experiments.stored import training_of
 from server.metrics.points import Points
@@ -27,7 +27,7 @@ Latest = Mapping[str, Mapping[str, float]]
 
 
 def reproduction_view(
-    experiments: Sequence[models.Experiment],
+    experiments: Sequence[tables.Experiment],
     latest: Latest,
     evaluations: Mapping[str, Points],
     campaign: Campaign | None,
@@ -67,7 +67,7 @@ def expected_seconds(workers: int) -> float:
     return seconds_left(shares, workers)
 
 
-def campaign_view(campaign_id: str, experiments: Sequence[models.Experiment], workers: int, now: float) -> Campaign:
+def campaign_view(campaign_id: str, experiments: Sequence[tables.Experiment], workers: int, now: float) -> Campaign:
     """How a campaign stands.
 
     Args:
@@ -98,7 +98,7 @@ def campaign_view(campaign_id: str, experiments: Sequence[models.Experiment], wo
 _ENDED = frozenset({"stopped", "failed", "stopping"})
 
 
-def _share(run: models.Run, experiment: models.Experiment, now: float) -> Share:
+def _share(run: tables.Run, experiment: tables.Experiment, now: float) -> Share:
     row = _row(experiment)
     done = _progress(run, training_of(experiment))
     # A run that was taken up more than once has waited in between.
@@ -108,21 +108,21 @@ def _share(run: models.Run, experiment: models.Experiment, now: float) -> Share:
     return Share(expected=expected, done=done, spent=None if spent is None else max(0.0, spent))
 
 
-def _row(experiment: models.Experiment) -> Row | None:
+def _row(experiment: tables.Experiment) -> Row | None:
     """The row that it trains; None where a later version has dropped it."""
     return ROW_BY_ID.get(experiment.campaign_row or "")
 
 
-def _effort(experiment: models.Experiment) -> float:
+def _effort(experiment: tables.Experiment) -> float:
     row = _row(experiment)
     return training_of(experiment).steps / row.training.steps if row else 1.0
 
 
-def _progress(run: models.Run, training: TrainingConfig) -> float:
+def _progress(run: tables.Run, training: TrainingConfig) -> float:
     return 1.0 if run.state == "completed" else min(1.0, run.step / training.steps)
 
 
-def _results(experiment: models.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
+def _results(experiment: tables.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
     if experiment is None:
         return []
     steps = training_of(experiment).steps
@@ -137,11 +137,11 @@ def _results(experiment: models.Experiment | None, latest: Latest, evaluations: 
     return results
 
 
-def _measured(run: models.Run, latest: Latest) -> TableRow | None:
+def _measured(run: tables.Run, latest: Latest) -> TableRow | None:
     return TableRow.from_metrics(latest.get(run.id, {})) if run.state == "completed" else None
 
 
-def _row_view(row: Row, experiment: models.Experiment | None, latest: Latest, results: Sequence[SeedResult]) -> CampaignRow:
+def _row_view(row: Row, experiment: tables.Experiment | None, latest: Latest, results: Sequence[SeedResult]) -> CampaignRow:
     training = training_of(experiment) if experiment else row.training
     return CampaignRow(
         id=row.id,

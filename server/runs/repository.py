@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session, joinedload
 
-from server import models
+from server.database import tables
 from server.errors import NotFoundError
 from server.runs.states import ACTIVE
 from workers.reporting import EventLevel
@@ -18,15 +18,15 @@ class RunRepository:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def get(self, run_id: str, *, for_update: bool = False) -> models.Run:
+    def get(self, run_id: str, *, for_update: bool = False) -> tables.Run:
         """The run with its experiment; `for_update` locks the row where the database has row locks.
 
         Raises:
             NotFoundError: there is none.
         """
-        query = select(models.Run).where(models.Run.id == run_id).options(joinedload(models.Run.experiment))
+        query = select(tables.Run).where(tables.Run.id == run_id).options(joinedload(tables.Run.experiment))
         if for_update:
-            query = query.with_for_update(of=models.Run)
+            query = query.with_for_update(of=tables.Run)
         run = self._session.scalar(query)
         if run is None:
             raise NotFoundError.of("run", run_id)
@@ -34,52 +34,52 @@ class RunRepository:
 
     def latest_metrics(self, run_ids: Collection[str], names: Collection[str]) -> dict[str, dict[str, float]]:
         """The newest value of each of `names`, by run and name; what a run never reported is absent."""
-        query = select(models.LatestMetric).where(
-            models.LatestMetric.run_id.in_(run_ids), models.LatestMetric.name.in_(names)
+        query = select(tables.LatestMetric).where(
+            tables.LatestMetric.run_id.in_(run_ids), tables.LatestMetric.name.in_(names)
         )
         latest: dict[str, dict[str, float]] = defaultdict(dict)
         for metric in self._session.scalars(query):
             latest[metric.run_id][metric.name] = metric.value
         return latest
 
-    def events(self, run_id: str) -> Sequence[models.RunEvent]:
+    def events(self, run_id: str) -> Sequence[tables.RunEvent]:
         """The run's event log, oldest first."""
-        query = select(models.RunEvent).where(models.RunEvent.run_id == run_id).order_by(models.RunEvent.id)
+        query = select(tables.RunEvent).where(tables.RunEvent.run_id == run_id).order_by(tables.RunEvent.id)
         return self._session.scalars(query).all()
 
     def add_event(self, run_id: str, level: EventLevel, message: str, step: int = 0) -> None:
         """Append a line to the run's event log."""
-        self._session.add(models.RunEvent(run_id=run_id, level=level, message=message, step=step))
+        self._session.add(tables.RunEvent(run_id=run_id, level=level, message=message, step=step))
 
-    def queued(self) -> Sequence[models.Run]:
+    def queued(self) -> Sequence[tables.Run]:
         """The runs that wait for a worker, with their experiments, the longest first."""
-        query = select(models.Run).where(models.Run.state == "queued").options(joinedload(models.Run.experiment))
-        return self._session.scalars(query.order_by(models.Run.queued_at, models.Run.id)).all()
+        query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
+        return self._session.scalars(query.order_by(tables.Run.queued_at, tables.Run.id)).all()
 
-    def with_expired_lease(self, now: float) -> Sequence[models.Run]:
+    def with_expired_lease(self, now: float) -> Sequence[tables.Run]:
         """The runs whose worker has not been heard of for longer than its lease, with their experiments, locked."""
         query = (
-            select(models.Run)
-            .where(models.Run.state.in_(ACTIVE), models.Run.lease_until < now)
-            .options(joinedload(models.Run.experiment))
-            .with_for_update(of=models.Run)
+            select(tables.Run)
+            .where(tables.Run.state.in_(ACTIVE), tables.Run.lease_until < now)
+            .options(joinedload(tables.Run.experiment))
+            .with_for_update(of=tables.Run)
         )
         return self._session.scalars(query).all()
 
     def extend_leases(self, until: float) -> None:
         """Let every lease last until then at least."""
         self._session.execute(
-            update(models.Run).where(models.Run.state.in_(ACTIVE), models.Run.lease_until < until).values(lease_until=until)
+            update(tables.Run).where(tables.Run.state.in_(ACTIVE), tables.Run.lease_until < until).values(lease_until=until)
         )
 
     def count_by_state(self) -> dict[str, int]:
         """How many runs are in each state; a state without any is absent."""
-        rows = self._session.execute(select(models.Run.state, func.count()).group_by(models.Run.state))
+        rows = self._session.execute(select(tables.Run.state, func.count()).group_by(tables.Run.state))
         return {row[0]: row[1] for row in rows}
 
     def trained_by(self, workers: Collection[str]) -> dict[str, str]:
         """The run that each of `workers` trains now, by worker."""
-        query = select(models.Run.worker, models.Run.id).where(
-            models.Run.state.in_(("running", "stopping")), models.Run.worker.in_(workers)
+        query = select(tables.Run.worker, tables.Run.id).where(
+            tables.Run.state.in_(("running", "stopping")), tables.Run.worker.in_(workers)
         )
         return {worker: run_id for worker, run_id in self._session.execute(query) if worker is not None}

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from server.models import RunState
+from server.database.tables import RunState
 from server.schemas import UNREADABLE, Schema
 from workers.config import TrainingConfig
 from workers.reporting import EventLevel

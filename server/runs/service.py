@@ -4,7 +4,7 @@ import time
 
 from sqlalchemy.orm import Session
 
-from server import models
+from server.database import tables
 from server.events.bus import Change
 from server.experiments.stored import training_of
 from server.runs import states, views
@@ -70,20 +70,20 @@ class RunService:
         self.announce_queued(run)
         return self.get(run_id)
 
-    def announce_stopped(self, run: models.Run) -> None:
+    def announce_stopped(self, run: tables.Run) -> None:
         """After the commit of `stop_run`: tell the worker, and whoever looks on."""
         if run.state == "stopping":
             self._services.links.stop(run.id)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
 
-    def announce_queued(self, run: models.Run) -> None:
+    def announce_queued(self, run: tables.Run) -> None:
         """After the commit of a run that waits for a worker: wake one, and tell whoever looks on."""
         queue = queue_of(training_of(run.experiment))
         self._services.doorbell.ring(run.id, run.attempt, queue)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
 
 
-def stop_run(session: Session, run: models.Run) -> None:
+def stop_run(session: Session, run: tables.Run) -> None:
     """Move the row as `stop` says."""
     before, run.state = run.state, states.next_state(run.state, "stop")
     if run.state == before:
@@ -94,7 +94,7 @@ def stop_run(session: Session, run: models.Run) -> None:
     RunRepository(session).add_event(run.id, "info", message, run.step)
 
 
-def resume_run(session: Session, run: models.Run) -> None:
+def resume_run(session: Session, run: tables.Run) -> None:
     """Move the row as `resume` says, with a clean slate of losses."""
     run.state = states.next_state(run.state, "resume")
     run.error = None

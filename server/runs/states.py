@@ -14,8 +14,8 @@ Once too many attempts in a row were lost, the caller, who counts them, says `fa
 
 from typing import Literal
 
+from server.database.tables import RunState
 from server.errors import ConflictError
-from server.models import RunState
 
 Occasion = Literal[
     "claim",  # a worker takes it up

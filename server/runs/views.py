@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from server import models
+from server.database import tables
 from server.experiments.stored import read_training
 from server.runs.schemas import Run, RunDetail
 from workers.config import TrainingConfig
@@ -14,7 +14,7 @@ EVAL_SUCCESS = "eval/success_rate"
 SHOWN = (SPEED, TRAIN_SUCCESS, EVAL_SUCCESS)
 
 
-def run_view(run: models.Run, training: TrainingConfig, latest: Mapping[str, float]) -> Run:
+def run_view(run: tables.Run, training: TrainingConfig, latest: Mapping[str, float]) -> Run:
     """The run in JSON; `latest` holds the newest value of each of `SHOWN` that there is."""
     speed = latest.get(SPEED) if run.state == "running" else None
     return Run(
@@ -37,7 +37,7 @@ def run_view(run: models.Run, training: TrainingConfig, latest: Mapping[str, flo
     )
 
 
-def run_detail(run: models.Run, latest: Mapping[str, float]) -> RunDetail:
+def run_detail(run: tables.Run, latest: Mapping[str, float]) -> RunDetail:
     """The run in JSON with what it trains."""
     stored = read_training(run.experiment.training)
     return RunDetail(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from server import models
+from server.database import tables
 from server.runs.states import ACTIVE
 from workers.protocol import Queue
 
@@ -16,21 +16,21 @@ class WorkerRepository:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def seen_since(self, moment: float) -> Sequence[models.Worker]:
+    def seen_since(self, moment: float) -> Sequence[tables.Worker]:
         """The workers heard of since `moment` (seconds since the epoch), by name."""
-        query = select(models.Worker).where(models.Worker.last_seen >= moment).order_by(models.Worker.name)
+        query = select(tables.Worker).where(tables.Worker.last_seen >= moment).order_by(tables.Worker.name)
         return self._session.scalars(query).all()
 
     def seen(self, name: str, queue: Queue, moment: float) -> None:
         """Note that a worker of this queue has just been heard of."""
-        self._session.merge(models.Worker(name=name, queue=queue, last_seen=moment))
+        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment))
 
     def idle_by_queue(self, moment: float) -> dict[Queue, int]:
         """How many workers heard of since `moment` train nothing, by queue; a queue without any is absent."""
-        busy = select(models.Run.worker).where(models.Run.state.in_(ACTIVE), models.Run.worker.is_not(None))
+        busy = select(tables.Run.worker).where(tables.Run.state.in_(ACTIVE), tables.Run.worker.is_not(None))
         query = (
-            select(models.Worker.queue, func.count())
-            .where(models.Worker.last_seen >= moment, models.Worker.name.not_in(busy))
-            .group_by(models.Worker.queue)
+            select(tables.Worker.queue, func.count())
+            .where(tables.Worker.last_seen >= moment, tables.Worker.name.not_in(busy))
+            .group_by(tables.Worker.queue)
         )
         return {row[0]: row[1] for row in self._session.execute(query)}

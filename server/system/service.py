@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from sqlalchemy.orm import Session
 
-from server import models
+from server.database import tables
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
@@ -21,7 +21,7 @@ def running_version() -> Version:
     return Version(version=version(), commit=commit())
 
 
-def workers_lately(session: Session) -> Sequence[models.Worker]:
+def workers_lately(session: Session) -> Sequence[tables.Worker]:
     """The workers that are there."""
     return WorkerRepository(session).seen_since(time.time() - _LATELY_SECONDS)
 

@@ -8,8 +8,8 @@ import time
 
 from sqlalchemy.orm import Session
 
-from server import models
 from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
 from server.errors import ConflictError
 from server.metrics.repository import MetricRepository
 from server.runs import states
@@ -25,8 +25,8 @@ class FencedError(ConflictError):
 
 
 def begin(
-    session: Session, run: models.Run, worker: str, published_attempt: int, lease_seconds: float
-) -> models.Checkpoint | None:
+    session: Session, run: tables.Run, worker: str, published_attempt: int, lease_seconds: float
+) -> tables.Checkpoint | None:
     """Give the run to a worker; what was reported beyond its last checkpoint is dropped.
 
     Returns:
@@ -54,7 +54,7 @@ def begin(
     return checkpoint
 
 
-def renew(run: models.Run, attempt: int, lease_seconds: float) -> None:
+def renew(run: tables.Run, attempt: int, lease_seconds: float) -> None:
     """Prolong the lease, as every message of the worker does.
 
     Raises:
@@ -65,7 +65,7 @@ def renew(run: models.Run, attempt: int, lease_seconds: float) -> None:
     run.lease_until = time.time() + lease_seconds
 
 
-def end(session: Session, run: models.Run, final: Final) -> None:
+def end(session: Session, run: tables.Run, final: Final) -> None:
     """The worker has said its last word."""
     events = RunRepository(session)
     match final.outcome:
@@ -89,7 +89,7 @@ def end(session: Session, run: models.Run, final: Final) -> None:
     _settle(run)
 
 
-def lose(session: Session, run: models.Run, reason: str) -> None:
+def lose(session: Session, run: tables.Run, reason: str) -> None:
     """The attempt was lost for a reason: another one may do better, unless too many were lost without a new checkpoint."""
     events = RunRepository(session)
     events.add_event(run.id, "warning", f"Attempt {run.attempt} was lost: {reason}", run.step)
@@ -105,13 +105,13 @@ def lose(session: Session, run: models.Run, reason: str) -> None:
     _settle(run)
 
 
-def progressed(run: models.Run) -> None:
+def progressed(run: tables.Run) -> None:
     """A new checkpoint was registered: what went wrong before it counts no more."""
     run.losses = 0
     run.error = None
 
 
-def _settle(run: models.Run) -> None:
+def _settle(run: tables.Run) -> None:
     """What holds for every run that no worker has."""
     now = time.time()
     run.lease_until = None

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 from sqlalchemy.orm import Session
 
-from server import models
 from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
 from server.errors import ConflictError, NotFoundError
 from server.events.bus import Change, ChangeKind
 from server.experiments.stored import read_training
@@ -169,7 +169,7 @@ class WorkerService:
             CheckpointRepository(session).get(checkpoint_id)
         return self._services.files.read(checkpoint_id)
 
-    def _renewed(self, session: Session, run_id: str, attempt: int) -> models.Run:
+    def _renewed(self, session: Session, run_id: str, attempt: int) -> tables.Run:
         try:
             run = RunRepository(session).get(run_id, for_update=True)
         except NotFoundError as error:
@@ -177,7 +177,7 @@ class WorkerService:
         attempts.renew(run, attempt, self._lease_seconds)
         return run
 
-    def _store(self, session: Session, run: models.Run, items: list[MetricItem | EventItem]) -> None:
+    def _store(self, session: Session, run: tables.Run, items: list[MetricItem | EventItem]) -> None:
         if not items:
             return
         rows = [
@@ -188,7 +188,7 @@ class WorkerService:
         metrics = MetricRepository(session)
         metrics.append_rows(run.id, rows)
         session.add_all(
-            models.RunEvent(run_id=run.id, at=item.at, step=item.step, level=item.level, message=item.message)
+            tables.RunEvent(run_id=run.id, at=item.at, step=item.step, level=item.level, message=item.message)
             for item in items
             if isinstance(item, EventItem)
         )
@@ -197,12 +197,12 @@ class WorkerService:
         if before // _COMPACT_EVERY != run.last_seq // _COMPACT_EVERY and metrics.needs_compaction(run.id):
             metrics.compact(run.id)
 
-    def _announce(self, run: models.Run) -> None:
+    def _announce(self, run: tables.Run) -> None:
         """After an attempt's end: tell whoever looks on, and wake another worker where the run waits for one."""
         if run.state == "queued":
             RunService(self._services).announce_queued(run)
         else:
             self._publish(run, "run")
 
-    def _publish(self, run: models.Run, kind: ChangeKind) -> None:
+    def _publish(self, run: tables.Run, kind: ChangeKind) -> None:
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))

@@ -7,9 +7,8 @@ from sim.arenas.document import to_arena
 from sim.arenas.families import CLEARANCE, generate_arena, pool_seeds
 from sim.arenas.geometry import Arena
 from sim.arenas.mover import Mover
-from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig, TaskConfig
+from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig, MoversConfig, TaskConfig
 from sim.errors import ArenaError
-from sim.mover_config import MoversConfig
 
 _ROOM = 0.05  # m between what a robot keeps from obstacles and the way that is left for it: what the default one has
 

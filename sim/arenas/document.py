@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.arena_file import AnyMover, ArenaFile, Box, Circle, Patrol, Pedestrian, Walker, Waypoint
 from sim.arenas.cells import CELL, components, free_mask
 from sim.arenas.geometry import Arena, free_distance
 from sim.arenas.mover import Mover
+from sim.config import AnyMover, ArenaFile, Box, Circle, Patrol, Pedestrian, Walker, Waypoint
 from sim.errors import ArenaFormatError, NoFreeSpaceError
 
 MIN_FREE_AREA = 1.0

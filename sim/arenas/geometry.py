@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas.mover import Mover
+from sim.config import MAX_MOVERS
 from sim.errors import ArenaError
-from sim.mover_config import MAX_MOVERS
 
 Float = NDArray[np.float64]
 

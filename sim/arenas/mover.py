@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sim.mover_config import MoverKind
+from sim.config import MoverKind
 
 
 @dataclass(frozen=True)

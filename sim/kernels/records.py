@@ -82,7 +82,7 @@ ROBOT = np.dtype(
 """What the simulator remembers of a robot besides pose and target."""
 
 PATROL, WALKER, PEDESTRIAN = 0, 1, 2
-"""Kinds of movers, see `sim.mover_config.MoverKind`."""
+"""Kinds of movers, see `sim.config.MoverKind`."""
 
 MOVER = np.dtype(
     [

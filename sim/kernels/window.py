@@ -1,4 +1,4 @@
-"""The inner loop of the Dynamic Window Approach, see `sim.dwa`."""
+"""The inner loop of the Dynamic Window Approach, see `sim.baselines.dwa`."""
 
 import math
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-from server import models
 from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
+from server.database.tables import RunState
 from server.ids import new_id
 from server.metrics.repository import MetricRepository, ReportedRow
-from server.models import RunState
 from server.services import Services
 from server.system.repository import WorkerRepository
 from workers.reporting import EpisodeResult, EvaluationResult
@@ -68,7 +68,7 @@ class Reports:
     def state(self, run: dict[str, Any], state: RunState, **columns: Any) -> None:
         """Bring a run where a worker would have brought it."""
         with self.services.database.write() as session:
-            row = session.get_one(models.Run, run["id"])
+            row = session.get_one(tables.Run, run["id"])
             row.state = state
             for name, value in columns.items():
                 setattr(row, name, value)

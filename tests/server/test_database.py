@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy.exc import DBAPIError
 
-from server import models
-from server.database import Database
-from server.migrate import upgrade
+from server.database import tables
+from server.database.engine import Database
+from server.database.migrate import upgrade
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
@@ -23,26 +23,26 @@ def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Databas
 
 def names(database: Database) -> list[str]:
     with database.read() as session:
-        return sorted(worker.name for worker in session.query(models.Worker))
+        return sorted(worker.name for worker in session.query(tables.Worker))
 
 
 def test_a_reader_cannot_write(database: Database) -> None:
     with database.read() as session:
-        session.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
+        session.add(tables.Worker(name="w", queue="cpu", last_seen=0.0))
         with pytest.raises(DBAPIError, match=r"read-?only"):
             session.flush()
 
     with database.write() as session:
-        session.add(models.Worker(name="allowed again", queue="cpu", last_seen=0.0))
+        session.add(tables.Worker(name="allowed again", queue="cpu", last_seen=0.0))
     assert names(database) == ["allowed again"]
 
 
 def test_a_reader_sees_one_state(database: Database) -> None:
     with database.read() as session:
-        assert session.query(models.Worker).count() == 0
+        assert session.query(tables.Worker).count() == 0
         with database.write() as other:
-            other.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
-        assert session.query(models.Worker).count() == 0
+            other.add(tables.Worker(name="w", queue="cpu", last_seen=0.0))
+        assert session.query(tables.Worker).count() == 0
 
     assert names(database) == ["w"]
 
@@ -50,7 +50,7 @@ def test_a_reader_sees_one_state(database: Database) -> None:
 def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
     def fail_midway() -> None:
         with database.write() as session:
-            session.add(models.Worker(name="w", queue="cpu", last_seen=0.0))
+            session.add(tables.Worker(name="w", queue="cpu", last_seen=0.0))
             session.flush()
             raise RuntimeError
 
@@ -63,12 +63,12 @@ def test_a_block_that_raises_leaves_nothing(database: Database) -> None:
 def test_writers_wait_for_one_another(database: Database) -> None:
     """Eight threads count in one row; deferred transactions would lose counts or fail."""
     with database.write() as session:
-        session.add(models.Worker(name="counter", queue="cpu", last_seen=0.0))
+        session.add(tables.Worker(name="counter", queue="cpu", last_seen=0.0))
 
     def count() -> None:
         for _ in range(20):
             with database.write() as session:
-                session.get_one(models.Worker, "counter", with_for_update=True).last_seen += 1
+                session.get_one(tables.Worker, "counter", with_for_update=True).last_seen += 1
 
     threads = [threading.Thread(target=count) for _ in range(8)]
     for thread in threads:
@@ -77,19 +77,19 @@ def test_writers_wait_for_one_another(database: Database) -> None:
         thread.join()
 
     with database.read() as session:
-        assert session.get_one(models.Worker, "counter").last_seen == 160
+        assert session.get_one(tables.Worker, "counter").last_seen == 160
 
 
 def test_an_experiment_takes_everything_along_when_it_goes(database: Database) -> None:
     with database.write() as session:
-        session.add(models.Experiment(id="e", name="e", training={}, runs=[models.Run(id="r", seed=0)]))
+        session.add(tables.Experiment(id="e", name="e", training={}, runs=[tables.Run(id="r", seed=0)]))
         session.flush()
-        session.add(models.RunEvent(run_id="r", level="info", message="m"))
-        session.add(models.MetricRow(run_id="r", seq=1, step=1, wall_time=0.0, values={"x": 1.0}))
-        session.add(models.Checkpoint(id="c", run_id="r", step=1, size=1, sha256="0"))
+        session.add(tables.RunEvent(run_id="r", level="info", message="m"))
+        session.add(tables.MetricRow(run_id="r", seq=1, step=1, wall_time=0.0, values={"x": 1.0}))
+        session.add(tables.Checkpoint(id="c", run_id="r", step=1, size=1, sha256="0"))
     with database.write() as session:
-        session.delete(session.get_one(models.Experiment, "e"))
+        session.delete(session.get_one(tables.Experiment, "e"))
 
     with database.read() as session:
-        for table in (models.Run, models.RunEvent, models.MetricRow, models.Checkpoint):
+        for table in (tables.Run, tables.RunEvent, tables.MetricRow, tables.Checkpoint):
             assert session.query(table).count() == 0

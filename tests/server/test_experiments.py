@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from server import models
-from server.database import Database
+from server.database import tables
+from server.database.engine import Database
+from server.database.migrate import upgrade
+from server.database.tables import RunState
 from server.events.bus import Change, EventBus
 from server.experiments.repository import ExperimentRepository, aggregate_state
-from server.migrate import upgrade
-from server.models import RunState
 from server.services import Services
 from tests.server.harness import Reports
 from workers.config import TrainingConfig
@@ -179,8 +179,8 @@ def module_database(tmp_path_factory: pytest.TempPathFactory) -> Database:
 @given(states=st.lists(run_states, min_size=1, max_size=5))
 def test_the_filter_in_sql_agrees_with_the_state_that_is_shown(module_database: Database, states: list[RunState]) -> None:
     with Session(module_database.engine) as session:
-        runs = [models.Run(id=str(seed), seed=seed, state=state) for seed, state in enumerate(states)]
-        session.add(models.Experiment(id="e", name="e", training={}, runs=runs))
+        runs = [tables.Run(id=str(seed), seed=seed, state=state) for seed, state in enumerate(states)]
+        session.add(tables.Experiment(id="e", name="e", training={}, runs=runs))
         session.flush()
         shown = aggregate_state(states)
         for state in ("queued", "running", "stopping", "stopped", "completed", "failed", "mixed"):
@@ -218,7 +218,7 @@ def test_resuming_queues_what_was_stopped_or_has_failed(
     assert resumed["runs"][1]["error"] is None
     assert doorbell.rings == [(experiment["runs"][0]["id"], 2), (experiment["runs"][1]["id"], 4)]
     with services.database.read() as session:
-        assert session.scalar(select(models.Run.losses).where(models.Run.id == experiment["runs"][1]["id"])) == 0
+        assert session.scalar(select(tables.Run.losses).where(tables.Run.id == experiment["runs"][1]["id"])) == 0
 
 
 def test_nothing_to_stop_and_nothing_to_resume(client: TestClient, reports: Reports) -> None:

@@ -27,12 +27,12 @@ from server.live.bridge import may_pass
 from server.live.gate import KEY
 from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
-from server.live.quiet import start_viser, stop_viser
-from server.live.robots import RobotNodes
-from server.live.scene import Scene
 from server.live.settings import LiveSettings
-from server.live.themes import COLOURS, Theme
 from server.live.view import LiveView
+from server.scene.quiet import start_viser, stop_viser
+from server.scene.robots import RobotNodes
+from server.scene.scene import Scene
+from server.scene.themes import COLOURS, Theme
 from server.services import Services
 from sim.arenas import build_arena
 from sim.config import GeneratedArenaConfig, TaskConfig

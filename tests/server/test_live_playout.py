@@ -7,7 +7,7 @@ import pytest
 
 from server.live.playout import PlayoutBuffer
 from server.live.scoreboard import Scoreboard
-from server.live.trails import Trails, trail_colours
+from server.scene.trails import Trails, trail_colours
 from workers.frames import Frame, ViewMode
 
 

@@ -10,11 +10,11 @@ from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server import models
-from server.database import Database
+from server.database import tables
+from server.database.engine import Database
+from server.database.migrate import upgrade
 from server.metrics.points import Points, downsample
 from server.metrics.repository import MetricRepository, ReportedRow
-from server.migrate import upgrade
 from server.services import Services
 
 
@@ -25,7 +25,7 @@ def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Databas
     database = Database(f"sqlite:///{tmp_path / 'test.db'}" if is_sqlite else request.getfixturevalue("postgres_url"))
     upgrade(database)
     with database.write() as session:
-        session.add(models.Experiment(id="e", name="e", training={}, runs=[models.Run(id="r", seed=0)]))
+        session.add(tables.Experiment(id="e", name="e", training={}, runs=[tables.Run(id="r", seed=0)]))
     yield database
     database.dispose()
 
@@ -39,7 +39,7 @@ def append(database: Database, new: list[ReportedRow]) -> None:
     """What the link does with a batch: rows and cursor in one transaction."""
     with database.write() as session:
         MetricRepository(session).append_rows("r", new)
-        run = session.get_one(models.Run, "r")
+        run = session.get_one(tables.Run, "r")
         run.last_seq = max(run.last_seq, *(row.seq for row in new))
 
 
@@ -63,7 +63,7 @@ def steps(database: Database, name: str = "loss/policy") -> list[int]:
 
 def latest(database: Database) -> dict[str, tuple[int, float]]:
     with database.read() as session:
-        return {metric.name: (metric.step, metric.value) for metric in session.query(models.LatestMetric)}
+        return {metric.name: (metric.step, metric.value) for metric in session.query(tables.LatestMetric)}
 
 
 def test_rows_are_there_once_however_often_they_come(database: Database) -> None:
@@ -92,8 +92,8 @@ def test_compaction_leaves_the_curve_as_it_was(database: Database) -> None:
     assert steps(database, "eval/steps") == [3, 4]
     with database.read() as session:
         # A chunk that is not full is grown: rare series don't end in chunks of one point.
-        assert session.query(models.MetricChunk).count() == 2
-        assert session.query(models.MetricRow).count() == 0
+        assert session.query(tables.MetricChunk).count() == 2
+        assert session.query(tables.MetricRow).count() == 0
 
 
 def test_a_chunk_that_is_full_is_followed_by_another(database: Database) -> None:
@@ -104,7 +104,7 @@ def test_a_chunk_that_is_full_is_followed_by_another(database: Database) -> None
 
     assert steps(database) == list(range(1, 5_002))
     with database.read() as session:
-        assert sorted(count for (count,) in session.query(models.MetricChunk.count)) == [905, 4_096]
+        assert sorted(count for (count,) in session.query(tables.MetricChunk.count)) == [905, 4_096]
 
 
 @pytest.mark.parametrize("compacted", [False, True])

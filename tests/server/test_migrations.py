@@ -10,9 +10,9 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import inspect, text
 
-from server.database import Database
-from server.migrate import IncompatibleDatabaseError, head, migration_config, upgrade
-from server.models import Base
+from server.database.engine import Database
+from server.database.migrate import IncompatibleDatabaseError, head, migration_config, upgrade
+from server.database.tables import Base
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])

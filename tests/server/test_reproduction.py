@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from server import models
 from server.app import create_app
+from server.database import tables
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.services import Services
 from server.settings import Settings
@@ -54,7 +54,7 @@ def complete(services: Services, run: dict[str, Any], success: float, *, steps: 
     ]
     with services.database.write() as session:
         MetricRepository(session).append_rows(run["id"], rows)
-        row = session.get_one(models.Run, run["id"])
+        row = session.get_one(tables.Run, run["id"])
         row.state, row.step, row.attempt, row.started_at, row.finished_at = "completed", 600_000, 1, 1000.0, 1040.0
 
 

@@ -4,7 +4,7 @@ from typing import get_args
 
 import pytest
 
-from server.models import RunState
+from server.database.tables import RunState
 from server.runs.states import ACTIVE, FINISHED, TRANSITIONS, Occasion, TransitionError, next_state
 
 STATES: tuple[RunState, ...] = get_args(RunState)

@@ -3,7 +3,7 @@
 import pytest
 from fastapi.testclient import TestClient
 
-from server import models
+from server.database import tables
 from server.experiments.stored import read_training
 from server.services import Services
 from server.sweeper import Sweeper
@@ -49,7 +49,7 @@ def test_such_a_training_is_shown_and_its_runs_fail_with_the_reason(client: Test
     created = client.post("/api/experiments", json={"name": "of tomorrow", "seeds": [1]}).json()
     run_id = created["runs"][0]["id"]
     with services.database.write() as session:
-        experiment = session.get_one(models.Experiment, created["id"])
+        experiment = session.get_one(tables.Experiment, created["id"])
         experiment.training = {**experiment.training, "teleportation": True}
 
     listed = client.get("/api/experiments").json()["items"]

@@ -6,8 +6,8 @@ import time
 import pytest
 from sqlalchemy import select
 
-from server import models
 from server.app import create_services
+from server.database import tables
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.settings import Settings
@@ -61,9 +61,9 @@ def now() -> float:
 def add_run(services: Services, run_id: str, queued_at: float, device: str = "cpu") -> None:
     training = TrainingConfig().model_copy(update={"device": device}).model_dump(mode="json")
     with services.database.write() as session:
-        session.add(models.Experiment(id=f"of-{run_id}", name="x", training=training))
+        session.add(tables.Experiment(id=f"of-{run_id}", name="x", training=training))
         session.flush()
-        session.add(models.Run(id=run_id, experiment_id=f"of-{run_id}", seed=0, queued_at=queued_at))
+        session.add(tables.Run(id=run_id, experiment_id=f"of-{run_id}", seed=0, queued_at=queued_at))
 
 
 def claim(services: Services, run_id: str, attempt: int = 0, worker: str = "w") -> None:
@@ -74,7 +74,7 @@ def see_worker(services: Services, name: str, queue: Queue = "cpu") -> None:
     WorkerService(services).heartbeat(Heartbeat(worker=name, queue=queue))
 
 
-def run_of(services: Services, run_id: str) -> models.Run:
+def run_of(services: Services, run_id: str) -> tables.Run:
     with services.database.read() as session:
         return RunRepository(session).get(run_id)
 
@@ -113,7 +113,7 @@ def test_three_silent_workers_in_a_row_fail_the_run_with_the_reason_of_each(
     assert run.error is not None
     assert [f"worker w{attempt} was not heard of" in run.error for attempt in range(3)] == [True] * 3
     with services.database.read() as session:
-        levels = [event.level for event in session.scalars(select(models.RunEvent)).all()]
+        levels = [event.level for event in session.scalars(select(tables.RunEvent)).all()]
     assert levels.count("warning") == 3
     assert levels.count("error") == 1
 

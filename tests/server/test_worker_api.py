@@ -12,7 +12,7 @@ from sqlalchemy import select, update
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from server import models
+from server.database import tables
 from server.metrics.repository import MetricRepository
 from server.services import Services
 from workers.protocol import (
@@ -345,12 +345,12 @@ def test_deleting_an_experiment_cuts_its_worker_off(client: TestClient, worker: 
 def test_every_message_renews_the_lease(worker: TestClient, run_id: str, services: Services) -> None:
     claim(worker, run_id)
     with services.database.write() as session:
-        session.execute(update(models.Run).values(lease_until=time.time() + 0.5))
+        session.execute(update(tables.Run).values(lease_until=time.time() + 0.5))
     with link(worker, run_id, 1) as socket:
         hear(socket)
         say(socket, Batch())
     with services.database.read() as session:
-        lease_until = session.scalar(select(models.Run.lease_until).where(models.Run.id == run_id))
+        lease_until = session.scalar(select(tables.Run.lease_until).where(tables.Run.id == run_id))
     assert lease_until is not None
     assert lease_until > time.time() + services.settings.lease_seconds / 2
 

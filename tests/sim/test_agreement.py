@@ -11,7 +11,7 @@ from sim.arenas import Arena, free_distance
 from sim.config import ObservationName, RandomisationConfig, RewardConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.kernels.records import ARRIVAL, COLLISION, NONE, TIMEOUT
-from sim.reference import ReferenceWorld, exact_arc
+from sim.plain import ReferenceWorld, exact_arc
 from sim.world import World
 from tests.sim.scenes import arenas
 

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from sim.arenas import Arena, build_arenas, free_distance
 from sim.arenas.cells import Grid, components, free_mask
 from sim.arenas.families import CLEARANCE, FAMILIES, SUITE_SEEDS, generate_arena, pool_seeds
+from sim.arenas.planner import Planner
 from sim.config import MAX_MAPS, FamilyName, GeneratedArenaConfig, TaskConfig
 from sim.errors import ArenaError
-from sim.planner import Planner
 
 families = st.sampled_from(sorted(FAMILIES))
 difficulties = st.floats(0.0, 1.0)

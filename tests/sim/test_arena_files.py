@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from sim.arena_file import ArenaFile
 from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.arenas.families import FAMILIES, generate_arena
 from sim.arenas.files import load_arena, read_arena, to_arena, to_document, write_own
-from sim.config import ImportedArenaConfig, TaskConfig
+from sim.arenas.planner import shortest_path
+from sim.config import ArenaFile, ImportedArenaConfig, TaskConfig
 from sim.errors import ArenaError, ArenaFileError
-from sim.planner import shortest_path
 
 OWN = """
 format: mapless-arena/1

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.arena_file import MAX_OBSTACLES
 from sim.arenas.files import load_arena, read_arena
 from sim.arenas.files.limits import MAX_SDF_BYTES, MAX_TEXT_BYTES
+from sim.config import MAX_OBSTACLES
 from sim.errors import ArenaFileError, ArenaFormatError, ArenaLimitError, NoFreeSpaceError
 
 # What "quickly" is, with room for a machine that does much else, seconds.

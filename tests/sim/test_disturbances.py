@@ -17,10 +17,10 @@ from sim.config import (
     RewardConfig,
     TaskConfig,
 )
+from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.records import QUANTITIES
-from sim.reference import exact_arc
+from sim.plain import exact_arc
 from sim.scan import scan
-from sim.vector_env import NavigationVectorEnv
 
 COMPLEX = ArenaConfig(name="complex")
 

@@ -15,9 +15,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from stable_baselines3 import PPO
 
-import sim.registration
+import sim.envs.registration
 from sim.config import TaskConfig
-from sim.env import NavigationEnv
+from sim.envs.single import NavigationEnv
 from sim.errors import DisplayError, PlacementError
 
 
@@ -34,7 +34,7 @@ def screen(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.parametrize("arena", ["simple", "complex"])
 def test_the_checker_has_nothing_to_say(screen: None, arena: str, observation: str, render_mode: str | None) -> None:
     task = {"arena": {"name": arena}, "observation": observation, "control_period": 0.02}
-    env = gymnasium.make(sim.registration.NAVIGATION, task=task, render_mode=render_mode)
+    env = gymnasium.make(sim.envs.registration.NAVIGATION, task=task, render_mode=render_mode)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
@@ -55,7 +55,7 @@ def test_the_checker_has_nothing_to_say(screen: None, arena: str, observation: s
     ],
 )
 def test_the_checker_has_nothing_to_say_of_other_robots_and_disturbances(task: dict[str, object]) -> None:
-    env = gymnasium.make(sim.registration.NAVIGATION, task=task, render_mode="rgb_array")
+    env = gymnasium.make(sim.envs.registration.NAVIGATION, task=task, render_mode="rgb_array")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped, skip_render_check=True)
@@ -100,18 +100,18 @@ def test_without_a_display_or_pygame_there_is_a_word_about_it(monkeypatch: pytes
     for variable in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(variable, raising=False)
     with pytest.raises(DisplayError, match="rgb_array"):
-        gymnasium.make(sim.registration.NAVIGATION, render_mode="human")
+        gymnasium.make(sim.envs.registration.NAVIGATION, render_mode="human")
     pygame.quit()
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(DisplayError, match="pygame-ce"):
-        gymnasium.make(sim.registration.NAVIGATION, render_mode="human")
+        gymnasium.make(sim.envs.registration.NAVIGATION, render_mode="human")
 
 
 @pytest.mark.filterwarnings("ignore:.*render_mode")  # Gymnasium warns before we refuse
 def test_a_render_mode_that_nobody_knows_is_refused() -> None:
     for make in (gymnasium.make, gymnasium.make_vec):
         with pytest.raises(ValueError, match="render_mode"):
-            make(sim.registration.NAVIGATION, render_mode="ascii")
+            make(sim.envs.registration.NAVIGATION, render_mode="ascii")
 
 
 @pytest.fixture
@@ -125,7 +125,7 @@ def one_thread() -> Iterator[None]:
 
 def test_stable_baselines_learns_on_it_unchanged(one_thread: None) -> None:
     # Targets that count as reached from 1 m: a few thousand steps are enough to learn to drive there.
-    env = gymnasium.make(sim.registration.NAVIGATION, task={"arrival_distance": 1.0, "step_limit": 100})
+    env = gymnasium.make(sim.envs.registration.NAVIGATION, task={"arrival_distance": 1.0, "step_limit": 100})
     model = PPO(
         "MlpPolicy", env, n_steps=512, batch_size=64, n_epochs=5, gamma=0.9, learning_rate=1e-3, seed=1, device="cpu"
     )
@@ -148,7 +148,7 @@ def arrivals(model: PPO, env: gymnasium.Env[np.ndarray, np.ndarray]) -> int:
 
 
 def test_make_vec_gives_the_real_vector_environment() -> None:
-    envs = gymnasium.make_vec(sim.registration.NAVIGATION, num_envs=16, task={"step_limit": 20})
+    envs = gymnasium.make_vec(sim.envs.registration.NAVIGATION, num_envs=16, task={"step_limit": 20})
     assert envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     observations, _ = envs.reset(seed=0)
     assert observations.shape == (16, 16)
@@ -158,7 +158,7 @@ def test_make_vec_gives_the_real_vector_environment() -> None:
 
 
 def test_gymnasiums_own_episode_statistics_count_right() -> None:
-    envs = RecordEpisodeStatistics(gymnasium.make_vec(sim.registration.NAVIGATION, num_envs=4, task={"step_limit": 20}))
+    envs = RecordEpisodeStatistics(gymnasium.make_vec(sim.envs.registration.NAVIGATION, num_envs=4, task={"step_limit": 20}))
     envs.reset(seed=0)
     lengths = []
     for _ in range(60):
@@ -169,7 +169,7 @@ def test_gymnasiums_own_episode_statistics_count_right() -> None:
 
 
 def test_a_robot_is_placed_by_options_and_told_in_the_info() -> None:
-    env = gymnasium.make(sim.registration.NAVIGATION)
+    env = gymnasium.make(sim.envs.registration.NAVIGATION)
     _, info = env.reset(options={"pose": (1.0, 2.0, 0.5), "target": (-3.0, 0.0)})
     assert info["pose"] == pytest.approx([1.0, 2.0, 0.5])
     assert info["target"] == pytest.approx([-3.0, 0.0])
@@ -178,7 +178,7 @@ def test_a_robot_is_placed_by_options_and_told_in_the_info() -> None:
 
 
 def test_an_attempt_is_told_in_the_info_when_it_ends() -> None:
-    env = gymnasium.make(sim.registration.NAVIGATION)
+    env = gymnasium.make(sim.envs.registration.NAVIGATION)
     env.reset(seed=0, options={"pose": (0.0, 0.0, 0.0), "target": (0.24, 0.0)})
     *_, info = env.step(np.array([1.0, 0.0], dtype=np.float32))
     assert info["attempt"]["outcome"] == "arrival"
@@ -187,11 +187,11 @@ def test_an_attempt_is_told_in_the_info_when_it_ends() -> None:
 
 def test_a_wrong_task_is_refused_with_its_place() -> None:
     with pytest.raises(ValueError, match=r"robot\.burger\.radius"):
-        gymnasium.make(sim.registration.NAVIGATION, task={"robot": {"radius": -1.0}})
+        gymnasium.make(sim.envs.registration.NAVIGATION, task={"robot": {"radius": -1.0}})
 
 
 def test_a_picture_shows_floor_wall_robot_and_target() -> None:
-    env = gymnasium.make(sim.registration.NAVIGATION, task=TaskConfig(), render_mode="rgb_array")
+    env = gymnasium.make(sim.envs.registration.NAVIGATION, task=TaskConfig(), render_mode="rgb_array")
     env.reset(seed=0, options={"pose": (0.0, 0.0, np.pi / 2), "target": (3.0, 3.0)})
     picture = env.render()
     assert isinstance(picture, np.ndarray)

@@ -9,18 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.arenas import Arena, Mover, build_arenas, free_distance
-from sim.baselines import go_to_goal
-from sim.config import ArenaConfig, JackalConfig, LidarConfig, RandomisationConfig, TaskConfig
+from sim.baselines.simple import go_to_goal
+from sim.config import ArenaConfig, JackalConfig, LidarConfig, MoverKind, MoversConfig, RandomisationConfig, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
 from sim.kernels.surroundings import free_length, obstacle_lines
-from sim.mover_config import MoverKind, MoversConfig
 from sim.movers import Movers
 from sim.physics import add_arena, robot_body, tile_origins
-from sim.scenarios import draw_scenarios, scenario_world
 from sim.shapes import hulls, pack_shapes
 from sim.suites import load_suite
-from sim.vector_env import NavigationVectorEnv
+from sim.suites.scenarios import draw_scenarios, scenario_world
 from sim.world import World
 from tests.sim.scenes import random_arena
 from tests.sim.test_sensing import TOLERANCE, chipmunk_scan, grazing

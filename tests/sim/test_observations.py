@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sim.config import ArenaConfig, ObservationName, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout, observation_size
-from sim.vector_env import NavigationVectorEnv
 
 
 @pytest.mark.parametrize("observation", ["paper", "improved"])

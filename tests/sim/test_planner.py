@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.builtin import complex_arena, simple_arena
+from sim.arenas.planner import Path, Planner, shortest_path
 from sim.errors import PlacementError
-from sim.planner import Path, Planner, shortest_path
 
 # The documented accuracy, and what a path may come closer than its clearance, metres.
 ACCURACY = 1.01

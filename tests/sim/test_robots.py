@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sim.arenas import Arena, build_arenas, build_task_arenas
 from sim.arenas.cells import components, free_mask
-from sim.baselines import go_to_goal
+from sim.baselines.simple import go_to_goal
 from sim.config import (
     BurgerConfig,
     GeneratedArenaConfig,
@@ -20,11 +20,11 @@ from sim.config import (
     TaskConfig,
     WaffleConfig,
 )
+from sim.envs.render import render_robot
 from sim.errors import PlacementError, SuiteError
 from sim.footprint import rectangle_clearance
 from sim.physics import add_arena, robot_body
-from sim.reference import ReferenceWorld
-from sim.render import render_robot
+from sim.plain import ReferenceWorld
 from sim.scan import body_clearances, clearances
 from sim.suites import load_suite, run_suite, suite_for
 from sim.world import World

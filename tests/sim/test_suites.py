@@ -8,16 +8,21 @@ import numpy as np
 import pytest
 
 import sim
-from sim.arena_file import ArenaFile
 from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.arenas.document import to_document
-from sim.baselines import bearings, go_to_goal, random_policy
-from sim.config import ArenaConfig, GeneratedArenaConfig, ImportedArenaConfig, ObservationName, TaskConfig
-from sim.dwa import dynamic_window
+from sim.baselines.dwa import dynamic_window
+from sim.baselines.simple import bearings, go_to_goal, random_policy
+from sim.config import (
+    ArenaConfig,
+    ArenaFile,
+    GeneratedArenaConfig,
+    ImportedArenaConfig,
+    MoversConfig,
+    ObservationName,
+    TaskConfig,
+)
+from sim.envs.vector import NavigationVectorEnv
 from sim.errors import PlacementError, SuiteError
-from sim.mover_config import MoversConfig
-from sim.scores import barn_score
-from sim.suite_builder import build_suite, suite_text
 from sim.suites import (
     EpisodeTable,
     Situation,
@@ -32,7 +37,8 @@ from sim.suites import (
     suite_of,
     suite_places,
 )
-from sim.vector_env import NavigationVectorEnv
+from sim.suites.builder import build_suite, suite_text
+from sim.suites.scores import barn_score
 
 SIMPLE = TaskConfig()
 COMPLEX = TaskConfig(arena=ArenaConfig(name="complex"))
@@ -50,7 +56,7 @@ HASHES = {
 def test_a_suite_is_what_it_was_and_its_procedure_makes_it_again(name: str) -> None:
     suite = load_suite(name)
     assert suite.hash == HASHES[name]
-    assert build_suite(name) == (Path(sim.__path__[0]) / "suite_data" / f"{name}.json").read_text("utf-8")
+    assert build_suite(name) == (Path(sim.__path__[0]) / "data" / f"{name}.json").read_text("utf-8")
 
 
 def test_a_suite_of_other_maps_is_drawn_as_the_frozen_one_was() -> None:
@@ -263,10 +269,10 @@ def test_an_imported_arena_is_its_own_suite() -> None:
 
 
 def test_a_suite_that_was_tampered_with_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "suite_data").mkdir()
+    (tmp_path / "data").mkdir()
     text = build_suite("simple-200").replace("1.", "2.", 1)
-    (tmp_path / "suite_data" / "simple-200.json").write_text(text, "utf-8")
-    monkeypatch.setattr("sim.suites.resources.files", lambda _: tmp_path)
+    (tmp_path / "data" / "simple-200.json").write_text(text, "utf-8")
+    monkeypatch.setattr("sim.suites.suite.resources.files", lambda _: tmp_path)
     load_suite.cache_clear()
     with pytest.raises(SuiteError, match="have changed"):
         load_suite("simple-200")

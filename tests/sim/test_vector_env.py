@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.config import ArenaConfig, TaskConfig
-from sim.env import NavigationEnv
+from sim.envs.single import NavigationEnv
+from sim.envs.vector import NavigationVectorEnv
 from sim.errors import PlacementError
-from sim.vector_env import NavigationVectorEnv
 
 SIMPLE = TaskConfig()
 COMPLEX = TaskConfig(arena=ArenaConfig(name="complex"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from workers.behavior import BehaviorMetrics
+from workers.training.behavior import BehaviorMetrics
 
 
 def window(actions: np.ndarray, observations: np.ndarray | None = None) -> dict[str, float]:

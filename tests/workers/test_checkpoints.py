@@ -15,9 +15,9 @@ from safetensors.numpy import load, save
 from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, read_policy, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork, TrainingConfig
 from workers.errors import ArchiveFormatError, ArchiveIntegrityError
-from workers.layout import layout, weight_shapes
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
-from workers.networks import bound_actions, build_network
+from workers.networks.layout import layout, weight_shapes
+from workers.networks.modules import bound_actions, build_network
 from workers.policy import Policy, torch_policy
 
 NETWORKS: list[Network] = [ResBlockNetwork(), MlpNetwork(), MlpNetwork(hidden_sizes=(8, 4), activation="tanh")]

@@ -14,7 +14,7 @@ from workers.diagnoses.learning import largest_value
 from workers.errors import NonFiniteError
 from workers.frames import Frame
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.trainer import train
+from workers.training.trainer import train
 
 SMALL_PPO = {
     "name": "ppo",

@@ -6,10 +6,10 @@ import torch
 from torch import nn
 
 from workers.algorithms.flat import FlatParameters
-from workers.backward import passes_of
 from workers.config import MlpNetwork, Network, ResBlockNetwork
 from workers.kernels.networks import backward, forward, input_gradient
-from workers.networks import GaussianActor, build_network
+from workers.networks.compiled import passes_of
+from workers.networks.modules import GaussianActor, build_network
 
 NETWORKS: list[Network] = [
     ResBlockNetwork(),

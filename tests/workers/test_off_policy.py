@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers.algorithms import build_algorithm
-from workers.algorithms.actor_critic_gradients import AutogradActorCritic, WrittenActorCritic
 from workers.algorithms.ddpg import Ddpg, build_ddpg
+from workers.algorithms.gradients.actor_critic import AutogradActorCritic, WrittenActorCritic
+from workers.algorithms.gradients.sac import AutogradSac, WrittenSac, log_slope
 from workers.algorithms.off_policy import OffPolicyAlgorithm
-from workers.algorithms.replay import ReplayBuffer, Transitions
 from workers.algorithms.sac import Sac, build_sac
-from workers.algorithms.sac_gradients import AutogradSac, WrittenSac, log_slope
+from workers.algorithms.storage.replay import ReplayBuffer, Transitions
 from workers.algorithms.td3 import Td3, build_td3
 from workers.config import DdpgConfig, MlpNetwork, Network, ResBlockNetwork, SacConfig, Td3Config
 from workers.policy import Policy

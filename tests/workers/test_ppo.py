@@ -8,13 +8,13 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from workers.algorithms.gradients.ppo import AutogradPpo, WrittenPpo, entropy, log_prob
 from workers.algorithms.ppo import Ppo, build_ppo
-from workers.algorithms.ppo_gradients import AutogradPpo, WrittenPpo, entropy, log_prob
-from workers.algorithms.return_scaler import ReturnScaler
-from workers.algorithms.rollout import Samples, generalized_advantages
-from workers.backward import ROWS_AT_ONCE
+from workers.algorithms.storage.return_scaler import ReturnScaler
+from workers.algorithms.storage.rollout import Samples, generalized_advantages
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
-from workers.networks import GaussianActor, build_network
+from workers.networks.compiled import ROWS_AT_ONCE
+from workers.networks.modules import GaussianActor, build_network
 
 F = np.float32
 CPU = torch.device("cpu")

@@ -5,14 +5,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from sim.baselines import go_to_goal
+from sim.baselines.simple import go_to_goal
 from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.suites import load_suite, suite_for, suite_named, suite_names
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy
 from workers.cli import app
 from workers.config import PpoConfig, TrainingConfig
 from workers.errors import ArchiveIntegrityError
-from workers.evaluation import evaluate
 from workers.export.bundle import export_checkpoint
 from workers.policy import torch_policy
 from workers.reference.build import BestCheckpoint, build, main
@@ -20,6 +19,7 @@ from workers.reference.figures import figures
 from workers.reference.library import FOLDER, ReferencePolicy, baselines, reference_policies, reference_policy
 from workers.reference.recipes import RECIPES, Recipe, recipe
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
+from workers.training.evaluation import evaluate
 
 POLICIES = [pytest.param(policy, id=policy.card.name) for policy in reference_policies()]
 # Another processor rounds otherwise, and an episode on the edge may end otherwise.

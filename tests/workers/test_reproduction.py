@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from sim.config import TaskConfig
 from workers.config import DdpgConfig
-from workers.drives import drive
 from workers.presets import paper_ddpg
 from workers.reproduction.claims import CLAIMS, Claim, Comparison, Safety
 from workers.reproduction.curves import band, binned
@@ -21,6 +20,7 @@ from workers.reproduction.results import SeedResult, Trained, learned_at, row_sp
 from workers.reproduction.rows import FIGURES, ROW_BY_ID, ROWS, STEPS, TABLES, scaled
 from workers.reproduction.table import METRICS, TableRow
 from workers.reproduction.verdict import judge, judge_all
+from workers.training.drives import drive
 
 LEARNED_AT = 100_000
 

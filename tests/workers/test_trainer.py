@@ -11,12 +11,12 @@ from sim.config import ArenaConfig, JackalConfig, MoversConfig, RandomisationCon
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveMismatchError, NonFiniteError
-from workers.evaluation import evaluation_metrics
 from workers.frames import Frame
 from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.table import TableRow
-from workers.trainer import train
-from workers.training_metrics import TrainingMetrics
+from workers.training.evaluation import evaluation_metrics
+from workers.training.metrics import TrainingMetrics
+from workers.training.trainer import train
 
 REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress", "reward/penalty"}
 METRICS = {

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from sim.arenas import build_arena, build_arenas
 from sim.config import ArenaConfig, BurgerConfig, GeneratedArenaConfig, MoversConfig, RandomisationConfig, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan
-from sim.vector_env import NavigationVectorEnv
 from workers.frames import Frame
 from workers.live.clips import CLIP_STEPS, ClipRecorder
 from workers.live.showcase import Showcase, along_arc

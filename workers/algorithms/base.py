@@ -10,7 +10,7 @@ Arrays = Mapping[str, NDArray[np.generic]]
 
 
 class Algorithm(Protocol):
-    """Acts, remembers, updates; `workers.trainer` is the loop around it.
+    """Acts, remembers, updates; `workers.training.trainer` is the loop around it.
 
     Attributes:
         robots: how many it drives side by side.

@@ -12,13 +12,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.algorithms.actor_critic_gradients import ActorCriticGradients, action_value, fastest_gradients
 from workers.algorithms.flat import FlatAdam, FlatParameters
+from workers.algorithms.gradients.actor_critic import ActorCriticGradients, action_value, fastest_gradients
 from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
-from workers.algorithms.replay import Transitions
+from workers.algorithms.storage.replay import Transitions
 from workers.config import DdpgConfig, Td3Config
-from workers.layout import ACTION_SIZE
-from workers.networks import Body, DeterministicActor, build_network
+from workers.networks.layout import ACTION_SIZE
+from workers.networks.modules import Body, DeterministicActor, build_network
 
 
 class NoisyPolicy(OffPolicyAlgorithm):

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam, FlatParameters
-from workers.algorithms.replay import ReplayBuffer, Transitions
+from workers.algorithms.storage.replay import ReplayBuffer, Transitions
 from workers.config import OffPolicyConfig
 
 ACTION_LOW = torch.tensor([0.0, -1.0])

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
-from workers.algorithms.ppo_gradients import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
-from workers.algorithms.return_scaler import ReturnScaler
-from workers.algorithms.rollout import RolloutStorage, generalized_advantages
-from workers.backward import inference
+from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
+from workers.algorithms.storage.return_scaler import ReturnScaler
+from workers.algorithms.storage.rollout import RolloutStorage, generalized_advantages
 from workers.config import PpoConfig
-from workers.layout import ACTION_SIZE
-from workers.networks import Body, GaussianActor, bound_actions, build_network
+from workers.networks.compiled import inference
+from workers.networks.layout import ACTION_SIZE
+from workers.networks.modules import Body, GaussianActor, bound_actions, build_network
 
 # A deviation between 1.8 % and 270 % of the action's unit: beyond either, exploration is none or all.
 LOG_STD_RANGE = (-4.0, 1.0)

@@ -13,14 +13,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.flat import FlatAdam, FlatParameters
+from workers.algorithms.gradients.actor_critic import action_value
+from workers.algorithms.gradients.sac import SacGradients, fastest_gradients, squashed_sample
 from workers.algorithms.off_policy import OffPolicyAlgorithm
-from workers.algorithms.replay import Transitions
-from workers.algorithms.sac_gradients import SacGradients, fastest_gradients, squashed_sample
+from workers.algorithms.storage.replay import Transitions
 from workers.config import SacConfig
-from workers.layout import ACTION_SIZE
-from workers.networks import Body, build_network
+from workers.networks.layout import ACTION_SIZE
+from workers.networks.modules import Body, build_network
 
 
 class Temperature(nn.Module):

@@ -8,11 +8,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.algorithms.actor_critic_gradients import action_value
 from workers.algorithms.base import Arrays
 from workers.algorithms.ddpg import NoisyPolicy, build_noisy_networks
+from workers.algorithms.gradients.actor_critic import action_value
 from workers.algorithms.off_policy import ACTION_HIGH, ACTION_LOW
-from workers.algorithms.replay import Transitions
+from workers.algorithms.storage.replay import Transitions
 from workers.config import Td3Config
 
 

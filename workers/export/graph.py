@@ -22,8 +22,8 @@ from onnx import TensorProto, helper, numpy_helper
 
 from workers.config import ResBlockNetwork
 from workers.export.ros2.mapless_navigator.policy import Specification
-from workers.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 from workers.manifest import Manifest
+from workers.networks.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 from workers.policy import Policy
 
 # Old enough for every runtime that robots carry; every operator used here is older still.

@@ -20,7 +20,7 @@ from workers.kernels.dense import (
     transpose,
 )
 from workers.kernels.options import kernel
-from workers.layout import LEAKY_SLOPE
+from workers.networks.layout import LEAKY_SLOPE
 
 RELU, TANH, RESBLOCK = range(3)
 """Kinds: fully connected with either activation, and the paper's residual blocks."""

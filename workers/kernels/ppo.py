@@ -1,6 +1,6 @@
 """The gradients of PPO's losses over a minibatch, in one compiled call.
 
-`workers.algorithms.ppo_gradients` has the formulas, and the reference by autograd that a test compares this with.
+`workers.algorithms.gradients.ppo` has the formulas, and the reference by autograd that a test compares this with.
 """
 
 import math
@@ -26,7 +26,7 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, clip_rang
     Args:
         actor: `workers.kernels.networks.Passes`.
         critic: likewise.
-        samples: the arrays of `workers.algorithms.rollout.Samples`, in their order.
+        samples: the arrays of `workers.algorithms.storage.rollout.Samples`, in their order.
         minibatch: (n,) rows of the samples.
         at_once: rows, at most as many as both networks have buffers for.
         log_std: (2,).

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from workers.frames import Frame
 
 if TYPE_CHECKING:
-    from sim.vector_env import NavigationVectorEnv
+    from sim.envs.vector import NavigationVectorEnv
 
 CLIP_STEPS = 90
 """Consecutive steps of a clip: three seconds of playing."""

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.config import GeneratedArenaConfig, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan
-from sim.vector_env import NavigationVectorEnv
 from workers.frames import Frame
 from workers.live.viewing import PolicyFunction
 

@@ -16,7 +16,7 @@ from workers.live.viewing import PolicyFunction
 from workers.reporting import Reporter, WatchRequest
 
 if TYPE_CHECKING:
-    from sim.vector_env import NavigationVectorEnv
+    from sim.envs.vector import NavigationVectorEnv
 
 FRAME_RATE = 30.0
 """Frames per second of wall time."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sim.vector_env import NavigationVectorEnv
+    from sim.envs.vector import NavigationVectorEnv
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 """Observations (n, 16) to actions (n, 2), deterministic; safe to call from another thread."""

@@ -16,12 +16,11 @@ from tempfile import TemporaryDirectory
 
 from pydantic import BaseModel
 
-from sim.baselines import go_to_goal, random_policy
+from sim.baselines.dwa import dynamic_window
+from sim.baselines.simple import go_to_goal, random_policy
 from sim.config import TaskConfig
-from sim.dwa import dynamic_window
 from sim.suites import EpisodeTable, Suite, load_suite, run_controller, run_suite, suite_named, suite_names
 from workers.checkpoints import copy_policy, read_policy
-from workers.evaluation import evaluate, to_result
 from workers.frames import Frame
 from workers.policy import torch_policy
 from workers.reference.figures import figures
@@ -37,7 +36,8 @@ from workers.reference.library import (
 )
 from workers.reference.recipes import RECIPES, Recipe, recipe
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.trainer import train
+from workers.training.evaluation import evaluate, to_result
+from workers.training.trainer import train
 
 _TASK = TaskConfig()
 CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {

@@ -15,9 +15,9 @@ from sim.suites import run_suite, suite_for, suite_named
 from sim.world import World
 from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
-from workers.evaluation import to_result
 from workers.policy import torch_policy
 from workers.replays.recording import Recording
+from workers.training.evaluation import to_result
 
 MAX_MOMENT_NUMBERS = 2**27
 """Numbers of all moments together: a quarter of a gigabyte in memory, 200 episodes of 20,000 steps with 30 rays."""

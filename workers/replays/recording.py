@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from sim.arena_file import ArenaFile
+from sim.config import ArenaFile
 from workers.reporting import EvaluationResult
 
 _ARENAS = TypeAdapter(tuple[ArenaFile, ...])

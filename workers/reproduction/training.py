@@ -14,7 +14,7 @@ from workers.reproduction.recorder import Recorder, evaluations, read_records, s
 from workers.reproduction.results import Progress, SeedResult, Trained, learned_at
 from workers.reproduction.rows import CURVE
 from workers.reproduction.table import TableRow
-from workers.trainer import train
+from workers.training.trainer import train
 
 RESULT = "result.json"
 _TRAINING = "training.json"

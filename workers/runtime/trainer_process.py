@@ -133,7 +133,7 @@ def main(descriptor: int, parent: int) -> None:
     # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
     from workers.live.viewer import LiveViewer
     from workers.precompile import warm_up
-    from workers.trainer import train
+    from workers.training.trainer import train
 
     warm_up()
 

@@ -5,8 +5,8 @@ from typing import Any, cast
 import yaml
 from pydantic import ValidationError
 
-from sim.arena_file import ArenaFile
 from sim.arenas.files.limits import MAX_DEPTH, MAX_EVENTS, MAX_TEXT_BYTES
+from sim.config import ArenaFile
 from sim.errors import ArenaFormatError, ArenaLimitError
 
 # The parser in C where PyYAML brings it: ten times faster, the same rules.

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 
-from sim.arena_file import ArenaFile
 from sim.arenas.document import check_free_space, check_patrols
 from sim.arenas.files.limits import MAX_IMAGE_BYTES, MAX_SDF_BYTES, MAX_TEXT_BYTES
 from sim.arenas.files.own_yaml import load_yaml, read_own
 from sim.arenas.files.ros_map import parse_info, read_map
 from sim.arenas.files.sdf import read_sdf
+from sim.config import ArenaFile
 from sim.errors import ArenaFileError, ArenaFormatError, ArenaLimitError
 
 _IMAGES = (".pgm", ".png")

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from sim.arena_file import MAX_OBSTACLES, MAX_SIDE, MIN_SIDE, ArenaFile
 from sim.arenas.cells import Mask, components
 from sim.arenas.document import to_document
 from sim.arenas.files.limits import MAX_IMAGE_BYTES, MAX_IMAGE_CELLS, RESOLUTIONS
 from sim.arenas.files.own_yaml import describe
 from sim.arenas.geometry import Arena
 from sim.arenas.rectangles import cover, to_boxes
+from sim.config import MAX_OBSTACLES, MAX_SIDE, MIN_SIDE, ArenaFile
 from sim.errors import ArenaFormatError, ArenaLimitError
 
 # Scale mode: cells that are more likely occupied than not are obstacles.

@@ -14,9 +14,9 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 from pydantic import ValidationError
 
-from sim.arena_file import MAX_OBSTACLES, MAX_SIDE, ArenaFile, Box, Circle, Start, Target
 from sim.arenas.files.limits import MAX_DEPTH, MAX_SDF_BYTES, MAX_XML_EVENTS
 from sim.arenas.files.own_yaml import describe
+from sim.config import MAX_OBSTACLES, MAX_SIDE, ArenaFile, Box, Circle, Start, Target
 from sim.errors import ArenaFormatError, ArenaLimitError
 
 # Includes that bring no obstacle.

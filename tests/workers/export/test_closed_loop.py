@@ -11,8 +11,8 @@ import numpy as np
 
 from sim.arenas import build_arenas
 from sim.config import LidarConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan as scan_arena
-from sim.vector_env import NavigationVectorEnv
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.export.bundle import bundle, export_checkpoint
 from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, State
@@ -20,7 +20,7 @@ from workers.export.ros2.mapless_navigator.observation import Scan
 from workers.export.ros2.mapless_navigator.policy import Policy
 from workers.frames import Frame
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
-from workers.trainer import train
+from workers.training.trainer import train
 
 # A full circle of one beam a degree, first beam ahead, then to the left: the LDS-01 of a TurtleBot3.
 SENSOR = LidarConfig(rays=360, batches=10, field_of_view=360.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sim.config import ArenaConfig, TaskConfig
-from sim.vector_env import NavigationVectorEnv
+from sim.envs.vector import NavigationVectorEnv
 from workers.export.bundle import export_checkpoint
 from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, State
 from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles

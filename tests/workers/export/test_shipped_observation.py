@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.config import ArenaConfig, LidarConfig, TaskConfig
+from sim.envs.vector import NavigationVectorEnv
 from sim.lidar import ray_angles as simulated_ray_angles
-from sim.vector_env import NavigationVectorEnv
 from workers.export.bundle import export_checkpoint
 from workers.export.check import run_graph
 from workers.export.ros2.mapless_navigator.observation import Frames, Scan, observe, ray_angles, resample, wrap

@@ -1,0 +1,76 @@
+"""Brings the database to the tables of this version."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sqlalchemy import inspect, text
+from sqlalchemy.exc import OperationalError
+
+from server.database.engine import Database
+from server.errors import ServiceError
+
+if TYPE_CHECKING:
+    from alembic.config import Config
+
+_SCRIPTS = Path(__file__).resolve().parents[1] / "migrations"
+
+
+class IncompatibleDatabaseError(ServiceError):
+    """The database was written by a newer version."""
+
+
+class UnreachableDatabaseError(ServiceError):
+    """The database does not answer, or does not let us in."""
+
+
+def head() -> str:
+    """The newest revision: migrations are numbered, and their files begin with their number."""
+    return max(path.name.partition("_")[0] for path in (_SCRIPTS / "versions").glob("[0-9]*.py"))
+
+
+def upgrade(database: Database) -> None:
+    """Run the migrations that the database has not seen, all in one transaction.
+
+    Raises:
+        IncompatibleDatabaseError: the database is from a newer version.
+        UnreachableDatabaseError: it can't be reached.
+    """
+    try:
+        if _revision(database) != head():
+            _run_migrations(database)
+    except OperationalError as error:
+        # What follows the first line are guesses at the cause.
+        reason, *_ = str(error.orig).splitlines()
+        url = database.engine.url.render_as_string(hide_password=True)
+        raise UnreachableDatabaseError(f"The database {url} can't be used: {reason}") from error
+
+
+def migration_config(database: Database) -> "Config":
+    """Alembic's configuration for this database; there is no alembic.ini that could disagree with the settings."""
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(_SCRIPTS))
+    config.attributes["database"] = database
+    return config
+
+
+def _revision(database: Database) -> str | None:
+    with database.read() as session:
+        if not inspect(session.connection()).has_table("alembic_version"):
+            return None
+        revision: str | None = session.scalar(text("SELECT version_num FROM alembic_version"))
+        return revision
+
+
+def _run_migrations(database: Database) -> None:
+    # Late: Alembic is a tenth of the server's start, and most starts find nothing to do.
+    from alembic import command
+    from alembic.util import CommandError
+
+    try:
+        command.upgrade(migration_config(database), "head")
+    except CommandError as error:
+        raise IncompatibleDatabaseError(
+            f"The database was written by a newer version of Mapless ({error}): update the program, or use another database."
+        ) from error

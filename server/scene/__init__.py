@@ -1,0 +1,1 @@
+"""What is drawn in 3D: the scene of live views and replays."""

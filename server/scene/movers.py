@@ -1,0 +1,48 @@
+"""The nodes of what moves beside the robots."""
+
+import numpy as np
+import viser
+
+from server.scene import meshes
+from server.scene.themes import Colours, linear
+from workers.frames import Frame
+
+
+class MoverNodes:
+    """A fixed number of movers below one node.
+
+    Args:
+        server: where the nodes live.
+        parent: path of the node to hang them under.
+        colours: of the theme.
+        movers: how many.
+    """
+
+    def __init__(self, server: viser.ViserServer, parent: str, colours: Colours, movers: int) -> None:
+        mesh = meshes.mover()
+        self._movers = movers
+        self._bodies = server.scene.add_batched_meshes_simple(
+            f"{parent}/movers",
+            mesh.vertices,
+            mesh.faces,
+            batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (movers, 1)),
+            batched_positions=np.zeros((movers, 3), np.float32),
+            batched_scales=np.ones((movers, 3), np.float32),
+            batched_colors=linear(colours.mover),
+            lod="off",
+            flat_shading=True,
+        )
+
+    def __len__(self) -> int:
+        return self._movers
+
+    def update(self, frame: Frame) -> None:
+        """Draws the movers of a frame that has as many."""
+        height = np.zeros(self._movers, np.float32)
+        self._bodies.batched_positions = np.column_stack([frame.movers[:, :2], height])
+        # As wide as each is, all equally tall.
+        self._bodies.batched_scales = np.column_stack([frame.movers[:, 2], frame.movers[:, 2], height + np.float32(1.0)])
+
+    def remove(self) -> None:
+        """Takes the nodes away."""
+        self._bodies.remove()

@@ -1,0 +1,148 @@
+"""The scene of one run: light, floor, walls and obstacles, built once, and the robots and movers that come and go in it."""
+
+import numpy as np
+import viser
+
+from server.scene.movers import MoverNodes
+from server.scene.robots import RobotNodes
+from server.scene.themes import COLOURS, Colours, Theme
+from sim.arenas import Arena, arena_clearance, build_arena
+from sim.config import TaskConfig
+from workers.frames import Frame
+
+# Everything hangs below this node, so that one message moves the world under the camera when it follows a robot.
+_WORLD = "/world"
+_ARENA = f"{_WORLD}/arena"
+_WALL_HEIGHT = 0.3
+_WALL_THICKNESS = 0.1
+_OBSTACLE_HEIGHT = 0.45
+
+
+class Scene:
+    """One run's scene; broadcast to every browser that watches it in the same theme.
+
+    Args:
+        server: where the nodes live.
+        task: the place, and the geometry of robot and LiDAR.
+        theme: light or dark.
+    """
+
+    def __init__(self, server: viser.ViserServer, task: TaskConfig, theme: Theme) -> None:
+        self._server = server
+        self._task = task
+        self._colours = COLOURS[theme]
+        self._rays_visible = True
+        self._robots: RobotNodes | None = None
+        self._movers: MoverNodes | None = None
+        self._shape: tuple[int, ...] = ()
+        self._world = server.scene.add_frame(_WORLD, show_axes=False)
+        _light(server, theme, self._colours)
+        self._enter(0)
+
+    @property
+    def half_size(self) -> float:
+        """Half the longer side of the arena, metres."""
+        return max(self._arena.half_width, self._arena.half_height)
+
+    def centre_on(self, x: float, y: float) -> None:
+        """Moves the world so that the point (x, y) of the arena lies where the camera looks."""
+        self._world.position = (-x, -y, 0.0)
+
+    def show_rays(self, visible: bool) -> None:
+        """Shows or hides rays, hits and scanned area."""
+        if visible == self._rays_visible:
+            return
+        self._rays_visible = visible
+        if self._robots is not None:
+            self._robots.show_rays(visible)
+
+    def update(self, frame: Frame, now: float) -> None:
+        """Draws a frame.
+
+        Args:
+            frame: what to draw.
+            now: seconds of the wall clock, for what fades.
+        """
+        if frame.arena != self._arena_index:
+            self._place.remove()
+            self._enter(frame.arena)
+        if self._robots is None or self._shape != frame.ranges.shape:
+            if self._robots is not None:
+                self._robots.remove()
+            self._shape = frame.ranges.shape
+            self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
+            self._robots.show_rays(self._rays_visible)
+        self._robots.update(frame, now)
+        if len(frame.movers) != (0 if self._movers is None else len(self._movers)):
+            if self._movers is not None:
+                self._movers.remove()
+            self._movers = MoverNodes(self._server, _WORLD, self._colours, len(frame.movers)) if len(frame.movers) else None
+        if self._movers is not None:
+            self._movers.update(frame)
+
+    def _enter(self, index: int) -> None:
+        """Builds the arena of that number in the task's pool."""
+        self._arena_index = index
+        self._arena = build_arena(self._task.arena, index, clearance=arena_clearance(self._task))
+        self._place = self._server.scene.add_frame(_ARENA, show_axes=False)
+        _build(self._server, self._arena, self._colours)
+
+
+def _light(server: viser.ViserServer, theme: Theme, colours: Colours) -> None:
+    scene = server.scene
+    scene.world_axes.visible = False
+    scene.set_up_direction("+z")
+    # No picture of a studio is needed for flat surfaces; without one, the scene is there at once.
+    scene.configure_environment_map(None)
+    scene.add_light_hemisphere("/sky", sky_color=colours.sky, ground_color=colours.ground, intensity=colours.ambient)
+    # viser's own lights are three times as bright as the colours of the theme bear.
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_directional("/sun", intensity=colours.sun, cast_shadow=True, position=(-2.0, -3.0, 8.0))
+    server.gui.configure_theme(dark_mode=theme == "dark", show_logo=False, show_share_button=False)
+
+
+def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
+    scene = server.scene
+    width, height = 2 * arena.half_width, 2 * arena.half_height
+    scene.add_grid(
+        f"{_ARENA}/floor",
+        width,
+        height,
+        cell_size=0.5,
+        cell_color=colours.cell,
+        section_size=1.0,
+        section_color=colours.section,
+        plane_color=colours.floor,
+        plane_opacity=1.0,
+        shadow_opacity=colours.shadow,
+        position=(0.0, 0.0, -0.005),
+    )
+    side = arena.half_width + _WALL_THICKNESS / 2
+    end = arena.half_height + _WALL_THICKNESS / 2
+    long = width + 2 * _WALL_THICKNESS
+    for name, x, y, size_x, size_y in (
+        ("east", side, 0.0, _WALL_THICKNESS, height),
+        ("west", -side, 0.0, _WALL_THICKNESS, height),
+        ("north", 0.0, end, long, _WALL_THICKNESS),
+        ("south", 0.0, -end, long, _WALL_THICKNESS),
+    ):
+        scene.add_box(
+            f"{_ARENA}/walls/{name}", colours.wall, (size_x, size_y, _WALL_HEIGHT), position=(x, y, _WALL_HEIGHT / 2)
+        )
+    for index, (x, y, radius) in enumerate(arena.circles):
+        scene.add_cylinder(
+            f"{_ARENA}/circles/{index}",
+            float(radius),
+            _OBSTACLE_HEIGHT,
+            colours.obstacle,
+            radial_segments=40,
+            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+        )
+    for index, (x, y, half_x, half_y, angle) in enumerate(arena.boxes):
+        scene.add_box(
+            f"{_ARENA}/boxes/{index}",
+            colours.obstacle,
+            (2 * float(half_x), 2 * float(half_y), _OBSTACLE_HEIGHT),
+            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+            wxyz=(float(np.cos(angle / 2)), 0.0, 0.0, float(np.sin(angle / 2))),
+        )

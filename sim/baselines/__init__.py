@@ -1,0 +1,1 @@
+"""Controllers that need no training: what a policy has to beat."""

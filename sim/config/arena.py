@@ -1,0 +1,87 @@
+"""Where robots drive: built-in arenas, pools that are drawn from a seed, and arenas from files (pydantic only)."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from sim.config.arena_file import ArenaFile
+from sim.config.base import ADVANCED, HIDDEN, Frozen
+from sim.config.movers import MoversConfig
+
+ArenaName = Literal["simple", "complex"]
+FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed"]
+
+
+class ArenaConfig(Frozen):
+    """The place in which the robots drive."""
+
+    name: ArenaName = Field(
+        "simple",
+        title="Arena",
+        description="Simple: 10 x 10 m with nothing but walls. Complex: the same with 17 obstacles.",
+    )
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
+
+
+MAX_MAPS = 4096
+"""Maps of the largest pool; pools of different seeds never share a map."""
+
+
+class GeneratedArenaConfig(Frozen):
+    """A pool of arenas drawn from a seed; the robots are spread over all of them."""
+
+    name: FamilyName = Field(
+        "clutter",
+        title="Arena",
+        description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
+        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed.",
+    )
+    difficulty: float = Field(
+        0.5,
+        ge=0.0,
+        le=1.0,
+        title="Difficulty",
+        description="More obstacles and narrower passages: at 1 they are 0.9 m wide for the default robot.",
+    )
+    maps: int = Field(
+        64,
+        ge=1,
+        le=MAX_MAPS,
+        title="Maps",
+        description="Different arenas of the training; with few of them the policy learns them by heart.",
+        json_schema_extra=ADVANCED,
+    )
+    seed: int = Field(
+        0,
+        ge=0,
+        le=2**31 - 1,
+        title="Map seed",
+        description="Which maps; the suites' maps are never among them.",
+        json_schema_extra=ADVANCED,
+    )
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
+
+
+class ImportedArenaConfig(Frozen):
+    """An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash."""
+
+    name: Literal["imported"] = Field("imported", title="Imported", description="Read from a file; see the gallery.")
+    sha256: str = Field(
+        "", pattern="^([0-9a-f]{64})?$", title="Imported arena", description="The hash that the gallery shows."
+    )
+    arena: ArenaFile | None = Field(None, title="Geometry", json_schema_extra=HIDDEN)
+    movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
+
+    @model_validator(mode="after")
+    def _geometry_is_the_hashed_one(self) -> Self:
+        if self.arena is not None and self.arena.sha256 != self.sha256:
+            raise ValueError(f"the geometry's hash is {self.arena.sha256}, not {self.sha256!r}")
+        return self
+
+    @classmethod
+    def of(cls, arena: ArenaFile) -> Self:
+        """The configuration that carries this arena."""
+        return cls(sha256=arena.sha256, arena=arena)
+
+
+AnyArenaConfig = Annotated[ArenaConfig | GeneratedArenaConfig | ImportedArenaConfig, Field(discriminator="name")]

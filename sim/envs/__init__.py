@@ -1,0 +1,1 @@
+"""Gymnasium's interfaces to the world: one robot, many robots, their pictures and ids."""

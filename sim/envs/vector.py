@@ -1,0 +1,225 @@
+"""The navigation task as a Gymnasium vector environment: many robots stepped together."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box, Space
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from sim.arenas import Arena, build_task_arenas
+from sim.config import TaskConfig
+from sim.envs.render import render_robot
+from sim.kernels.bundles import REWARD_TERMS
+from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
+from sim.observations import observation_layout
+from sim.world import World
+
+Floats = NDArray[np.float32]
+Task = TaskConfig | Mapping[str, Any] | None
+"""A task, the values in which it differs from the default one, or None for the default one."""
+
+
+def read_task(task: Task) -> TaskConfig:
+    """The task meant; raises pydantic's ValidationError where a value is wrong."""
+    return task if isinstance(task, TaskConfig) else TaskConfig.model_validate(dict(task or {}))
+
+
+def single_spaces(task: TaskConfig) -> tuple[Space[Floats], Space[Floats]]:
+    """Observation and action space of one robot."""
+    numbers = observation_layout(task).numbers
+    observation: Space[Any] = Box(
+        np.array([number.low for number in numbers], dtype=np.float32),
+        np.array([number.high for number in numbers], dtype=np.float32),
+    )
+    action: Space[Any] = Box(np.array([0.0, -1.0], dtype=np.float32), np.array([1.0, 1.0], dtype=np.float32))
+    return observation, action
+
+
+def known_mode(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
+    """The render mode; raises ValueError where `metadata` has none of this name."""
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        raise ValueError(f"render_mode must be None or one of {metadata['render_modes']}, not {render_mode!r}")
+    return render_mode
+
+
+class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
+    """Robots that drive to targets by their LiDAR, each alone in its arena.
+
+    An *attempt* is the way to one target and ends with an arrival, a collision or a time-out. An arrival pays its reward
+    and brings a new target, and the episode goes on; a collision terminates the episode, a time-out truncates it. Both
+    start anew in the same step: the observation returned is the new episode's first, the last one is in
+    `final_observations` and in `infos["final_obs"]`.
+
+    Args:
+        task: arena, robot, LiDAR, observation, reward, limits.
+        num_envs: robots.
+        seed: of all that is random, until `reset` gives another; None takes one from the operating system.
+        render_mode: None, or "rgb_array" for pictures of the first robots.
+        copy: whether `step` and `reset` return copies; False returns the environment's own arrays, which the next step
+            overwrites.
+
+    Raises:
+        pydantic.ValidationError: a value of the task is wrong.
+        ArenaError: the robot does not fit into the arena.
+        ValueError: there is no such render mode, or not one robot.
+
+    >>> envs = NavigationVectorEnv(num_envs=4, seed=1)
+    >>> observations, infos = envs.reset()
+    >>> observations.shape
+    (4, 16)
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+        "render_modes": ["rgb_array"],
+        "render_fps": 5,
+    }
+
+    def __init__(
+        self,
+        task: Task = None,
+        num_envs: int = 1,
+        *,
+        seed: int | None = None,
+        render_mode: str | None = None,
+        copy: bool = True,
+    ) -> None:
+        if num_envs < 1:
+            raise ValueError(f"num_envs must be at least 1, not {num_envs}")
+        self.task = read_task(task)
+        self.num_envs = num_envs
+        self.render_mode = known_mode(render_mode, self.metadata)
+        self.single_observation_space, self.single_action_space = single_spaces(self.task)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._copy = copy
+        self._world = World(self.task, build_task_arenas(self.task), num_envs, seed=seed)
+        robots = self._world.robots
+        self.poses = robots.poses
+        """(N, 3) x, y in metres, heading in radians: in the robot's arena, after the step and its resets."""
+        self.targets = robots.targets
+        """(N, 2) metres."""
+        self.ranges = robots.ranges
+        """(N, rays) metres: the raw scan at `poses`."""
+        self.fields_of_view = self._world.fields_of_view
+        """(N,) degrees that each robot's rays cover in this episode, from which their angles follow (`sim.lidar`)."""
+        self.outcomes = robots.outcomes
+        """(N,) how the attempt that ended in this step ended: 1 arrival, 2 collision, 3 time-out; 0 where none did."""
+        self.final_observations = robots.final_observations
+        """(N, numbers) last observation of the episodes that ended in this step; meaningless elsewhere."""
+        self.reward_terms = robots.terms
+        """(N, terms) of this step's reward, named by `reward_term_names`."""
+        self.reward_term_names = REWARD_TERMS
+        records = robots.records
+        self.attempt_steps: NDArray[np.int32] = records["steps"]
+        """(N,) steps of the attempt that ended in this step, elsewhere of the one that goes on."""
+        self.attempt_rewards: NDArray[np.float64] = records["attempt_reward"]
+        """(N,) summed reward of that attempt."""
+        self.attempt_path_lengths: NDArray[np.float64] = records["path_length"]
+        """(N,) metres driven in that attempt."""
+        self.attempt_min_clearances: Floats = records["min_clearance"]
+        """(N,) smallest distance of the body from anything else in that attempt, metres."""
+        self.arena_indices: NDArray[np.int32] = records["map"]
+        """(N,) which of `arenas` each robot is in."""
+
+        self.discs = self._world.movers.discs
+        """(tiles, K, 5) movers of every copy of an arena: x, y, radius, and how far each came in the last step in x and y,
+        metres; a radius below zero is none. `tiles` says which row a robot meets."""
+
+    def tiles(self) -> NDArray[np.int32]:
+        """(N,) which copy of an arena each robot is in; modulo the number of arenas it is the arena."""
+        return self._world.tiles()
+
+    @property
+    def arenas(self) -> tuple[Arena, ...]:
+        """The arenas that robots start in."""
+        return self._world.arenas
+
+    def velocities(self) -> Floats:
+        """(N, 2) velocities of the last step, m/s and rad/s; zero for robots that have started anew in it."""
+        robots = self._world.robots
+        fractions = np.stack([robots.records["linear"], robots.records["angular"]], axis=1)
+        return np.asarray(fractions * robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]], dtype=np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Begin a new episode for every robot.
+
+        Args:
+            seed: start all random numbers anew from here.
+            options: `poses` (N, 3), `targets` (N, 2) and `arenas` (N,) place the robots; what is missing is drawn.
+
+        Returns:
+            Observations (N, numbers), and infos (empty).
+
+        Raises:
+            PlacementError: a pose or target does not fit, or an option is not known.
+        """
+        super().reset(seed=seed)
+        if seed is not None:
+            self._world.seed(seed)
+        self._world.reset_with(options)
+        observations = self._world.robots.observations
+        return (observations.copy() if self._copy else observations), {}
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Drive every robot for one control period.
+
+        Args:
+            actions: (N, 2) linear in [0, 1] and angular in [-1, 1], as fractions of the robot's limits; clipped.
+
+        Returns:
+            Observations (N, numbers), rewards (N,), terminations (N,), truncations (N,), and infos: where episodes ended
+            `final_obs` and `final_info`, each with its mask `_final_obs`, `_final_info`.
+
+        Raises:
+            ValueError: the actions have the wrong shape or are not finite.
+        """
+        actions = np.ascontiguousarray(actions, dtype=np.float32)
+        if actions.shape != (self.num_envs, 2):
+            raise ValueError(f"actions must have shape ({self.num_envs}, 2), not {actions.shape}")
+        self._world.step(actions)
+        robots = self._world.robots
+        results = (robots.observations, robots.rewards, robots.terminations, robots.truncations)
+        infos = self._infos() if robots.outcomes.any() else {}
+        if self._copy:
+            observations, rewards, terminations, truncations = results
+            return observations.copy(), rewards.copy(), terminations.copy(), truncations.copy(), infos
+        return (*results, infos)
+
+    def _infos(self) -> dict[str, Any]:
+        """What ended in this step, in Gymnasium's layout: values, and a mask that says where they mean something."""
+        robots = self._world.robots
+        attempts = {
+            "outcome": robots.outcomes.copy(),
+            "steps": self.attempt_steps.copy(),
+            "reward": self.attempt_rewards.copy(),
+            "path_length": self.attempt_path_lengths.copy(),
+            "min_clearance": self.attempt_min_clearances.copy(),
+        }
+        infos: dict[str, Any] = {"attempt": attempts, "_attempt": robots.outcomes > 0}
+        ended = robots.terminations | robots.truncations
+        if ended.any():
+            infos |= {"final_obs": robots.final_observations.copy(), "_final_obs": ended}
+            infos |= {"final_info": {"attempt": attempts, "_attempt": ended}, "_final_info": ended}
+        return infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """One picture of every robot, (height, width, 3) each; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(render_robot(self._world, index) for index in range(self.num_envs))
+
+    def get_state(self) -> dict[str, NDArray[Any]]:
+        """Everything that the future depends on, as plain arrays."""
+        return self._world.get_state()
+
+    def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `get_state` gave, bit for bit.
+
+        Raises:
+            ValueError: the state is of another task or number of robots.
+        """
+        self._world.set_state(state)

@@ -1,0 +1,116 @@
+"""Driving all scenarios of a suite side by side, by a policy or by a controller that knows more than a policy sees."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.config import TaskConfig
+from sim.errors import PlacementError, SuiteError
+from sim.suites.scenarios import scenario_world
+from sim.suites.suite import Suite
+from sim.world import World
+
+Floats = NDArray[np.float32]
+PolicyFunction = Callable[[Floats], Floats]
+"""Observations (n, numbers) to actions (n, 2)."""
+Observer = Callable[[NDArray[np.int64], World], None]
+"""Told before the first step, and after each one, the scenarios that were under way, and the world as it is now."""
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeTable:
+    """What a policy did in each of S scenarios, in the suite's order.
+
+    Attributes:
+        outcomes: (S,) 1 arrival, 2 collision, 3 time-out.
+        steps: (S,) control steps driven.
+        rewards: (S,) summed.
+        path_lengths: (S,) metres driven.
+        shortest_paths: (S,) metres, the suite's.
+        min_clearances: (S,) smallest distance of the body from anything else, metres.
+    """
+
+    outcomes: NDArray[np.uint8]
+    steps: NDArray[np.int32]
+    rewards: NDArray[np.float64]
+    path_lengths: NDArray[np.float64]
+    shortest_paths: NDArray[np.float64]
+    min_clearances: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """The robots that are still under way, for controllers that know more than an observation says.
+
+    Attributes:
+        observations: (n, numbers).
+        ranges: (n, rays) metres.
+        poses: (n, 3) x, y, heading.
+        targets: (n, 2).
+    """
+
+    observations: Floats
+    ranges: Floats
+    poses: Floats
+    targets: Floats
+
+
+def run_suite(policy: PolicyFunction, task: TaskConfig, suite: Suite, observer: Observer | None = None) -> EpisodeTable:
+    """Drive every scenario once with a policy that sees observations; see `run_controller`."""
+    return run_controller(lambda situation: policy(situation.observations), task, suite, observer)
+
+
+def run_controller(
+    controller: Callable[[Situation], Floats], task: TaskConfig, suite: Suite, observer: Observer | None = None
+) -> EpisodeTable:
+    """Drive every scenario once, all side by side.
+
+    Args:
+        controller: situations of the robots under way to their actions (n, 2); called with fewer robots as they finish.
+        task: robot, LiDAR, observation, reward and limits; the arenas are the suite's.
+        suite: the scenarios.
+        observer: looks on.
+
+    Raises:
+        SuiteError: the task's robot does not fit at a start of the suite.
+    """
+    world = scenario_world(task, suite.arenas, len(suite))
+    try:
+        world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
+    except PlacementError as error:
+        raise SuiteError(
+            f"suite {suite.name!r} has no room for this robot ({error}): use a smaller one, or the suite that "
+            "sim.suites.suite_for draws for it"
+        ) from error
+    robots = world.robots
+    outcomes = np.zeros(len(suite), dtype=np.uint8)
+    actions = np.zeros((len(suite), 2), dtype=np.float32)
+    ended = {name: robots.records[name].copy() for name in ("steps", "attempt_reward", "path_length", "min_clearance")}
+    active = np.arange(len(suite))
+    if observer is not None:
+        observer(active, world)
+    while len(active):
+        situation = Situation(
+            robots.observations[active], robots.ranges[active], robots.poses[active], robots.targets[active]
+        )
+        actions[active] = controller(situation)
+        world.step(actions)
+        if observer is not None:
+            observer(active, world)
+        done = active[robots.outcomes[active] > 0]
+        if len(done):
+            outcomes[done] = robots.outcomes[done]
+            for name, column in ended.items():
+                column[done] = robots.records[name][done]
+            world.park(done)
+            active = active[robots.outcomes[active] == 0]
+    return EpisodeTable(
+        outcomes=outcomes,
+        steps=ended["steps"],
+        rewards=ended["attempt_reward"],
+        path_lengths=ended["path_length"],
+        shortest_paths=suite.shortest_paths,
+        min_clearances=ended["min_clearance"],
+    )

@@ -1,0 +1,165 @@
+"""Frozen scenarios on which policies are compared.
+
+A suite's file in `sim/suites/data` holds where every scenario starts, its target and the length of the shortest path;
+`sim.suites.builder` is the procedure that made it. The hash covers scenarios and the geometry of their arenas: a suite that
+differs in anything is another suite, and a file that does not match its hash is refused.
+"""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arenas import Arena, arena_clearance, build_arenas
+from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, GeneratedArenaConfig, ImportedArenaConfig, TaskConfig
+from sim.errors import PlacementError, SuiteError
+from sim.suites.places import PLACES, GeneratedPlace, build_places, content_hash, suite_places
+from sim.suites.scenarios import draw_scenarios, own_scenarios
+
+# Maps and scenarios of a suite that is drawn for a task.
+_DRAWN_MAPS = 20
+_DRAWN_SCENARIOS = 200
+# Characters of an imported arena's name in the name of its suite.
+_NAME = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Suite:
+    """A frozen list of S scenarios.
+
+    Attributes:
+        name: such as `complex-200`.
+        hash: SHA-256 of the scenarios and the arenas' geometry.
+        arenas: the places.
+        arena_indices: (S,) the arena of each scenario.
+        starts: (S, 3) x, y, heading.
+        targets: (S, 2).
+        shortest_paths: (S,) metres, for the default robot's body around the obstacles.
+    """
+
+    name: str
+    hash: str
+    arenas: tuple[Arena, ...]
+    arena_indices: NDArray[np.int32]
+    starts: NDArray[np.float64]
+    targets: NDArray[np.float64]
+    shortest_paths: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+
+def suite_names() -> tuple[str, ...]:
+    """All suites, by name."""
+    files = (resources.files("sim.suites") / "data").iterdir()
+    return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
+
+
+@cache
+def load_suite(name: str) -> Suite:
+    """A suite by name.
+
+    Raises:
+        SuiteError: there is none of this name, or its content is not what its hash says.
+    """
+    if name not in suite_names():
+        raise SuiteError(f"there is no suite {name!r}; there are {', '.join(suite_names())}")
+    content = json.loads((resources.files("sim.suites") / "data" / f"{name}.json").read_text("utf-8"))
+    arenas = build_places(PLACES.validate_python(content["arenas"]))
+    if content_hash(arenas, content["scenarios"]) != content["hash"]:
+        raise SuiteError(
+            f"suite {name!r} is not what its hash says: its file or its arenas have changed. Restore them, or give the new "
+            "scenarios a new name (python -m sim.suites.builder NAME)"
+        )
+    return _suite(name, content["hash"], arenas, content["scenarios"])
+
+
+def _suite(name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> Suite:
+    table = np.array(scenarios, dtype=np.float64)
+    return Suite(
+        name=name,
+        hash=content,
+        arenas=arenas,
+        arena_indices=table[:, 0].astype(np.int32),
+        starts=table[:, 1:4],
+        targets=table[:, 4:6],
+        shortest_paths=table[:, 6],
+    )
+
+
+def suite_of(name: str, documents: Sequence[ArenaFile], task: TaskConfig | None = None) -> Suite:
+    """A suite of one scenario for each arena file: its own start and target.
+
+    Args:
+        name: of the suite.
+        documents: arenas with a start and a target, see `sim.arenas.files.load_arena`.
+        task: whose robot must fit there; the default one's if not given.
+
+    Raises:
+        PlacementError: an arena has no start or target, the robot does not fit there, or there is no way between them.
+    """
+    arenas, scenarios = build_places(documents), own_scenarios(documents, task)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+
+
+def suite_in(name: str, places: Sequence[GeneratedPlace], count: int) -> Suite:
+    """A suite of scenarios spread evenly over places, drawn as those of a frozen suite of this name would be."""
+    arenas = build_places(places)
+    scenarios = draw_scenarios(name, arenas, count)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+
+
+def suite_for(task: TaskConfig) -> Suite:
+    """The suite on which policies trained for a task are measured: a frozen one, or one drawn for its arena.
+
+    A drawn suite depends on the arena alone, so all policies that were trained for it meet the same scenarios: 20 generated
+    maps of the same family and difficulty, none of which is in any training, or the imported arena itself, whose own
+    start and target are the first scenario if it has them; with the movers of the training's arena. A robot that needs more
+    room than the default one gets a suite with that room, and its clearance in the suite's name.
+
+    Raises:
+        ArenaError: the robot has no room in the arena.
+    """
+    usual = TaskConfig()
+    fits = task.passable_clearance <= usual.passable_clearance
+    if fits and isinstance(task.arena, ArenaConfig) and not task.arena.movers.count:
+        return load_suite(f"{task.arena.name}-{_DRAWN_SCENARIOS}")
+    large = TaskConfig(robot=task.robot, collision_distance=task.collision_distance)
+    return _draw_suite(task.arena, usual if fits else large)
+
+
+def suite_named(name: str, task: TaskConfig) -> Suite:
+    """The task's own suite where it goes by that name, else the frozen one.
+
+    Raises:
+        SuiteError: there is none.
+    """
+    own = suite_for(task)
+    return own if own.name == name else load_suite(name)
+
+
+@lru_cache(maxsize=8)
+def _draw_suite(arena: AnyArenaConfig, task: TaskConfig) -> Suite:
+    """Scenarios for the robot and collision distance of `task`."""
+    usual = task.passable_clearance <= TaskConfig().passable_clearance
+    ending = f"{_DRAWN_SCENARIOS}" if usual else f"{task.passable_clearance:.2f}m-{_DRAWN_SCENARIOS}"
+    if isinstance(arena, GeneratedArenaConfig):
+        name = f"{arena.name}-{arena.difficulty:g}"
+        places = suite_places(arena.name, arena.difficulty, _DRAWN_MAPS, arena.movers)
+        arenas = build_places(places, clearance=arena_clearance(task))
+    else:
+        arenas = build_arenas(arena)
+        name = arenas[0].name[:_NAME]
+    if arena.movers.count:
+        name += f"-{arena.movers.count}-{arena.movers.kind}"
+    name += f"-{ending}"
+    scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS, task)
+    if isinstance(arena, ImportedArenaConfig) and arena.arena and arena.arena.start and arena.arena.target:
+        with suppress(PlacementError):  # a start or target that this robot does not fit at
+            scenarios[:1] = own_scenarios([arena.arena], task)
+    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)

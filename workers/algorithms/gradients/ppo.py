@@ -1,0 +1,96 @@
+"""The gradients of PPO's losses: by autograd, which reads as the paper does, and written out, which is faster on a CPU.
+
+The losses, over a minibatch of n samples (Schulman et al. 2017):
+
+    policy  -mean(min(r A, clip(r, 1 - eps, 1 + eps) A)) - c_entropy H,  r = pi(a|o) / pi_old(a|o)      Eq. 7 and 9
+    value   mean((V(o) - R)^2)                                                                         Eq. 9
+
+Actor and critic share nothing, so each gradient is that of its own loss and needs no weighing against the other.
+"""
+
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from workers.algorithms.storage.rollout import Samples
+from workers.kernels.ppo import LOG_SQRT_2PI, STATISTICS, differentiate
+from workers.networks.compiled import ROWS_AT_ONCE, passes_of
+from workers.networks.layout import ACTION_SIZE
+from workers.networks.modules import Body, GaussianActor
+
+
+class PpoGradients(Protocol):
+    """Fills the `.grad` of the actor's and the critic's parameters."""
+
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
+        """Overwrites the gradients.
+
+        Args:
+            samples: a rollout's.
+            rows: (n,) int64, those that are in the minibatch.
+
+        Returns:
+            (4,): policy loss (without the entropy bonus), value loss, estimate of KL(old, new), clipped fraction.
+        """
+
+
+def log_prob(noise: Tensor, log_std: Tensor) -> Tensor:
+    """Log density (n,) of a diagonal normal at mean + std * noise, for standard normal `noise` (n, 2)."""
+    return (-0.5 * noise.square() - log_std - LOG_SQRT_2PI).sum(-1)
+
+
+def entropy(log_std: Tensor) -> Tensor:
+    """Entropy of a diagonal normal, summed over its dimensions."""
+    return (log_std + 0.5 + LOG_SQRT_2PI).sum()
+
+
+class AutogradPpo:
+    """The reference."""
+
+    def __init__(self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float) -> None:
+        self._actor, self._critic = actor, critic
+        self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
+
+    @torch.enable_grad()
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
+        """See `PpoGradients`."""
+        batch = Samples(*(column[rows] for column in samples))
+        for parameter in (*self._actor.parameters(), *self._critic.parameters()):
+            if parameter.grad is not None:
+                parameter.grad.zero_()
+        log_std = self._actor.log_std
+        noise = (batch.actions - self._actor(batch.observations)) / torch.exp(log_std)
+        log_ratio = log_prob(noise, log_std) - batch.log_probs
+        ratio = torch.exp(log_ratio)
+        clipped = ratio.clamp(1.0 - self._clip_range, 1.0 + self._clip_range)
+        policy_loss = -torch.min(ratio * batch.advantages, clipped * batch.advantages).mean()
+        value_loss = (self._critic(batch.observations)[:, 0] - batch.returns).square().mean()
+        (policy_loss - self._entropy_coefficient * entropy(log_std) + value_loss).backward()
+        with torch.no_grad():
+            kl = (ratio - 1.0 - log_ratio).mean()
+            clip_fraction = (ratio != clipped).float().mean()
+            return torch.stack((policy_loss, value_loss, kl, clip_fraction))
+
+
+class WrittenPpo:
+    """The same gradients without autograd, on a CPU; a test compares them with `AutogradPpo`'s."""
+
+    def __init__(self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float) -> None:
+        log_std = actor.log_std
+        assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
+        self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
+        self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
+        self._actor, self._critic = passes_of(actor.network, ROWS_AT_ONCE), passes_of(critic, ROWS_AT_ONCE)
+
+    def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
+        """See `PpoGradients`."""
+        statistics, by_log_std = np.zeros(STATISTICS), np.full(ACTION_SIZE, -self._entropy_coefficient)
+        arrays = tuple(column.numpy() for column in samples)
+        differentiate(
+            self._actor, self._critic, arrays, rows.numpy(), ROWS_AT_ONCE,
+            self._log_std, self._clip_range, by_log_std, statistics,
+        )  # fmt: skip
+        self._by_log_std[:] = by_log_std
+        return torch.from_numpy(statistics)

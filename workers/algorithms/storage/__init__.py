@@ -1,0 +1,1 @@
+"""What algorithms keep of the steps that they learn from."""

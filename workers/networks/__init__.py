@@ -1,0 +1,1 @@
+"""The networks: as modules, as layouts of arrays, and as compiled passes."""

@@ -1,0 +1,1 @@
+"""A training: the loop, what it measures of itself, and its evaluations."""

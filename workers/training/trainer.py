@@ -1,0 +1,325 @@
+"""The training loop: collect, update, evaluate, report, save; the same for every algorithm."""
+
+import math
+import platform
+import time
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal, NoReturn
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from sim.envs.vector import NavigationVectorEnv
+from sim.observations import observation_layout
+from sim.suites import suite_for
+from workers.algorithms import build_algorithm
+from workers.algorithms.base import with_prefix, without_prefix
+from workers.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
+from workers.config import TrainingConfig
+from workers.errors import ArchiveMismatchError, NonFiniteError
+from workers.live.viewing import PolicyFunction, TrainingViewer, Unwatched
+from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.networks.layout import layout
+from workers.policy import Policy, torch_policy
+from workers.reporting import EvaluationResult, Reporter
+from workers.training.drives import drive
+from workers.training.evaluation import evaluate, evaluation_metrics
+from workers.training.metrics import TrainingMetrics
+
+TrainingOutcome = Literal["completed", "stopped"]
+
+# Five reports a second are smooth to the eye and cost nothing.
+REPORT_INTERVAL = 0.2
+"""Least wall time between two reports of metrics, in seconds."""
+
+# A failure is repeated within seconds, and a replay memory of millions is copied often enough.
+_REMEMBER_INTERVAL = 5.0
+
+
+def train(
+    config: TrainingConfig,
+    seed: int,
+    reporter: Reporter,
+    directory: Path,
+    resume: Path | None = None,
+    *,
+    viewer: TrainingViewer | None = None,
+    report_interval: float = REPORT_INTERVAL,
+) -> TrainingOutcome:
+    """Trains until the configured steps are done, or until the reporter asks to stop.
+
+    Sets torch to one thread: several trainings share a machine better than several threads share a small matrix.
+
+    Args:
+        config: what to train.
+        seed: of weights, exploration and environment.
+        reporter: where metrics, events, checkpoints and frames go, and who may ask to stop.
+        directory: for checkpoint archives, 'step-<n>.zip'.
+        resume: an archive of the same training, to continue bit for bit where it was written.
+        viewer: what makes frames; None is a training that nobody can watch.
+        report_interval: least wall time between two reports of metrics, in seconds.
+
+    Returns:
+        'completed', or 'stopped' when it was asked to; either way the last checkpoint holds the last weights.
+
+    Raises:
+        NonFiniteError: the weights are no longer finite numbers.
+        ArchiveError: `resume` is damaged, or belongs to another training.
+    """
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)  # Adam's moments of dead units decay into numbers that the processor handles slowly
+    viewer = viewer or Unwatched()
+    training = Training(config, seed, reporter, directory, viewer, report_interval)
+    try:
+        if resume is not None:
+            training.resume(resume)
+        return training.run()
+    finally:
+        viewer.close()
+        torch.set_flush_denormal(False)
+
+
+class Training:
+    """The state of one training and the stages of its loop."""
+
+    def __init__(
+        self,
+        config: TrainingConfig,
+        seed: int,
+        reporter: Reporter,
+        directory: Path,
+        viewer: TrainingViewer,
+        report_interval: float,
+    ) -> None:
+        self.config, self.seed, self.reporter, self.directory, self.viewer = config, seed, reporter, directory, viewer
+        self.report_interval = report_interval
+        self.suite = suite_for(config.task)
+        self.observation_layout = observation_layout(config.task)
+        self.algorithm = build_algorithm(config.algorithm, self.observation_layout.size, seed, _device(config.device))
+        self.env = NavigationVectorEnv(config.task, self.algorithm.robots, seed=seed, copy=False)
+        self.observations, _ = self.env.reset(seed=seed)
+        self.metrics = TrainingMetrics(self.algorithm.robots)
+        self.steps_per_update = self.algorithm.steps_per_update * self.algorithm.robots
+        self.total_updates = math.ceil(config.steps / self.steps_per_update)
+        self.step = self.updates = self.evaluations = 0
+        self.reported = self.saved = -1
+        self.remembered: Checkpoint | None = None
+        self.remembered_at = 0.0
+
+    def run(self) -> TrainingOutcome:
+        """The loop."""
+        while self.updates < self.total_updates:
+            if self.reporter.stop_requested:
+                self.report(None)
+                self.save(None)
+                return "stopped"
+            self.remember()
+            self.collect()
+            self.update()
+            if self.evaluation_due:
+                result = self.evaluate()
+                self.report(result)
+                if self.checkpoint_due:
+                    self.save(result)
+            elif self.reported < 0 or self.metrics.seconds >= self.report_interval:
+                self.report(None)
+        return "completed"
+
+    def collect(self) -> None:
+        """Steps of all robots with the exploring policy, remembered by the algorithm."""
+        algorithm, env = self.algorithm, self.env
+        inference = simulation = 0.0
+        clock: Callable[[], float] = time.perf_counter
+        for _ in range(algorithm.steps_per_update):
+            started = clock()
+            actions = algorithm.act(self.observations)
+            acted = clock()
+            self.observations, rewards, terminations, truncations, _ = env.step(actions)
+            stepped = clock()
+            algorithm.record(self.observations, rewards, terminations, truncations, env.final_observations)
+            self.metrics.step(env, self.observations, actions, rewards)
+            self.step += algorithm.robots
+            self.viewer.on_step(env, self.step)
+            simulation += stepped - acted
+            inference += clock() - stepped + acted - started
+        self.metrics.spend("simulation", simulation)
+        self.metrics.spend("inference", inference)
+
+    def update(self) -> None:
+        """One update of the algorithm."""
+        with self.metrics.phase("update"):
+            diagnostics = self.algorithm.update(self.updates / self.total_updates)
+            self.updates += 1
+        self.metrics.update(diagnostics)
+        if not self.algorithm.finite:
+            self.fail()
+        self.viewer.on_weights(lambda: self.policy(Policy), self.step)
+
+    def fail(self) -> NoReturn:
+        """The weights are no longer numbers: says so, and saves the last state that was remembered before it.
+
+        Resuming that checkpoint repeats the failure bit for bit: a training depends on state and configuration only.
+        """
+        self.metrics.update({"policy/finite": 0.0})
+        self.report(None)
+        assert self.remembered is not None
+        step = self.remembered.counters.step
+        if step != self.saved:
+            archive = self.directory / f"step-{step}.zip"
+            write_checkpoint(archive, self.remembered)
+            self.reporter.checkpoint(step, archive, None)
+        raise NonFiniteError(
+            f"the weights became infinite or NaN in the update at step {self.step}: lower the learning rate or the gradient "
+            f"clipping, check the reward's size; resuming the checkpoint of step {step} repeats it"
+        )
+
+    @property
+    def evaluation_due(self) -> bool:
+        """Whether an evaluation step was passed since the last one, or the training is at its end."""
+        passed = self.step // self.config.evaluation.every_steps
+        return passed > self.evaluations or self.updates == self.total_updates
+
+    @property
+    def checkpoint_due(self) -> bool:
+        """Whether the evaluation just made keeps a checkpoint."""
+        evaluation = self.config.evaluation
+        interval = evaluation.every_steps * evaluation.evaluations_per_checkpoint
+        return self.updates == self.total_updates or self.step // interval > max(self.saved, 0) // interval
+
+    def evaluate(self) -> EvaluationResult:
+        """The deterministic policy on the task's frozen suite."""
+        with self.metrics.phase("evaluation"):
+            self.evaluations = self.step // self.config.evaluation.every_steps
+            return evaluate(self.policy(torch_policy), self.config.task, self.suite)
+
+    def drive(self) -> dict[str, float]:
+        """The finished policy as the paper's tables measure one, where the training asks for that."""
+        config = self.config.evaluation
+        if not config.drives or self.updates < self.total_updates:
+            return {}
+        with self.metrics.phase("evaluation"):
+            return drive(self.policy(torch_policy), self.config.task, config.drives, config.drive_steps).metrics()
+
+    def policy(self, runner: Callable[..., PolicyFunction]) -> PolicyFunction:
+        """A copy of the newest deterministic policy."""
+        return runner(self.config.algorithm.network, self.algorithm.policy_weights())
+
+    def report(self, result: EvaluationResult | None) -> None:
+        """Everything since the last report, and the evaluation of this step if there is one."""
+        if self.metrics.empty:
+            return
+        measured = {} if result is None else {**evaluation_metrics(result), **self.drive()}
+        values = self.metrics.flush()
+        values.update(measured)
+        with self.metrics.phase("reporting"):
+            self.reporter.metrics(self.step, values)
+        self.reported = self.step
+
+    def remember(self) -> None:
+        """Keeps a copy of the whole state now and then, from which a failure can be repeated."""
+        now = time.monotonic()
+        if self.remembered is None or now - self.remembered_at >= _REMEMBER_INTERVAL:
+            self.remembered, self.remembered_at = self.checkpoint(None), now
+
+    def checkpoint(self, result: EvaluationResult | None) -> Checkpoint:
+        """A copy of the whole state; `result` belongs to exactly these weights."""
+        counters = TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
+        return Checkpoint(self._manifest(result), self.algorithm.policy_weights(), self._arrays(), counters)
+
+    def save(self, result: EvaluationResult | None) -> None:
+        """A checkpoint of this step, unless there is one."""
+        if self.saved == self.step:
+            return
+        with self.metrics.phase("reporting"):
+            archive = self.directory / f"step-{self.step}.zip"
+            write_checkpoint(archive, self.checkpoint(result))
+            self.reporter.checkpoint(self.step, archive, result)
+        self.saved = self.step
+
+    def resume(self, archive: Path) -> None:
+        """Continues where the archive was written.
+
+        Raises:
+            ArchiveMismatchError: it belongs to another training.
+        """
+        checkpoint = read_checkpoint(archive)
+        theirs, ours = checkpoint.manifest.training, self.config
+        if (theirs.task, theirs.algorithm, checkpoint.manifest.seed) != (ours.task, ours.algorithm, self.seed):
+            raise ArchiveMismatchError(
+                f"{archive.name} is of a training with another task, algorithm or seed: resume it with its own configuration"
+            )
+        self.algorithm.load_state(without_prefix("algorithm", checkpoint.arrays))
+        self.env.set_state(without_prefix("environment", checkpoint.arrays))
+        self.observations = np.array(checkpoint.arrays["observations"], np.float32)
+        counters = checkpoint.counters
+        self.step, self.updates, self.evaluations = counters.step, counters.updates, counters.evaluations
+        self.reported = self.saved = counters.step
+        self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots)
+        self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
+
+    def _arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {
+            **with_prefix("algorithm", self.algorithm.state()),
+            **with_prefix("environment", self.env.get_state()),
+            "observations": self.observations.copy(),
+        }
+
+    def _manifest(self, result: EvaluationResult | None) -> Manifest:
+        robot = self.config.task.robot
+        return Manifest(
+            training=self.config,
+            seed=self.seed,
+            step=self.step,
+            observation=Observation(
+                name=self.observation_layout.name,
+                version=self.observation_layout.version,
+                numbers=tuple(
+                    Number(index=index, name=number.name, meaning=number.formula, low=number.low, high=number.high)
+                    for index, number in enumerate(self.observation_layout.numbers)
+                ),
+            ),
+            action=(
+                Number(index=0, name="linear", meaning=f"x {robot.max_linear_speed} m/s forwards", low=0.0, high=1.0),
+                Number(
+                    index=1,
+                    name="angular",
+                    meaning=f"x {robot.max_angular_speed} rad/s, positive to the left",
+                    low=-1.0,
+                    high=1.0,
+                ),
+            ),
+            network=layout(self.config.algorithm.network),
+            evaluation=_summary(result),
+            versions=_versions(),
+            files={},
+        )
+
+
+def _summary(result: EvaluationResult | None) -> EvaluationSummary | None:
+    if result is None:
+        return None
+    return EvaluationSummary(
+        suite=result.suite,
+        suite_hash=result.suite_hash,
+        episodes=len(result.episodes),
+        arrivals=sum(episode.outcome == "arrival" for episode in result.episodes),
+    )
+
+
+def _device(name: Literal["auto", "cpu", "cuda"]) -> torch.device:
+    if name == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    return torch.device(name)
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for package in ("mapless", "torch", "numpy", "pymunk"):
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:  # run from a source tree that is not installed
+            versions[package] = "unknown"
+    return versions
