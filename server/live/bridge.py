@@ -15,8 +15,8 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from server.live.gate import KEY
 from server.live.page import VISER_PROTOCOL
+from server.scene.gate import KEY
 
 ALLOWED_FROM_BROWSERS = frozenset({"ViewerCameraMessage"})
 # A camera's pose takes about 300 bytes.

@@ -24,11 +24,11 @@ from websockets.sync.client import connect as connect_websocket
 from websockets.typing import Subprotocol
 
 from server.live.bridge import may_pass
-from server.live.gate import KEY
 from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
 from server.live.settings import LiveSettings
 from server.live.view import LiveView
+from server.scene.gate import KEY
 from server.scene.quiet import start_viser, stop_viser
 from server.scene.robots import RobotNodes
 from server.scene.scene import Scene
