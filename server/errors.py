@@ -13,6 +13,7 @@ ServiceError                        500
 ├── TooManyAttemptsError            429  too many wrong tokens
 ├── ExportFailedError               500  a policy could not be exported faithfully
 ├── ReplayFailedError               500  an evaluation could not be driven again
+├── DatabaseBusyError               503  other writers take too long
 ├── ExportTimeoutError              503  exporting took too long
 └── ReplayTimeoutError              503  driving an evaluation again took too long
 """
@@ -99,6 +100,12 @@ class TooManyAttemptsError(ServiceError):
     """Too many wrong tokens from one address."""
 
     status = 429
+
+
+class DatabaseBusyError(ServiceError):
+    """Other writers hold the database for too long; later they may not."""
+
+    status = 503
 
 
 class ExportFailedError(ServiceError):

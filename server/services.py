@@ -18,6 +18,7 @@ from server.replays.recordings import RecordingStore
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
+from server.worker_api.leases import Leases
 
 
 @dataclass
@@ -35,10 +36,12 @@ class Services:
     links: Links = field(default_factory=NoLinks)
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
+    leases: Leases = field(init=False)
     login_limiter: GuessLimiter = field(default_factory=GuessLimiter)
 
     def __post_init__(self) -> None:
         self.drivers = PolicyDrivers(self.live)
+        self.leases = Leases(self.settings.lease_seconds)
 
 
 def _services(connection: HTTPConnection) -> Services:

@@ -5,7 +5,7 @@ import contextlib
 import logging
 import time
 from collections import defaultdict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
@@ -15,6 +15,8 @@ from server.experiments.stored import training_of
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
+from server.worker_api.ingest import Ingest
+from server.worker_api.leases import Attempt
 from server.worker_api.links import OpenLinks
 from server.worker_api.service import WorkerService
 from workers.protocol import HEARTBEAT_SECONDS, queue_of
@@ -29,54 +31,57 @@ _HEARTBEATS = 3
 
 
 class Sweeper:
-    """Looks at all runs at regular intervals; the clock is the caller's, so that time can be told in a test."""
+    """Looks at all runs at regular intervals.
 
-    def __init__(self, services: Services) -> None:
+    Args:
+        services: of the server.
+        clock: seconds that only grow, however the wall clock is set.
+    """
+
+    def __init__(self, services: Services, clock: Callable[[], float] = time.monotonic) -> None:
         self._services = services
+        self._clock = clock
         self._service = WorkerService(services)
         self._lease_seconds = services.settings.lease_seconds
         self._swept_at: float | None = None
-        self._rung_at: dict[str, float] = {}
+        self._quiet_since: dict[Attempt, float] = {}
 
     @property
     def interval(self) -> float:
         """Seconds between two sweeps."""
         return self._lease_seconds / _SWEEPS_PER_LEASE
 
-    def sweep(self, now: float) -> None:
+    def sweep(self) -> None:
         """One look at everything.
 
-        After a time in which nobody swept (the server was down, the laptop asleep) the workers could not have been heard, so
-        their leases are prolonged first.
+        After a time in which nobody swept (the server was stopped, the laptop asleep) the workers could not have been heard,
+        so they all have a whole lease again.
         """
+        now = self._clock()
         first = self._swept_at is None
-        if self._swept_at is None or now - self._swept_at > self._lease_seconds / 2:
-            self._extend_leases(now)
-        else:
-            self._service.lose_expired(now)
+        if self._swept_at is not None and now - self._swept_at > self._lease_seconds / 2:
+            self._services.leases.renew_all()
         self._swept_at = now
+        self._service.lose_expired()
         self._ring_again(now, everybody=first)
-
-    def _extend_leases(self, now: float) -> None:
-        with self._services.database.write() as session:
-            RunRepository(session).extend_leases(now + self._lease_seconds)
 
     def _ring_again(self, now: float, *, everybody: bool) -> None:
         """Ring for runs that wait although somebody could train them; at start for all that wait."""
+        moment = time.time()
         with self._services.database.read() as session:
             waiting = RunRepository(session).queued()
-            idle = WorkerRepository(session).idle_by_queue(now - _HEARTBEATS * HEARTBEAT_SECONDS)
+            idle = WorkerRepository(session).idle_by_queue(moment - _HEARTBEATS * HEARTBEAT_SECONDS, moment)
+        # Whoever queued a run has rung for it: one that is new here was rung a moment ago.
+        quiet_since = {(run.id, run.attempt): self._quiet_since.get((run.id, run.attempt), now) for run in waiting}
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
             queue = queue_of(training_of(run.experiment))
-            quiet_since = max(run.queued_at, self._rung_at.get(run.id, 0.0))
-            overdue = now - quiet_since >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)
+            overdue = now - quiet_since[run.id, run.attempt] >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)
             if everybody or overdue:
-                self._rung_at[run.id] = now
+                quiet_since[run.id, run.attempt] = now
                 self._services.doorbell.ring(run.id, run.attempt, queue)
                 rung[queue] += 1
-        known = {run.id for run in waiting}
-        self._rung_at = {run_id: at for run_id, at in self._rung_at.items() if run_id in known}
+        self._quiet_since = quiet_since
 
 
 @asynccontextmanager
@@ -86,7 +91,8 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     await run_in_threadpool(prepare_broker, broker_url, prefix)
     doorbell = CeleryDoorbell(broker_url, prefix)
     services.doorbell = doorbell
-    services.links = OpenLinks(asyncio.get_running_loop())
+    ingest = Ingest(WorkerService(services).receive)
+    services.links = OpenLinks(asyncio.get_running_loop(), ingest)
     task = asyncio.create_task(_sweep_regularly(Sweeper(services)))
     try:
         yield
@@ -94,13 +100,14 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await task
+        await ingest.close()
         await run_in_threadpool(doorbell.close)
 
 
 async def _sweep_regularly(sweeper: Sweeper) -> None:
     while True:
         try:
-            await run_in_threadpool(sweeper.sweep, time.time())
+            await run_in_threadpool(sweeper.sweep)
         except Exception:
             # Leases must expire for all runs, whatever is wrong with one of them, or with the database for a while.
             logger.exception("a sweep failed: the next one tries again")

@@ -2,11 +2,12 @@
 
 SQLite runs in WAL mode, where readers and the one writer don't wait for one another. A transaction that means to write
 takes the write lock at its start (BEGIN IMMEDIATE): one that started as a reader could only fail when it upgrades, where
-this one waits.
+this one waits. Within this process writers queue up in front of it: SQLite's own lock is polled, and where forty threads
+poll, chance decides who waits until the time-out.
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 from typing import Any
@@ -16,8 +17,12 @@ from sqlalchemy.engine import Engine
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from server.database.fair_lock import FairLock
+
 # How long a writer waits for another one; a transaction of ours takes milliseconds.
 _BUSY_TIMEOUT_MS = 10_000
+# How long one waits in the queue of this process: several transactions of other programs' length.
+_TURN_SECONDS = 30.0
 # FastAPI runs synchronous endpoints on up to 40 threads.
 _POOL_SIZE = 10
 _POOL_OVERFLOW = 40
@@ -34,6 +39,7 @@ class Database:
         if self.engine.dialect.name == "postgresql":
             # All of a block sees one state; in SQLite every transaction does.
             read_only |= {"postgresql_readonly": True, "isolation_level": "REPEATABLE READ"}
+        self._turn = FairLock() if self.engine.dialect.name == "sqlite" else None
         self._read_engine = self.engine.execution_options(**read_only)
 
     @contextmanager
@@ -44,8 +50,13 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """A transaction that commits at the end of the block and rolls back if the block raises."""
-        with Session(self.engine, expire_on_commit=False) as session, session.begin():
+        """A transaction that commits at the end of the block and rolls back if the block raises.
+
+        Raises:
+            DatabaseBusyError: other writers took too long.
+        """
+        turn = self._turn.held(_TURN_SECONDS) if self._turn else nullcontext()
+        with turn, Session(self.engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     def ping(self) -> None:

@@ -35,7 +35,7 @@ class Experiment(Base):
 
 
 class Run(Base):
-    """One seed's training. (state, attempt, lease_until) is what a worker's claim compares and sets.
+    """One seed's training. (state, attempt) is what a worker's claim compares and sets.
 
     `attempt` is the fencing token: it grows by one with every claim, and a message of an older attempt is refused.
     """

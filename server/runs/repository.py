@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 
-from sqlalchemy import func, select, update
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, joinedload
 
 from server.database import tables
@@ -24,13 +24,31 @@ class RunRepository:
         Raises:
             NotFoundError: there is none.
         """
-        query = select(tables.Run).where(tables.Run.id == run_id).options(joinedload(tables.Run.experiment))
-        if for_update:
-            query = query.with_for_update(of=tables.Run)
-        run = self._session.scalar(query)
+        run = self.find(run_id, for_update=for_update)
         if run is None:
             raise NotFoundError.of("run", run_id)
         return run
+
+    def find(self, run_id: str, *, for_update: bool = False) -> tables.Run | None:
+        """As `get`; None if there is none."""
+        query = select(tables.Run).where(tables.Run.id == run_id).options(joinedload(tables.Run.experiment))
+        if for_update:
+            query = query.with_for_update(of=tables.Run)
+        return self._session.scalar(query)
+
+    def several(
+        self, run_ids: Collection[str], *, for_update: bool = False, with_experiments: bool = False
+    ) -> dict[str, tables.Run]:
+        """Those of the runs that there are, by id.
+
+        Rows are locked in the order of their ids, so that two who want some of the same don't wait for one another.
+        """
+        query = select(tables.Run).where(tables.Run.id.in_(run_ids)).order_by(tables.Run.id)
+        if with_experiments:
+            query = query.options(joinedload(tables.Run.experiment))
+        if for_update:
+            query = query.with_for_update(of=tables.Run)
+        return {run.id: run for run in self._session.scalars(query)}
 
     def latest_metrics(self, run_ids: Collection[str], names: Collection[str]) -> dict[str, dict[str, float]]:
         """The newest value of each of `names`, by run and name; what a run never reported is absent."""
@@ -56,21 +74,10 @@ class RunRepository:
         query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
         return self._session.scalars(query.order_by(tables.Run.queued_at, tables.Run.id)).all()
 
-    def with_expired_lease(self, now: float) -> Sequence[tables.Run]:
-        """The runs whose worker has not been heard of for longer than its lease, with their experiments, locked."""
-        query = (
-            select(tables.Run)
-            .where(tables.Run.state.in_(ACTIVE), tables.Run.lease_until < now)
-            .options(joinedload(tables.Run.experiment))
-            .with_for_update(of=tables.Run)
-        )
-        return self._session.scalars(query).all()
-
-    def extend_leases(self, until: float) -> None:
-        """Let every lease last until then at least."""
-        self._session.execute(
-            update(tables.Run).where(tables.Run.state.in_(ACTIVE), tables.Run.lease_until < until).values(lease_until=until)
-        )
+    def active_attempts(self) -> list[tuple[str, int]]:
+        """Id and attempt of every run that a worker has."""
+        query = select(tables.Run.id, tables.Run.attempt).where(tables.Run.state.in_(ACTIVE))
+        return [(run_id, attempt) for run_id, attempt in self._session.execute(query)]
 
     def count_by_state(self) -> dict[str, int]:
         """How many runs are in each state; a state without any is absent."""

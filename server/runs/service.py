@@ -99,7 +99,6 @@ def resume_run(session: Session, run: tables.Run) -> None:
     run.state = states.next_state(run.state, "resume")
     run.error = None
     run.losses = 0
-    run.lease_until = None
     run.finished_at = None
     run.queued_at = time.time()
     RunRepository(session).add_event(run.id, "info", "Resume requested.", run.step)

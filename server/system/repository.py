@@ -25,12 +25,15 @@ class WorkerRepository:
         """Note that a worker of this queue has just been heard of."""
         self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment))
 
-    def idle_by_queue(self, moment: float) -> dict[Queue, int]:
-        """How many workers heard of since `moment` train nothing, by queue; a queue without any is absent."""
+    def idle_by_queue(self, since: float, until: float) -> dict[Queue, int]:
+        """How many workers heard of between these moments train nothing, by queue; a queue without any is absent.
+
+        One heard of in the future was heard before the clock was set back, and not since.
+        """
         busy = select(tables.Run.worker).where(tables.Run.state.in_(ACTIVE), tables.Run.worker.is_not(None))
         query = (
             select(tables.Worker.queue, func.count())
-            .where(tables.Worker.last_seen >= moment, tables.Worker.name.not_in(busy))
+            .where(tables.Worker.last_seen.between(since, until), tables.Worker.name.not_in(busy))
             .group_by(tables.Worker.queue)
         )
         return {row[0]: row[1] for row in self._session.execute(query)}

@@ -1,7 +1,7 @@
-"""How an attempt begins, is kept alive and ends, as changes to a run's row within the caller's transaction.
+"""How an attempt begins and ends, as changes to a run's row within the caller's transaction.
 
-The attempt's number is the fencing token: `renew` refuses every older one, so whatever a worker says after it has lost its
-run changes nothing.
+The attempt's number is the fencing token: `unfenced` refuses every older one, so whatever a worker says after it has lost
+its run changes nothing.
 """
 
 import time
@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
-from server.errors import ConflictError
+from server.errors import ConflictError, NotFoundError
 from server.metrics.repository import MetricRepository
 from server.runs import states
 from server.runs.repository import RunRepository
@@ -24,9 +24,7 @@ class FencedError(ConflictError):
     """The attempt is over: a newer one runs, its lease ran out, or the run has ended or was deleted."""
 
 
-def begin(
-    session: Session, run: tables.Run, worker: str, published_attempt: int, lease_seconds: float
-) -> tables.Checkpoint | None:
+def begin(session: Session, run: tables.Run, worker: str, published_attempt: int) -> tables.Checkpoint | None:
     """Give the run to a worker; what was reported beyond its last checkpoint is dropped.
 
     Returns:
@@ -44,7 +42,6 @@ def begin(
     run.state = states.next_state(run.state, "claim")
     run.attempt += 1
     run.worker = worker
-    run.lease_until = now + lease_seconds
     run.started_at = run.started_at or now
     run.step = checkpoint.step if checkpoint else 0
     # A step of its own for a fresh start: points at step 0 go too.
@@ -54,15 +51,17 @@ def begin(
     return checkpoint
 
 
-def renew(run: tables.Run, attempt: int, lease_seconds: float) -> None:
-    """Prolong the lease, as every message of the worker does.
+def unfenced(run: tables.Run | None, run_id: str, attempt: int) -> tables.Run:
+    """The run, if it is this attempt's.
 
     Raises:
-        FencedError: the attempt is over.
+        FencedError: the attempt is over, or the run was deleted.
     """
+    if run is None:
+        raise FencedError(NotFoundError.of("run", run_id).message)
     if run.attempt != attempt or run.state not in states.ACTIVE:
         raise FencedError(f"Attempt {attempt} of run {run.id} is over: it is {run.state} at attempt {run.attempt}.")
-    run.lease_until = time.time() + lease_seconds
+    return run
 
 
 def end(session: Session, run: tables.Run, final: Final) -> None:
@@ -114,7 +113,6 @@ def progressed(run: tables.Run) -> None:
 def _settle(run: tables.Run) -> None:
     """What holds for every run that no worker has."""
     now = time.time()
-    run.lease_until = None
     run.worker = None
     if run.state in states.FINISHED:
         run.finished_at = now

@@ -18,6 +18,7 @@ from server.services import Services, ServicesDep
 from server.worker_api.attempts import FencedError
 from server.worker_api.batches import read_batch
 from server.worker_api.errors import MalformedUploadError
+from server.worker_api.ingest import Ingest, Report
 from server.worker_api.links import OpenLink, OpenLinks
 from server.worker_api.service import WorkerService
 from workers.frames import FrameError
@@ -85,19 +86,19 @@ def get_checkpoint(checkpoint_id: str, service: WorkerServiceDep) -> StreamingRe
 async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, services: ServicesDep) -> None:
     """The link of a run: batches and frames come in, orders go out (`workers.protocol`)."""
     await websocket.accept()
-    service = WorkerService(services)
+    assert isinstance(services.links, OpenLinks)
     opened = OpenLink(websocket)
     try:
-        opened.tell(await run_in_threadpool(service.receive, run_id, attempt, Batch()))
+        opened.tell(await services.links.ingest.receive(Report(run_id, attempt, Batch())))
     except FencedError:
         await websocket.close(CLOSE_FENCED, "this attempt is over")
         return
-    assert isinstance(services.links, OpenLinks)
+    services.leases.renew(run_id, attempt)
     services.links.add(run_id, opened)
     detach = services.live.attach(run_id, opened.watch)
     writer = asyncio.create_task(opened.write())
     try:
-        await _receive(websocket, run_id, attempt, services, opened)
+        await _receive(websocket, run_id, attempt, services, services.links.ingest, opened)
     finally:
         detach()
         services.links.remove(run_id, opened)
@@ -106,19 +107,21 @@ async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, service
             await writer
 
 
-async def _receive(websocket: WebSocket, run_id: str, attempt: int, services: Services, opened: OpenLink) -> None:
+async def _receive(
+    websocket: WebSocket, run_id: str, attempt: int, services: Services, ingest: Ingest, opened: OpenLink
+) -> None:
     """Take in what the worker sends until the link ends."""
-    service = WorkerService(services)
     try:
         while True:
             message = await websocket.receive()
             if message["type"] == "websocket.disconnect":
                 return
+            services.leases.renew(run_id, attempt)
             if (frame := message.get("bytes")) is not None:
                 services.live.frames(run_id, frame)
             else:
                 batch, refused = read_batch(message["text"])
-                opened.tell(await run_in_threadpool(service.receive, run_id, attempt, batch, refused))
+                opened.tell(await ingest.receive(Report(run_id, attempt, batch, refused)))
     except FencedError:
         opened.fence()
         # The worker answers the close; waiting for that lets it arrive.

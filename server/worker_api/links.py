@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
+from server.worker_api.ingest import Ingest
 from workers.protocol import CLOSE_FENCED, Orders
 from workers.reporting import WatchRequest
 
@@ -67,9 +68,14 @@ class OpenLink:
 
 
 class OpenLinks:
-    """The `Links` of a server with workers, by run."""
+    """The `Links` of a server with workers, by run.
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+    Attributes:
+        ingest: where what they report goes.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, ingest: Ingest) -> None:
+        self.ingest = ingest
         self._loop = loop
         self._by_run: dict[str, OpenLink] = {}
 

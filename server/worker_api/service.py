@@ -1,8 +1,9 @@
 """What workers may do, each in one transaction, and what follows from it for everybody else."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from server.arenas.references import with_geometry
@@ -13,6 +14,7 @@ from server.events.bus import Change, ChangeKind
 from server.experiments.stored import read_training
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
+from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService
 from server.services import Services
@@ -21,8 +23,8 @@ from server.worker_api import attempts
 from server.worker_api.attempts import FencedError
 from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
+from server.worker_api.ingest import Outcome, Report
 from workers.protocol import (
-    Batch,
     CheckpointReference,
     CheckpointUpload,
     Claim,
@@ -32,7 +34,6 @@ from workers.protocol import (
     Heartbeat,
     MetricItem,
     Orders,
-    Refusal,
 )
 
 # Compaction is looked at once in so many items: counting rows costs a query.
@@ -44,7 +45,6 @@ class WorkerService:
 
     def __init__(self, services: Services) -> None:
         self._services = services
-        self._lease_seconds = services.settings.lease_seconds
 
     def heartbeat(self, heartbeat: Heartbeat) -> None:
         """Note that a worker is there."""
@@ -61,7 +61,7 @@ class WorkerService:
         problem: str | None = None
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
-            checkpoint = attempts.begin(session, run, request.worker, request.published_attempt, self._lease_seconds)
+            checkpoint = attempts.begin(session, run, request.worker, request.published_attempt)
             stored = read_training(run.experiment.training)
             training = stored.training
             if stored.unreadable:
@@ -80,42 +80,71 @@ class WorkerService:
                 checkpoint=CheckpointReference(id=checkpoint.id, step=checkpoint.step, sha256=checkpoint.sha256)
                 if checkpoint
                 else None,
-                lease_seconds=self._lease_seconds,
+                lease_seconds=self._services.settings.lease_seconds,
             )
+        self._services.leases.renew(run_id, claim.attempt)
         self._publish(run, "run")
         if problem is not None:
             raise ConflictError(problem)
         return claim
 
-    def receive(self, run_id: str, attempt: int, batch: Batch, refused: Refusal | None = None) -> Orders:
-        """Store what a worker reports, once, and renew its lease.
+    def receive(self, reports: Sequence[Report]) -> list[Outcome]:
+        """Store what workers report, once, all in one transaction.
 
-        Args:
-            run_id: the run.
-            attempt: the worker's.
-            batch: what it reports.
-            refused: what came behind the batch and can never be stored.
+        Where the transaction fails, each report gets one of its own: what is wrong with one is no other's trouble.
 
-        Raises:
-            FencedError: the attempt is over.
+        Returns:
+            For each report what its worker is to know, or why it was not stored: FencedError if the attempt is over.
         """
-        with self._services.database.write() as session:
-            run = self._renewed(session, run_id, attempt)
-            batch, gap = in_turn(batch, run.last_seq)
-            fresh = list(batch.items)
-            self._store(session, run, fresh)
-            if batch.final is not None:
-                attempts.end(session, run, batch.final)
-            orders = Orders(
-                ack=run.last_seq, refused=gap or refused, stop=run.state == "stopping", over=batch.final is not None
+        try:
+            return self._receive(reports)
+        except OperationalError as error:
+            # The database is away or busy, for everybody.
+            return [error] * len(reports)
+        except Exception as error:
+            if len(reports) == 1:
+                return [error]
+            return [outcome for report in reports for outcome in self.receive([report])]
+
+    def _receive(self, reports: Sequence[Report]) -> list[Outcome]:
+        outcomes: list[Outcome] = []
+        changes: dict[Change, None] = {}
+        ended: list[tables.Run] = []
+        # A sign of life alone changes nothing in the database.
+        is_read = not any(report.batch.items or report.batch.final for report in reports)
+        with self._services.database.read() if is_read else self._services.database.write() as session:
+            runs = RunRepository(session).several(
+                {report.run_id for report in reports},
+                for_update=not is_read,
+                with_experiments=any(report.batch.final for report in reports),
             )
-        if any(isinstance(item, MetricItem) for item in fresh):
-            self._publish(run, "metrics")
-        if batch.final is not None:
+            for report in reports:
+                try:
+                    run = attempts.unfenced(runs.get(report.run_id), report.run_id, report.attempt)
+                except FencedError as error:
+                    outcomes.append(error)
+                    continue
+                batch, gap = in_turn(report.batch, run.last_seq)
+                self._store(session, run, batch.items)
+                if batch.final is not None:
+                    attempts.end(session, run, batch.final)
+                    ended.append(run)
+                outcomes.append(
+                    Orders(
+                        ack=run.last_seq,
+                        refused=gap or report.refused,
+                        stop=run.state == "stopping",
+                        over=batch.final is not None,
+                    )
+                )
+                for item in batch.items:
+                    kind: ChangeKind = "metrics" if isinstance(item, MetricItem) else "run"
+                    changes[Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind)] = None
+        for change in changes:
+            self._services.bus.publish(change)
+        for run in ended:
             self._announce(run)
-        elif any(isinstance(item, EventItem) for item in fresh):
-            self._publish(run, "run")
-        return orders
+        return outcomes
 
     def check(self, run_id: str, attempt: int, after_seq: int) -> None:
         """Before a checkpoint's bytes are taken in: whether it would be registered.
@@ -124,8 +153,8 @@ class WorkerService:
             FencedError: the attempt is over.
             TooEarlyError: the metrics before the checkpoint have not arrived.
         """
-        with self._services.database.write() as session:
-            run = self._renewed(session, run_id, attempt)
+        with self._services.database.read() as session:
+            run = attempts.unfenced(RunRepository(session).find(run_id), run_id, attempt)
             if run.last_seq < after_seq:
                 raise TooEarlyError(f"Item {after_seq} must be here before this checkpoint; the last one is {run.last_seq}.")
 
@@ -139,7 +168,7 @@ class WorkerService:
             FencedError: the attempt is over.
         """
         with self._services.database.write() as session:
-            run = self._renewed(session, run_id, attempt)
+            run = attempts.unfenced(RunRepository(session).find(run_id, for_update=True), run_id, attempt)
             checkpoints = CheckpointRepository(session)
             if checkpoints.at_step(run_id, step) is not None:
                 return False
@@ -148,12 +177,23 @@ class WorkerService:
         self._publish(run, "checkpoint")
         return True
 
-    def lose_expired(self, now: float) -> None:
+    def lose_expired(self) -> None:
         """Take the runs whose lease has run out away from their workers."""
+        leases = self._services.leases
+        with self._services.database.read() as session:
+            expired = leases.expired(RunRepository(session).active_attempts())
+        if not expired:
+            return
         with self._services.database.write() as session:
-            runs = list(RunRepository(session).with_expired_lease(now))
+            silent = {run_id for run_id, _ in expired}
+            runs = [
+                run
+                for run in RunRepository(session).several(silent, for_update=True, with_experiments=True).values()
+                # Its worker may have been heard since, or have ended it.
+                if run.state in states.ACTIVE and leases.is_expired(run.id, run.attempt)
+            ]
             for run in runs:
-                reason = f"worker {run.worker} was not heard of for {self._lease_seconds:g} s."
+                reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
                 attempts.lose(session, run, reason)
         for run in runs:
             self._services.links.cut(run.id)
@@ -169,15 +209,7 @@ class WorkerService:
             CheckpointRepository(session).get(checkpoint_id)
         return self._services.files.read(checkpoint_id)
 
-    def _renewed(self, session: Session, run_id: str, attempt: int) -> tables.Run:
-        try:
-            run = RunRepository(session).get(run_id, for_update=True)
-        except NotFoundError as error:
-            raise FencedError(error.message) from error
-        attempts.renew(run, attempt, self._lease_seconds)
-        return run
-
-    def _store(self, session: Session, run: tables.Run, items: list[MetricItem | EventItem]) -> None:
+    def _store(self, session: Session, run: tables.Run, items: Sequence[MetricItem | EventItem]) -> None:
         if not items:
             return
         rows = [

@@ -57,7 +57,7 @@ def test_such_a_training_is_shown_and_its_runs_fail_with_the_reason(client: Test
     for path in (f"/api/experiments/{created['id']}", f"/api/runs/{run_id}"):
         assert client.get(path).json()["unreadable"] == ["teleportation"]
     assert client.get(f"/api/runs/{run_id}/diagnoses").status_code == 200
-    Sweeper(services).sweep(0.0)  # rings for it as for any other
+    Sweeper(services).sweep()  # rings for it as for any other
 
     claim = client.post(
         f"/api/worker/runs/{run_id}/claim",

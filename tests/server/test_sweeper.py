@@ -12,6 +12,7 @@ from server.runs.repository import RunRepository
 from server.services import Services
 from server.settings import Settings
 from server.sweeper import RING_AGAIN_SECONDS, Sweeper, dispatch
+from server.worker_api.leases import Leases
 from server.worker_api.service import WorkerService
 from workers.config import TrainingConfig
 from workers.protocol import ClaimRequest, Heartbeat, Queue
@@ -34,11 +35,27 @@ class Bell:
         return heard
 
 
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    def __init__(self) -> None:
+        self.now = 1_000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
 @pytest.fixture
-def services(settings: Settings) -> Services:
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def services(settings: Settings, clock: Clock) -> Services:
     """Without the application around it: here the clock is the test's."""
     services = create_services(settings)
     services.doorbell = Bell()
+    services.leases = Leases(LEASE, clock)
     return services
 
 
@@ -49,21 +66,16 @@ def bell(services: Services) -> Bell:
 
 
 @pytest.fixture
-def sweeper(services: Services) -> Sweeper:
-    return Sweeper(services)
+def sweeper(services: Services, clock: Clock) -> Sweeper:
+    return Sweeper(services, clock)
 
 
-@pytest.fixture
-def now() -> float:
-    return time.time()
-
-
-def add_run(services: Services, run_id: str, queued_at: float, device: str = "cpu") -> None:
+def add_run(services: Services, run_id: str, age: float = 0.0, device: str = "cpu") -> None:
     training = TrainingConfig().model_copy(update={"device": device}).model_dump(mode="json")
     with services.database.write() as session:
         session.add(tables.Experiment(id=f"of-{run_id}", name="x", training=training))
         session.flush()
-        session.add(tables.Run(id=run_id, experiment_id=f"of-{run_id}", seed=0, queued_at=queued_at))
+        session.add(tables.Run(id=run_id, experiment_id=f"of-{run_id}", seed=0, queued_at=time.time() - age))
 
 
 def claim(services: Services, run_id: str, attempt: int = 0, worker: str = "w") -> None:
@@ -79,17 +91,24 @@ def run_of(services: Services, run_id: str) -> tables.Run:
         return RunRepository(session).get(run_id)
 
 
+def pass_by(sweeper: Sweeper, clock: Clock, seconds: float) -> None:
+    """Time passes, and is swept through."""
+    end = clock.now + seconds
+    while clock.now < end:
+        clock.now = min(end, clock.now + sweeper.interval)
+        sweeper.sweep()
+
+
 def test_a_run_whose_worker_is_silent_goes_back_to_the_queue_and_is_rung(
-    services: Services, sweeper: Sweeper, bell: Bell, now: float
+    services: Services, sweeper: Sweeper, bell: Bell, clock: Clock
 ) -> None:
-    add_run(services, "r", now)
-    sweeper.sweep(now)
+    add_run(services, "r")
+    sweeper.sweep()
     claim(services, "r")
     bell.heard()
-    for elapsed in (3, 6, 9, 12, 14):
-        sweeper.sweep(now + elapsed)
+    pass_by(sweeper, clock, LEASE - 0.1)
     assert run_of(services, "r").state == "running"
-    sweeper.sweep(now + LEASE + 2)
+    pass_by(sweeper, clock, 0.2)
     run = run_of(services, "r")
     assert (run.state, run.attempt, run.losses, run.worker) == ("queued", 1, 1, None)
     assert run.error is not None
@@ -97,16 +116,45 @@ def test_a_run_whose_worker_is_silent_goes_back_to_the_queue_and_is_rung(
     assert bell.rings == [("r", 1, "cpu")]
 
 
-def test_three_silent_workers_in_a_row_fail_the_run_with_the_reason_of_each(
-    services: Services, sweeper: Sweeper, now: float
+@pytest.mark.parametrize("hours", [-1, 1])
+def test_the_wall_clock_may_be_set_and_leases_last_as_long_as_they_do(
+    services: Services, sweeper: Sweeper, clock: Clock, monkeypatch: pytest.MonkeyPatch, hours: int
 ) -> None:
-    add_run(services, "r", now)
-    sweeper.sweep(now)
+    add_run(services, "dead")
+    add_run(services, "alive")
+    sweeper.sweep()
+    claim(services, "dead")
+    claim(services, "alive")
+    wall = time.time
+    monkeypatch.setattr(time, "time", lambda: wall() + 3_600 * hours)
+    pass_by(sweeper, clock, LEASE / 2)
+    services.leases.renew("alive", 1)
+    pass_by(sweeper, clock, LEASE / 2 + 0.1)
+    assert run_of(services, "dead").state == "queued"
+    assert run_of(services, "alive").state == "running"
+
+
+def test_what_an_earlier_attempt_still_says_prolongs_no_other_ones_lease(
+    services: Services, sweeper: Sweeper, clock: Clock
+) -> None:
+    add_run(services, "r")
+    claim(services, "r")
+    pass_by(sweeper, clock, LEASE + 3)
+    claim(services, "r", attempt=1)
+    for _ in range(10):
+        services.leases.renew("r", 1)
+        pass_by(sweeper, clock, LEASE / 8)
+    assert run_of(services, "r").state == "queued"
+
+
+def test_three_silent_workers_in_a_row_fail_the_run_with_the_reason_of_each(
+    services: Services, sweeper: Sweeper, clock: Clock
+) -> None:
+    add_run(services, "r")
+    sweeper.sweep()
     for attempt in range(3):
         claim(services, "r", attempt, worker=f"w{attempt}")
-        with services.database.write() as session:
-            RunRepository(session).get("r").lease_until = now - 1
-        sweeper.sweep(now + attempt + 1)
+        pass_by(sweeper, clock, LEASE + 1)
     run = run_of(services, "r")
     assert run.state == "failed"
     assert run.finished_at is not None
@@ -119,89 +167,112 @@ def test_three_silent_workers_in_a_row_fail_the_run_with_the_reason_of_each(
 
 
 def test_a_run_that_was_to_stop_is_stopped_when_its_worker_falls_silent(
-    services: Services, sweeper: Sweeper, bell: Bell, now: float
+    services: Services, sweeper: Sweeper, bell: Bell, clock: Clock
 ) -> None:
-    add_run(services, "r", now)
-    sweeper.sweep(now)
+    add_run(services, "r")
+    sweeper.sweep()
     bell.heard()
     claim(services, "r")
     with services.database.write() as session:
-        run = RunRepository(session).get("r")
-        run.state, run.lease_until = "stopping", now - 1
-    sweeper.sweep(now + 1)
+        RunRepository(session).get("r").state = "stopping"
+    pass_by(sweeper, clock, LEASE + 1)
     assert run_of(services, "r").state == "stopped"
     assert bell.heard() == []
 
 
-@pytest.mark.parametrize("away", ["at start", "in between"])
-def test_a_server_that_was_away_gives_the_workers_time_to_come_back(
-    services: Services, sweeper: Sweeper, now: float, away: str
-) -> None:
-    add_run(services, "r", now)
+def test_a_server_that_starts_gives_the_workers_time_to_come_back(services: Services, clock: Clock) -> None:
+    add_run(services, "r")
     claim(services, "r")
-    if away == "in between":
-        sweeper.sweep(now)
-    back = now + 3_600
-    sweeper.sweep(back)
+    services.leases = Leases(LEASE, clock)  # as of a new process
+    sweeper = Sweeper(services, clock)
+    sweeper.sweep()
+    pass_by(sweeper, clock, LEASE - 0.1)
     assert run_of(services, "r").state == "running"
-    assert run_of(services, "r").lease_until == pytest.approx(back + LEASE)
-    for elapsed in range(3, int(LEASE) + 6, 3):
-        sweeper.sweep(back + elapsed)
+    pass_by(sweeper, clock, 0.2)
     assert run_of(services, "r").state == "queued"
 
 
-def test_at_start_everything_that_waits_is_rung_once(services: Services, sweeper: Sweeper, bell: Bell, now: float) -> None:
+def test_a_server_that_was_away_in_between_gives_the_workers_time_to_come_back(
+    services: Services, sweeper: Sweeper, clock: Clock
+) -> None:
+    add_run(services, "r")
+    claim(services, "r")
+    sweeper.sweep()
+    clock.now += 3_600
+    sweeper.sweep()
+    pass_by(sweeper, clock, LEASE - 0.1)
+    assert run_of(services, "r").state == "running"
+    pass_by(sweeper, clock, 0.2)
+    assert run_of(services, "r").state == "queued"
+
+
+def test_at_start_everything_that_waits_is_rung_once(services: Services, sweeper: Sweeper, bell: Bell, clock: Clock) -> None:
     for name in ("a", "b", "c"):
-        add_run(services, name, now - 1_000)
-    sweeper.sweep(now)
+        add_run(services, name, age=1_000)
+    sweeper.sweep()
     assert sorted(bell.heard()) == ["a", "b", "c"]
-    sweeper.sweep(now + 3)
+    pass_by(sweeper, clock, 3)
     assert bell.heard() == []
 
 
 def test_a_lost_message_is_sent_again_while_a_worker_is_idle(
-    services: Services, sweeper: Sweeper, bell: Bell, now: float
+    services: Services, sweeper: Sweeper, bell: Bell, clock: Clock
 ) -> None:
-    sweeper.sweep(now)
+    sweeper.sweep()
     for age, name in enumerate(("youngest", "middle", "oldest")):
-        add_run(services, name, now - age)
-    sweeper.sweep(now + RING_AGAIN_SECONDS + 1 - 5)
+        add_run(services, name, age)
+    pass_by(sweeper, clock, RING_AGAIN_SECONDS + 4)
     assert bell.heard() == []  # nobody is idle
     see_worker(services, "w1")
     see_worker(services, "w2")
-    sweeper.sweep(now + RING_AGAIN_SECONDS + 1)
+    pass_by(sweeper, clock, 1)
     assert bell.heard() == ["oldest", "middle"]  # one for each worker that could take it
     claim(services, "oldest", worker="w1")
     claim(services, "middle", worker="w2")
-    sweeper.sweep(now + RING_AGAIN_SECONDS + 2)
+    pass_by(sweeper, clock, RING_AGAIN_SECONDS + 4)
     assert bell.heard() == []
 
 
-def test_each_queue_is_rung_for_its_own_workers(services: Services, sweeper: Sweeper, bell: Bell, now: float) -> None:
-    sweeper.sweep(now - 5)
-    add_run(services, "on-cpu", now - 60)
-    add_run(services, "on-gpu", now - 60, device="cuda")
+def test_a_lost_message_is_sent_again_though_the_clock_was_set_back(
+    services: Services, sweeper: Sweeper, bell: Bell, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    see_worker(services, "gone")
+    add_run(services, "r")
+    sweeper.sweep()
+    bell.heard()
+    wall = time.time
+    monkeypatch.setattr(time, "time", lambda: wall() - 3_600)
+    pass_by(sweeper, clock, RING_AGAIN_SECONDS + 4)
+    assert bell.heard() == []  # who was heard of before has not been heard of since
+    see_worker(services, "there")
+    pass_by(sweeper, clock, 1)
+    assert bell.heard() == ["r"]
+
+
+def test_each_queue_is_rung_for_its_own_workers(services: Services, sweeper: Sweeper, bell: Bell, clock: Clock) -> None:
+    sweeper.sweep()
+    add_run(services, "on-cpu", 60)
+    add_run(services, "on-gpu", 60, device="cuda")
     see_worker(services, "w", "gpu")
-    sweeper.sweep(now)
+    pass_by(sweeper, clock, RING_AGAIN_SECONDS + 4)
     assert bell.rings == [("on-gpu", 0, "gpu")]
 
 
 def test_a_run_with_settings_of_another_version_keeps_no_other_from_being_rung(
-    services: Services, sweeper: Sweeper, bell: Bell, now: float
+    services: Services, sweeper: Sweeper, bell: Bell
 ) -> None:
-    add_run(services, "odd", now - 100)
+    add_run(services, "odd", 100)
     with services.database.write() as session:
         RunRepository(session).get("odd").experiment.training = {"algorithm": "of another time"}
-    add_run(services, "waits", now - 50)
-    sweeper.sweep(now)
+    add_run(services, "waits", 50)
+    sweeper.sweep()
     assert bell.heard() == ["odd", "waits"]  # and whoever takes up the odd one hears why it can't be trained
 
 
 def test_a_sweep_that_breaks_is_not_the_last(settings: Settings) -> None:
     services = create_services(settings.model_copy(update={"lease_seconds": 0.5}))
-    now = time.time()
-    add_run(services, "waits", now)
-    add_run(services, "silent", now)
+    add_run(services, "waits")
+    add_run(services, "silent")
     claim(services, "silent")
 
     class BrokenBell(Bell):

@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import select, update
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from server.database import tables
 from server.metrics.repository import MetricRepository
 from server.services import Services
+from server.worker_api.leases import Leases
 from workers.protocol import (
     CLOSE_FENCED,
     CLOSE_NOT_UNDERSTOOD,
@@ -343,16 +342,35 @@ def test_deleting_an_experiment_cuts_its_worker_off(client: TestClient, worker: 
 
 
 def test_every_message_renews_the_lease(worker: TestClient, run_id: str, services: Services) -> None:
+    now = 0.0
+    services.leases = Leases(15.0, lambda: now)
     claim(worker, run_id)
-    with services.database.write() as session:
-        session.execute(update(tables.Run).values(lease_until=time.time() + 0.5))
     with link(worker, run_id, 1) as socket:
         hear(socket)
+        now = 14.0
         say(socket, Batch())
-    with services.database.read() as session:
-        lease_until = session.scalar(select(tables.Run.lease_until).where(tables.Run.id == run_id))
-    assert lease_until is not None
-    assert lease_until > time.time() + services.settings.lease_seconds / 2
+        now = 28.0
+        assert not services.leases.is_expired(run_id, 1)
+    now = 29.1
+    assert services.leases.is_expired(run_id, 1)
+
+
+def test_a_database_that_takes_its_time_costs_nobody_a_lease(worker: TestClient, run_id: str, services: Services) -> None:
+    """A message counts when it is heard: it is stored behind whoever holds the database."""
+    now = 0.0
+    services.leases = Leases(15.0, lambda: now)
+    claim(worker, run_id)
+    with link(worker, run_id, 1) as socket:
+        hear(socket)
+        now = 14.0
+        with services.database.write():
+            socket.send_text(Batch(items=metrics((1, 100))).model_dump_json())
+            deadline = time.monotonic() + 10
+            while services.leases._until[run_id, 1] < 29.0:
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+            assert steps_of(services, run_id) == []
+        assert hear(socket).ack == 1
 
 
 def test_heartbeats_make_a_worker_visible_with_the_run_that_it_trains(
