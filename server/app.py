@@ -33,6 +33,7 @@ from server.security.proxies import ClientAddressMiddleware
 from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
+from server.slow_clients import SlowClientMiddleware
 from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.version import version
@@ -109,6 +110,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )
     app.add_middleware(SecurityHeadersMiddleware)
+    app.add_middleware(SlowClientMiddleware, seconds=services.settings.request_seconds)
     app.add_middleware(ClientAddressMiddleware, trusted_proxies=services.settings.trusted_proxies)
     return app
 

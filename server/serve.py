@@ -9,6 +9,7 @@ import uvicorn
 
 from server.listening import listen, login_url
 from server.settings import Settings
+from server.slow_clients import timed_protocol
 from workers.runtime.supervised import end_with_supervisor
 
 # Streams end by themselves when the bus closes; this is for a client that takes its time to read the last bytes.
@@ -60,6 +61,7 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             server_header=False,
             # The application asks its own settings whom to believe.
             proxy_headers=False,
+            http=timed_protocol(settings.request_seconds),
             # Frames are small and many: compressing each would cost more than it saves.
             ws="websockets-sansio",
             ws_per_message_deflate=False,

@@ -71,6 +71,9 @@ class Settings(BaseSettings):
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
     max_replay_bytes: int = Field(256 * 2**20, ge=0, description="Of all replays that are kept; older ones are made again.")
+    request_seconds: float = Field(
+        20.0, gt=0.0, le=600.0, description="How long a client may take for headers, and for the next part of a body."
+    )
     max_body_bytes: int = Field(4 * 2**20, gt=0, description="Largest body of any other request.")
 
     @field_validator("data_dir")

@@ -27,12 +27,12 @@ def environment(data: Path) -> dict[str, str]:
 
 
 @contextmanager
-def serving(data: Path, port: str = "0") -> Iterator[tuple["subprocess.Popen[str]", str]]:
+def serving(data: Path, port: str = "0", **settings: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """`mapless serve` while the block lasts, and its login URL."""
     with subprocess.Popen(
         [sys.executable, "-m", "server", "serve", "--port", port],
         cwd=ROOT,
-        env=environment(data),
+        env=environment(data) | settings,
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
