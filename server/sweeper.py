@@ -44,6 +44,7 @@ class Sweeper:
         self._service = WorkerService(services)
         self._lease_seconds = services.settings.lease_seconds
         self._swept_at: float | None = None
+        self._rung_all = False
         self._quiet_since: dict[Attempt, float] = {}
 
     @property
@@ -58,12 +59,12 @@ class Sweeper:
         so they all have a whole lease again.
         """
         now = self._clock()
-        first = self._swept_at is None
         if self._swept_at is not None and now - self._swept_at > self._lease_seconds / 2:
             self._services.leases.renew_all()
         self._swept_at = now
         self._service.lose_expired()
-        self._ring_again(now, everybody=first)
+        self._ring_again(now, everybody=not self._rung_all)
+        self._rung_all = True
 
     def _ring_again(self, now: float, *, everybody: bool) -> None:
         """Ring for runs that wait although somebody could train them; at start for all that wait."""
