@@ -45,7 +45,11 @@ def mount_pages(app: FastAPI, dist: Path) -> None:
 
 def _file_within(directory: Path, path: str) -> Path | None:
     """The regular file at `path` below `directory`, links that lead out of it not followed; None if there is none."""
-    if not path or "\0" in path:
+    if not path:
         return None
-    file = (directory / path).resolve()
-    return file if file.is_relative_to(directory.resolve()) and file.is_file() else None
+    try:
+        file = (directory / path).resolve()
+        return file if file.is_relative_to(directory.resolve()) and file.is_file() else None
+    except OSError:
+        # Longer than any file's name.
+        return None

@@ -1,6 +1,11 @@
 """What several domains say in JSON: the base of every message, and a number with its uncertainty."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
+"""Text of one line that a person types and the database keeps: PostgreSQL holds no NUL."""
 
 
 class Schema(BaseModel):

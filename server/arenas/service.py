@@ -1,7 +1,6 @@
 """What a person may do with arenas."""
 
 import base64
-import binascii
 
 from sqlalchemy import func, select
 
@@ -84,9 +83,11 @@ class ArenaService:
             ConflictError: there are too many arenas already.
         """
         try:
-            document = read_arena({file.name: base64.b64decode(file.content, validate=True) for file in upload.files})
-        except binascii.Error as error:
+            files = {file.name: base64.b64decode(file.content, validate=True) for file in upload.files}
+        except ValueError as error:
             raise UnusableArenaError("The upload is not base64: choose the file again.") from error
+        try:
+            document = read_arena(files)
         except ArenaFileError as error:
             raise UnusableArenaError(str(error)) from error
         if upload.keep:

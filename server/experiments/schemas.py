@@ -6,7 +6,7 @@ from pydantic import Field, StringConstraints, field_validator
 
 from server.database.tables import RunState
 from server.runs.schemas import Run
-from server.schemas import UNREADABLE, Estimate, Schema
+from server.schemas import UNREADABLE, Estimate, Line, Schema
 from sim.config import Frozen
 from workers.config import TrainingConfig
 from workers.presets import Preset
@@ -16,7 +16,7 @@ ExperimentState = RunState | Literal["mixed"]
 _MAX_SEEDS = 50
 _MAX_SEED = 2**31 - 1
 
-ExperimentName = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120)]
+ExperimentName = Annotated[Line, StringConstraints(max_length=120)]
 Seed = Annotated[int, Field(ge=0, le=_MAX_SEED)]
 
 

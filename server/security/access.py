@@ -52,6 +52,7 @@ class AccessMiddleware:
         connection = HTTPConnection(scope)
         try:
             self._check_host(connection)
+            _check_address(scope)
             self._check_origin(connection)
             if scope["type"] == "http" and "token" in connection.query_params and not _is_protected(scope["path"]):
                 await self._login_by_url(connection, scope, receive, send)
@@ -128,6 +129,12 @@ class AccessMiddleware:
         response = RedirectResponse(target, status_code=303)
         set_login_cookie(response, Request(scope), self._settings, self._secrets)
         await response(scope, receive, send)
+
+
+def _check_address(scope: Scope) -> None:
+    """No name of anything holds a NUL: the file system and PostgreSQL would refuse it with an error of their own."""
+    if "\0" in scope["path"] or b"%00" in scope.get("query_string", b"") or b"\0" in scope.get("query_string", b""):
+        raise InvalidRequestError("The address holds a NUL character.")
 
 
 def _is_protected(path: str) -> bool:

@@ -224,3 +224,12 @@ def test_tokens_are_made_once_and_kept_for_their_owner_only(tmp_path: Path) -> N
     assert (tmp_path / "data" / "token").stat().st_mode & 0o777 == 0o600
     assert first.token not in repr(first)
     assert load_secrets(Settings(data_dir=tmp_path / "other")).token != first.token
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["/%00", "/api/experiments?query=%00", "/api/runs/%00", "/api/compare?experiment=a%00", "/assets/%00"],
+)
+def test_no_address_holds_a_nul(client: TestClient, address: str) -> None:
+    response = client.get(address)
+    assert (response.status_code, "NUL" in response.json()["detail"]) == (400, True)

@@ -1,5 +1,6 @@
 """Launching, listing, stopping, resuming, renaming and deleting experiments."""
 
+import json
 from typing import Any
 
 import pytest
@@ -79,6 +80,8 @@ def test_launching_queues_one_run_a_seed_and_rings_for_each(
     [
         ({"name": ""}, ["body", "name"]),
         ({"name": "x" * 121}, ["body", "name"]),
+        ({"name": "nul \0"}, ["body", "name"]),
+        ({"name": "half a \ud800"}, ["body", "name"]),
         ({"seeds": []}, ["body", "seeds"]),
         ({"seeds": [1, 1]}, ["body", "seeds"]),
         ({"seeds": [0, -1]}, ["body", "seeds", 1]),
@@ -93,7 +96,7 @@ def test_launching_queues_one_run_a_seed_and_rings_for_each(
     ],
 )
 def test_a_wrong_value_is_refused_next_to_its_field(client: TestClient, body: dict[str, Any], loc: list[str]) -> None:
-    response = client.post("/api/experiments", json=body)
+    response = client.post("/api/experiments", content=json.dumps(body), headers={"Content-Type": "application/json"})
 
     assert response.status_code == 422
     assert [problem["loc"] for problem in response.json()["detail"]] == [loc]

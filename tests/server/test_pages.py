@@ -64,3 +64,9 @@ def test_pages_that_were_not_built(client: TestClient) -> None:
 
     assert response.status_code == 503
     assert "make pages" in response.text
+
+
+def test_a_path_longer_than_any_file_is_the_page_too(dist: Path, client: TestClient) -> None:
+    assert client.get("/" + "x" * 5_000).status_code == 200
+    assert client.get("/" + "x/" * 2_500).status_code == 200
+    assert client.get("/assets/" + "x" * 5_000).status_code == 404
