@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from sqlalchemy import delete, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
@@ -71,18 +72,16 @@ class MetricRepository:
 
     def compact(self, run_id: str) -> None:
         """Move the run's rows into chunks."""
-        rows = self._rows(run_id)
-        fresh = _series(rows)
-        for name, points in fresh.items():
-            last = self._last_chunk(run_id, name)
-            # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
-            if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
-                points = Points.joined([_decode(last), points])
-                self._session.delete(last)
-                self._session.flush()
-            self._add_chunks(run_id, name, points)
+        self._extend(run_id, _series(self._rows(run_id)))
         self._session.execute(delete(tables.MetricRow).where(tables.MetricRow.run_id == run_id))
         self._session.flush()
+
+    def add_series(self, run_id: str, series: Mapping[str, Points]) -> None:
+        """Add whole series at once, as chunks: what a benchmark or an import brings, without a row for every step."""
+        self._extend(run_id, series)
+        self._session.flush()
+        newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
+        self._set_latest(run_id, newest)
 
     def drop_beyond(self, run_id: str, step: int) -> None:
         """Forget every point after `step`: what a lost attempt did after the checkpoint from which the next one resumes."""
@@ -104,11 +103,11 @@ class MetricRepository:
             delete(tables.LatestMetric).where(tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step)
         )
         known = self._session.scalars(select(tables.LatestMetric.name).where(tables.LatestMetric.run_id == run_id)).all()
-        newest = {}
-        for name, points in self.read(run_id).items():
-            finite = [i for i in range(len(points) - 1, -1, -1) if math.isfinite(points.values[i])][:1]
-            if name not in known and finite:
-                newest[name] = (int(points.steps[finite[0]]), float(points.values[finite[0]]))
+        newest = {
+            name: last
+            for name, points in self.read(run_id).items()
+            if name not in known and (last := _last_finite(points)) is not None
+        }
         self._set_latest(run_id, newest)
 
     def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
@@ -123,6 +122,16 @@ class MetricRepository:
             if names is None or name in names:
                 parts[name].append(points)
         return {name: Points.joined(parts[name]) for name in sorted(parts)}
+
+    def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
+        for name, points in fresh.items():
+            last = self._last_chunk(run_id, name)
+            # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
+            if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
+                points = Points.joined([_decode(last), points])
+                self._session.delete(last)
+                self._session.flush()
+            self._add_chunks(run_id, name, points)
 
     def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
         query = select(tables.MetricRow).where(tables.MetricRow.run_id == run_id).order_by(tables.MetricRow.seq)
@@ -164,6 +173,12 @@ class MetricRepository:
 
 def _decode(chunk: tables.MetricChunk) -> Points:
     return Points.decode(chunk.points, chunk.count)
+
+
+def _last_finite(points: Points) -> tuple[int, float] | None:
+    """Step and value of the newest point that is a number."""
+    finite = np.flatnonzero(np.isfinite(points.values))
+    return (int(points.steps[finite[-1]]), float(points.values[finite[-1]])) if finite.size else None
 
 
 def _series(rows: Sequence[tables.MetricRow]) -> dict[str, Points]:
