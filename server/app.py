@@ -7,6 +7,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from server import pages
+from server.abandoned import AbandonedRequestsMiddleware
 from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
 from server.checkpoints import endpoints as checkpoints
@@ -106,6 +107,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.services = services
     pages.mount_pages(app, services.settings.web_dist)
     # The last one added meets a request first.
+    app.add_middleware(AbandonedRequestsMiddleware)
     app.add_middleware(
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )

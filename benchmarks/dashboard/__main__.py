@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for visit in warming(lab):
                 opened.visit(visit.path, visit.ready)
             _say("cold and alone")
-            figures |= _measure("", opened, lab, options.repeats, with_server=True)
+            figures |= _measure("", opened, lab, options, with_server=True)
             figures["server_mb"] = round(server.memory_mb())
             if lab.live:
                 _say(f"{len(lab.live)} runs report, {options.tabs} tabs look on")
@@ -65,15 +65,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
             alone, together = time_claims(server, lab.stopped)
             figures["claim_ms"] = round(max(alone, default=0.0), 1)
             figures["claim_at_once_ms"] = round(max(together, default=0.0), 1)
-    finish("dashboard", figures, at_most=_targets(), check=options.check)
+    finish("dashboard", figures, at_most=_targets(options.pages), check=options.check)
 
 
-def _measure(prefix: str, opened: Tabs, lab: Lab, repeats: int, *, with_server: bool) -> dict[str, object]:
+def _measure(prefix: str, opened: Tabs, lab: Lab, options: argparse.Namespace, *, with_server: bool) -> dict[str, object]:
     """Visit every page, each time another training where there are more, and print a row for each."""
     print(f"{'page':<28}{'server ms':>10}{'drawn ms':>10}{'longest ms':>11}{'tab MB':>8}{'kB':>8}")
     figures: dict[str, object] = {}
-    for visit in visits(lab):
-        costs = [opened.visit(visit.at(index), visit.ready) for index in range(repeats)]
+    for visit in visits(lab, options.pages):
+        costs = [opened.visit(visit.at(index), visit.ready) for index in range(options.repeats)]
         cost = Cost(*(statistics.median(each) for each in zip(*(asdict(one).values() for one in costs), strict=True)))
         print(
             f"{prefix + visit.name:<28}{cost.server_ms:>10.0f}{cost.drawn_ms:>10.0f}{cost.longest_ms:>11.0f}"
@@ -94,7 +94,7 @@ def _under_load(server: Server, opened: Tabs, lab: Lab, options: argparse.Namesp
         watched = lab.live[0]
         run = Visit.of_run(watched)
         pages = [opened.open(run.path, run.ready)]
-        others = visits(lab)
+        others = visits(lab, options.pages)
         for index in range(1, options.tabs):
             # Half of the others look at a run that reports too, the rest at lists, trainings and comparisons.
             other = Visit.of_run(lab.live[index % len(lab.live)]) if index % 2 else others[index // 2 % len(others)]
@@ -112,7 +112,7 @@ def _under_load(server: Server, opened: Tabs, lab: Lab, options: argparse.Namesp
             **_delays("update", sent, [(at, step) for at, step, _ in shown], ended),
             **_delays("curve_update", sent, [(at, step) for at, _, step in shown], ended),
         }
-        figures |= _measure("busy: ", opened, lab, 1, with_server=False)
+        figures |= _measure("busy: ", opened, lab, options, with_server=False)
         figures["busy_server_mb"] = round(server.memory_mb())
         for page in pages:
             page.context.close()
@@ -130,10 +130,11 @@ def _delays(name: str, sent: dict[int, float], shown: Sequence[tuple[float, int]
     return {f"{name}_median_s": round(statistics.median(delays), 2), f"{name}_worst_s": round(max(delays), 2)}
 
 
-def _targets() -> dict[str, float]:
+def _targets(pages: Sequence[str]) -> dict[str, float]:
     targets = {"server_mb": _MEMORY_MB, "bytes_a_point": _BYTES_A_POINT, "claim_ms": _CLAIM_MS}
     targets |= {"update_worst_s": _UPDATE_SECONDS, "curve_update_worst_s": _UPDATE_SECONDS}
-    for name, (drawn, longest) in PAGES.items():
+    for name in pages:
+        drawn, longest = PAGES[name]
         targets |= {f"{name} drawn_ms": drawn, f"{name} longest_ms": longest}
         targets |= {f"{name} server_ms": _SERVER_MS, f"{name} tab_mb": _TAB_MB}
     return targets
@@ -151,6 +152,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     options.add_argument("--tabs", type=int, default=20, help="that look on meanwhile")
     options.add_argument("--seconds", type=float, default=60.0, help="of watching while runs report")
     options.add_argument("--repeats", type=int, default=1, help="visits of a page; medians count")
+    options.add_argument("--pages", nargs="+", choices=PAGES, default=list(PAGES), help="that are measured")
     options.add_argument("--data-dir", type=Path, help="where the database is made; it stays there")
     return options.parse_args(arguments)
 

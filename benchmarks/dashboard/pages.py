@@ -50,11 +50,11 @@ class Visit:
         return cls("run", [f"/runs/{run_id}"], _RUN)
 
 
-def visits(lab: Lab) -> list[Visit]:
-    """Every page of a lab."""
+def visits(lab: Lab, names: Sequence[str]) -> list[Visit]:
+    """The pages of these names over a lab."""
     compared = "&".join(f"experiment={each}" for each in lab.long_experiments)
     with_checkpoints = f"{_RUN} && document.querySelectorAll('[data-testid=checkpoint]').length > 0"
-    return [
+    pages = [
         Visit("list", ["/"], _ROWS),
         Visit("experiment", [f"/experiments/{each}" for each in lab.long_experiments], f"{_CURVES} >= 3"),
         Visit("run, few checkpoints", [f"/runs/{lab.few}"], with_checkpoints),
@@ -67,6 +67,7 @@ def visits(lab: Lab) -> list[Visit]:
         Visit("compare's picker", ["/compare"], _ROWS),
         Visit("paper", ["/reproduction"], "document.querySelectorAll('[data-testid=claim]').length > 0"),
     ]
+    return [page for page in pages if page.name in names]
 
 
 def warming(lab: Lab) -> list[Visit]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from server import statistics
+from server.abandoned import stop_if_abandoned
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.checkpoints.views import estimate
 from server.comparison.differences import differences
@@ -52,17 +53,18 @@ class ComparisonService:
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
             repository = MetricRepository(session)
-            series = {
-                run.id: repository.read(run.id, [name]).get(name, Points.joined([]))
-                for experiment in experiments
-                for run in experiment.runs
-            }
+            series = {run.id: _series(repository, run.id, name) for experiment in experiments for run in experiment.runs}
         grid = common_grid(list(series.values()), points)
         return Curves(
             name=name,
             steps=grid.tolist(),
             experiments=[_curves(experiment, series, grid) for experiment in experiments],
         )
+
+
+def _series(repository: MetricRepository, run_id: str, name: str) -> Points:
+    stop_if_abandoned()
+    return repository.read(run_id, [name]).get(name, Points.joined([]))
 
 
 def common_grid(series: Sequence[Points], limit: int) -> NDArray[np.int64]:

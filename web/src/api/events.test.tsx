@@ -1,9 +1,9 @@
-import { QueryClient, QueryClientProvider } from '@tanstack/react-query'
+import { QueryClient, QueryClientProvider, QueryObserver } from '@tanstack/react-query'
 import { act, renderHook } from '@testing-library/react'
 import type { ReactNode } from 'react'
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest'
 import { FakeEventSource } from '../testing/server'
-import { type Change, concerns, createInvalidator, ROUND_MS, useServerEvents } from './events'
+import { type Change, concerns, createInvalidator, ROUND_MS, SLOW_ROUND_MS, useServerEvents } from './events'
 
 const change = (kind: Change['kind'], run_id: string | null = 'run1'): Change => ({
   experiment_id: 'exp1',
@@ -65,16 +65,76 @@ describe('the stream', () => {
     document.dispatchEvent(new Event('visibilitychange'))
   }
 
-  test('the first change is acted on at once, what follows in rounds', () => {
+  const metricsKey = key('/api/runs/{run_id}/metrics', { path: { run_id: 'run1' } })
+
+  /** A query that is shown, and its questions in order; the test answers them. */
+  async function show(queryKey: readonly unknown[]) {
+    const questions: { answer: (value: string) => void; thrownAway: boolean }[] = []
+    const observer = new QueryObserver(client, {
+      queryKey,
+      queryFn: ({ signal }) =>
+        new Promise<string>((answer) => {
+          const question = { answer, thrownAway: false }
+          questions.push(question)
+          signal.addEventListener('abort', () => {
+            question.thrownAway = true
+          })
+        }),
+    })
+    observer.subscribe(() => {})
+    questions[0]?.answer('first')
+    await vi.advanceTimersByTimeAsync(ROUND_MS)
+    return questions
+  }
+
+  test('the first change is acted on at once, what follows in rounds', async () => {
     const invalidator = createInvalidator(client)
+    const questions = await show(metricsKey)
     for (let i = 0; i < 50; i++) invalidator.push(change('metrics'))
-    expect(asked).toHaveBeenCalledTimes(1)
-    vi.advanceTimersByTime(ROUND_MS)
-    expect(asked).toHaveBeenCalledTimes(2)
-    vi.advanceTimersByTime(10 * ROUND_MS)
-    expect(asked).toHaveBeenCalledTimes(2)
+    expect(questions).toHaveLength(2)
+    questions[1]?.answer('second')
+    await vi.advanceTimersByTimeAsync(ROUND_MS / 2)
+    expect(questions).toHaveLength(2)
+    await vi.advanceTimersByTimeAsync(ROUND_MS)
+    expect(questions).toHaveLength(3)
+    questions[2]?.answer('third')
+    await vi.advanceTimersByTimeAsync(10 * ROUND_MS)
+    expect(questions).toHaveLength(3)
+  })
+
+  test('an answer that is slower than the reports arrives, and what came meanwhile is asked for after it', async () => {
+    const invalidator = createInvalidator(client)
+    const questions = await show(metricsKey)
     invalidator.push(change('metrics'))
-    expect(asked).toHaveBeenCalledTimes(3)
+    for (let second = 0; second < 5; second++) {
+      await vi.advanceTimersByTimeAsync(1_000)
+      invalidator.push(change('metrics'))
+    }
+    expect(questions).toHaveLength(2)
+    questions[1]?.answer('slow')
+    await vi.advanceTimersByTimeAsync(0)
+    expect(client.getQueryData(metricsKey)).toBe('slow')
+    expect(questions[1]?.thrownAway).toBe(false)
+    // It took the server five seconds: it is left alone for three times as long.
+    await vi.advanceTimersByTimeAsync(14_000)
+    expect(questions).toHaveLength(2)
+    await vi.advanceTimersByTimeAsync(1_500)
+    expect(questions).toHaveLength(3)
+  })
+
+  test('the list follows reports slowly, and a run that ends at once', async () => {
+    const invalidator = createInvalidator(client)
+    const questions = await show(key('/api/experiments'))
+    invalidator.push(change('metrics'))
+    await vi.advanceTimersByTimeAsync(2 * ROUND_MS)
+    expect(questions).toHaveLength(1)
+    invalidator.push(change('run'))
+    await vi.advanceTimersByTimeAsync(ROUND_MS)
+    expect(questions).toHaveLength(2)
+    questions[1]?.answer('second')
+    invalidator.push(change('metrics'))
+    await vi.advanceTimersByTimeAsync(SLOW_ROUND_MS + ROUND_MS)
+    expect(questions).toHaveLength(3)
   })
 
   test('a hidden tab lets go of its connection and takes it up again', () => {
@@ -94,6 +154,21 @@ describe('the stream', () => {
     expect(asked).not.toHaveBeenCalled()
     FakeEventSource.open[0]?.onopen?.()
     expect(asked).toHaveBeenCalledWith()
+  })
+
+  test('a stream that was refused is asked for again, each time later', () => {
+    renderHook(() => useServerEvents(true), { wrapper })
+    for (const wait of [1_000, 2_000, 4_000]) {
+      const refused = FakeEventSource.open.at(-1)
+      const before = FakeEventSource.open.length
+      refused?.refuse()
+      vi.advanceTimersByTime(wait - 1)
+      expect(FakeEventSource.open).toHaveLength(before)
+      vi.advanceTimersByTime(1)
+      expect(FakeEventSource.open).toHaveLength(before + 1)
+    }
+    FakeEventSource.open.at(-1)?.onopen?.()
+    expect(asked).not.toHaveBeenCalled()
   })
 
   test('nothing is opened before there is a login', () => {

@@ -98,7 +98,13 @@ export function Chart({
   }
 
   return (
-    <figure className={classes.chart} aria-label={label} data-testid="chart" data-points={data.x.length} data-step={data.x.at(-1)}>
+    <figure
+      className={classes.chart}
+      aria-label={label}
+      data-testid="chart"
+      data-points={data.x.length}
+      data-step={data.x.at(-1)}
+    >
       <div ref={frame} style={{ height }} />
       <dl ref={legend} className={classes.legend}>
         {labelled.map((line) => {

@@ -47,6 +47,8 @@ export function refusal(code: number, detail: unknown): Response {
 export class FakeEventSource extends EventTarget {
   static open: FakeEventSource[] = []
   onopen: (() => void) | null = null
+  onerror: (() => void) | null = null
+  readyState = 1
   readonly url: string
 
   constructor(url: string) {
@@ -57,6 +59,12 @@ export class FakeEventSource extends EventTarget {
 
   close() {
     FakeEventSource.open = FakeEventSource.open.filter((one) => one !== this)
+  }
+
+  /** As an answer that is no stream ends it: for good. */
+  refuse() {
+    this.readyState = 2
+    this.onerror?.()
   }
 
   send(change: Change) {
