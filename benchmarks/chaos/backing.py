@@ -1,0 +1,129 @@
+"""PostgreSQL and Redis of the benchmark's own, on ports of their own, to be killed, stopped and restarted at will."""
+
+import os
+import pwd
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import psutil
+
+from benchmarks.chaos.processes import free_port, tree
+
+_PATIENCE_SECONDS = 60.0
+_SYSTEM_USER = "postgres"
+
+
+class Backing:
+    """A process that others connect to. `start` returns once it answers; its data outlive `kill`."""
+
+    def __init__(self, name: str, directory: Path) -> None:
+        self.name = name
+        self.port = free_port()
+        self._log = directory / f"{name}.log"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def command(self) -> list[str]:
+        """What starts it, in the foreground."""
+        raise NotImplementedError
+
+    def answers(self) -> bool:
+        """Whether it can be used."""
+        raise NotImplementedError
+
+    def start(self) -> None:
+        """Start it.
+
+        Raises:
+            TimeoutError: it does not answer.
+        """
+        with self._log.open("ab") as log:
+            self._process = subprocess.Popen(self.command(), stdout=log, stderr=log, start_new_session=True)
+        deadline = time.monotonic() + _PATIENCE_SECONDS
+        while not self.answers():
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"{self.name} does not answer: {self._log.read_text()[-2000:]}")
+            time.sleep(0.05)
+
+    def members(self) -> list[psutil.Process]:
+        """Its processes."""
+        return tree(self._process.pid) if self._process is not None else []
+
+    def kill(self) -> None:
+        """End it without a word."""
+        for member in self.members():
+            member.kill()
+        if self._process is not None:
+            self._process.wait()
+
+    def stop(self) -> None:
+        """End it in order, connections or not."""
+        assert self._process is not None
+        self._process.send_signal(self.stop_signal)
+        self._process.wait(_PATIENCE_SECONDS)
+
+    stop_signal = 15
+
+
+class Redis(Backing):
+    """A broker that forgets its queues when it ends: the doorbells are rung again."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__("redis", directory)
+        self._directory = directory
+
+    def command(self) -> list[str]:
+        """Nothing is written to disk."""
+        return ["redis-server", "--port", str(self.port), "--save", "", "--dir", str(self._directory), "--bind", "127.0.0.1"]
+
+    def answers(self) -> bool:
+        """Whether it is pinged back."""
+        command = ("redis-cli", "-p", str(self.port), "ping")
+        return subprocess.run(command, check=False, capture_output=True).stdout.strip() == b"PONG"
+
+
+class Postgres(Backing):
+    """A cluster of its own in `directory`; it refuses to be root's, so it is the system user's where root asks."""
+
+    stop_signal = 2  # SIGINT: "fast", which ends connections
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__("postgres", directory)
+        self._data = directory / "postgres"
+        self._data.mkdir()
+        self._as_user: list[str] = []
+        if os.getuid() == 0:
+            user = pwd.getpwnam(_SYSTEM_USER)
+            os.chown(self._data, user.pw_uid, user.pw_gid)
+            self._as_user = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups"]
+        self._bin = _programs()
+        options = ("--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-locale", "--no-sync")
+        subprocess.run(
+            [*self._as_user, str(self._bin / "initdb"), *options, str(self._data)], check=True, capture_output=True
+        )
+
+    @property
+    def url(self) -> str:
+        """SQLAlchemy URL, past any proxy."""
+        return f"postgresql+psycopg://postgres@127.0.0.1:{self.port}/postgres"
+
+    def command(self) -> list[str]:
+        """With one socket, on 127.0.0.1."""
+        options = ("-k", "", "-h", "127.0.0.1", "-p", str(self.port), "-D", str(self._data))
+        return [*self._as_user, str(self._bin / "postgres"), *options]
+
+    def answers(self) -> bool:
+        """Whether connections are accepted."""
+        command = (str(self._bin / "pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(self.port))
+        return subprocess.run(command, check=False).returncode == 0
+
+
+def _programs() -> Path:
+    """Where initdb and postgres are: Debian keeps them out of the path."""
+    if found := shutil.which("initdb"):
+        return Path(found).resolve().parent
+    candidates = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+    if not candidates:
+        raise FileNotFoundError("initdb: install PostgreSQL's server (Debian: apt install postgresql)")
+    return candidates[-1].parent
