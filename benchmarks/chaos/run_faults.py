@@ -4,13 +4,13 @@ import time
 from functools import partial
 
 from benchmarks.chaos.kinds import Heal, Kind, MissedError, Scene
-from benchmarks.chaos.processes import kill, resume, suspend
 from benchmarks.chaos.proxy import Trap
+from benchmarks.processes import kill, resume, suspend
 from benchmarks.service import wait_for
 
 # For what comes by itself as long as the run goes on: a report, an upload.
 _MOMENT_SECONDS = 10.0
-# A disk that is full for so long, in seconds, and a server that is not reached.
+# A disk that is full for so long at least, in seconds, and a server that is not reached.
 _FULL_SECONDS = 3.0
 _AWAY_SECONDS = 2.0
 # A trainer that stands still for so long.
@@ -138,10 +138,11 @@ def _damage_spool(scene: Scene, *, truncate: bool) -> None:
         scene.node.proxy.open()
 
 
-def _fill_worker_disk(scene: Scene) -> None:
+def _fill_worker_disk(scene: Scene) -> Heal:
+    """It stays full until the run goes on elsewhere: this worker must not take it up again and again."""
     scene.node.disk.fill()
     time.sleep(_FULL_SECONDS)
-    scene.node.disk.free()
+    return scene.node.disk.free
 
 
 def _damage_checkpoint(scene: Scene) -> None:
@@ -201,7 +202,7 @@ RUN_FAULTS = (
         "spool overwritten", "a line that waits becomes zeros in part", _overwrite_spool, "run", "closed", new_attempt=True
     ),
     Kind("spool truncated", "cut in the middle of a line that waits", _truncate_spool, "run", "closed", new_attempt=True),
-    Kind("worker's disk full", f"no byte left for {_FULL_SECONDS:g} s", _fill_worker_disk, "run", "closed"),
+    Kind("worker's disk full", "no byte left until another worker has its run", _fill_worker_disk, "run", "closed"),
     Kind("checkpoint damaged", "the newest archive, then its trainer killed", _damage_checkpoint, "run", "closed", True),
     Kind("clock set back", "the server's, by an hour, and a worker killed", _set_clock_back, "run", "silent", True),
     Kind("clock set forward", "the server's, by an hour, and a worker killed", _set_clock_forward, "run", "silent", True),

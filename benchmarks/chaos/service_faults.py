@@ -9,10 +9,10 @@ from pathlib import Path
 
 import psycopg
 
-from benchmarks.chaos.backing import Backing
+from benchmarks.backing import Backing
 from benchmarks.chaos.kinds import Kind, Scene
-from benchmarks.chaos.processes import kill, resume, suspend
 from benchmarks.chaos.proxy import Proxy
+from benchmarks.processes import kill, resume, suspend
 
 _AWAY_SECONDS = 2.0
 _FULL_SECONDS = 3.0

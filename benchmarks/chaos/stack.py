@@ -12,12 +12,12 @@ from typing import Any, Literal, TypeVar
 import httpx
 import psutil
 
-from benchmarks.chaos.backing import Postgres, Redis
+from benchmarks.backing import Postgres, Redis
 from benchmarks.chaos.clock import Clock
 from benchmarks.chaos.disk import Disk
-from benchmarks.chaos.processes import free_port, kill, trainer_of, tree
 from benchmarks.chaos.proxy import Proxy
 from benchmarks.chaos.recorder import Recorder
+from benchmarks.processes import free_port, kill, trainer_of, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 Mode = Literal["embedded", "production"]

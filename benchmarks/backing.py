@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.chaos.processes import free_port, tree
+from benchmarks.processes import free_port, tree
 
 _PATIENCE_SECONDS = 60.0
 _SYSTEM_USER = "postgres"

@@ -1,0 +1,269 @@
+"""What one server carries: reporting runs, browsers with a stream and a page every ten seconds, watched runs with frames.
+
+The server has one core to itself; the load, and PostgreSQL where that is the database, have the others. The runs are
+synthetic, their link to the server is the real one. A page is all its requests side by side, timed until the last answer.
+
+    python -m benchmarks.load --database sqlite --check
+    python -m benchmarks.load --database postgresql --check
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal, TypeVar
+
+import httpx
+import numpy as np
+import psutil
+from pydantic import BaseModel
+
+from benchmarks.backing import Postgres
+from benchmarks.load.meter import Meter
+from benchmarks.load.plan import PagesTold, Plan, StreamsTold, ViewsTold, WorkersTold
+from benchmarks.processes import free_port, kill, tree
+from benchmarks.report import finish, parser
+from benchmarks.service import wait_for
+
+ROOT = Path(__file__).resolve().parents[2]
+Database = Literal["sqlite", "postgresql"]
+MAX_PAGE_MILLISECONDS = 300.0
+# Flat: over the second half the memory grows by no more than this part of itself.
+MAX_GROWTH_PERCENT = 3.0
+# Of the 30 frames a second that a view aims at.
+MIN_VIEW_FRAMES = 27.0
+_SEEDS_PER_EXPERIMENT = 50
+_TOKEN = "a-login-token-of-the-benchmark"
+_WORKER_TOKEN = "a-worker-token-of-the-benchmark"
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@contextmanager
+def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -> Iterator[tuple[str, int]]:
+    """A server on a core of its own; its URL and process id."""
+    port, (own, others) = free_port(), cores
+    environment = {
+        **{name: value for name, value in os.environ.items() if not name.startswith("MAPLESS_")},
+        "MAPLESS_DATA_DIR": str(directory / "data"),
+        "MAPLESS_PORT": str(port),
+        "MAPLESS_TOKEN": _TOKEN,
+        "MAPLESS_WORKER_TOKEN": _WORKER_TOKEN,
+    }
+    postgres = None
+    if database == "postgresql":
+        postgres = Postgres(directory)
+        postgres.start()
+        for process in postgres.members():
+            process.cpu_affinity(others)
+        environment["MAPLESS_DATABASE_URL"] = postgres.url
+    with (directory / "server.log").open("ab") as log:
+        process = subprocess.Popen(
+            ["taskset", "-c", str(own), sys.executable, "-m", "server", "serve"],
+            cwd=ROOT,
+            env=environment,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+    url = f"http://127.0.0.1:{port}"
+    try:
+        wait_for(lambda: _answers(url), seconds=60.0)
+        yield url, process.pid
+    finally:
+        kill(tree(process.pid))
+        process.wait()
+        if postgres is not None:
+            postgres.stop()
+
+
+def _answers(url: str) -> bool:
+    try:
+        return httpx.get(f"{url}/healthz").status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+def _launch(url: str, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """So many runs, and their experiments."""
+    run_ids: list[str] = []
+    experiment_ids: list[str] = []
+    with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {_TOKEN}"}, timeout=60.0) as api:
+        while len(run_ids) < runs:
+            seeds = list(range(min(_SEEDS_PER_EXPERIMENT, runs - len(run_ids))))
+            answer = api.post("/api/experiments", json={"name": "load", "seeds": seeds, "training": {}}).raise_for_status()
+            experiment_ids.append(answer.json()["id"])
+            run_ids.extend(run["id"] for run in answer.json()["runs"])
+    return tuple(run_ids), tuple(experiment_ids)
+
+
+class _Part:
+    """A process that makes a part of the load, on the cores that are not the server's."""
+
+    def __init__(self, plan: Plan, cores: list[int], niceness: int, *command: str) -> None:
+        where = ("taskset", "-c", ",".join(map(str, cores)), "nice", "-n", str(niceness))
+        self._process = subprocess.Popen(
+            [*where, sys.executable, "-m", *command], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self._say(plan.model_dump_json())
+
+    def await_readiness(self) -> None:
+        """Until it has imported what it needs.
+
+        Raises:
+            RuntimeError: it ended instead.
+        """
+        assert self._process.stdout is not None
+        if not self._process.stdout.readline():
+            raise RuntimeError("a part of the load did not start; its own output says why")
+
+    def begin(self, end: float) -> None:
+        """Make the load until then, on the machine's clock."""
+        self._say(f"{end}")
+
+    def told(self, model: type[M], seconds: float) -> M:
+        """What it tells when it is over, which must be so within `seconds`."""
+        assert self._process.stdout is not None
+        self._process.wait(seconds)
+        return model.model_validate_json(self._process.stdout.read())
+
+    def _say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        self._process.stdin.flush()
+
+    def kill(self) -> None:
+        """End it, if it has not ended."""
+        kill(tree(self._process.pid))
+        self._process.wait()
+
+
+def load(
+    *, database: Database, runs: int, series: int, batches: float, browsers: int, views: int, seconds: float
+) -> dict[str, object]:
+    """Make the load for a while; the figures."""
+    usable = sorted(os.sched_getaffinity(0))
+    own, others = usable[0], usable[1:] or usable[:1]
+    with (
+        TemporaryDirectory(prefix="mapless-load-") as directory,
+        _server(Path(directory), database, (own, others)) as server,
+    ):
+        url, pid = server
+        run_ids, experiment_ids = _launch(url, runs)
+        plan = Plan(
+            server_url=url,
+            token=_TOKEN,
+            worker_token=_WORKER_TOKEN,
+            run_ids=run_ids,
+            experiment_ids=experiment_ids,
+            series=series,
+            batches=batches,
+            browsers=browsers,
+            page_seconds=10.0,
+            views=views,
+            seconds=seconds,
+        )
+        # The pages' clock must not wait for a turn on a core that the others keep busy.
+        parts = [
+            _Part(plan, others, 5, "benchmarks.load.workers"),
+            _Part(plan, others, 5, "benchmarks.load.browsers", "streams"),
+            _Part(plan, others, 5, "benchmarks.load.views"),
+            _Part(plan, others, 0, "benchmarks.load.browsers", "pages"),
+        ]
+        patience = seconds + 120.0
+        try:
+            for part in parts:
+                part.await_readiness()
+            meter = Meter(pid)
+            clients_before = psutil.cpu_times(percpu=True)
+            end = time.time() + seconds
+            for part in parts:
+                part.begin(end)
+            workers = parts[0].told(WorkersTold, patience)
+            streams = parts[1].told(StreamsTold, patience)
+            watched = parts[2].told(ViewsTold, patience)
+            pages = parts[3].told(PagesTold, patience)
+        finally:
+            for part in parts:
+                part.kill()
+        idle = sum(
+            after.idle - before.idle
+            for core, (before, after) in enumerate(zip(clients_before, psutil.cpu_times(percpu=True), strict=True))
+            if core in others
+        )
+        cpu = meter.close()
+        mean_memory, slope = meter.second_half()
+        errors = {**workers.errors, **{f"page: {text}": count for text, count in pages.errors.items()}}
+        return {
+            "database": database,
+            "runs": runs,
+            "browsers": browsers,
+            "views": views,
+            "minutes": round(seconds / 60.0, 2),
+            "batches_per_second": round(workers.acknowledged / seconds, 1),
+            "leases_lost": workers.leases_lost,
+            "items_not_acknowledged": workers.items - workers.acknowledged,
+            "pages": len(pages.seconds),
+            "page_p50_milliseconds": _percentile(pages.seconds, 50),
+            "page_p95_milliseconds": _percentile(pages.seconds, 95),
+            "memory_peak_megabytes": round(meter.peak_megabytes, 1),
+            "memory_slope_megabytes_per_hour": round(slope, 1),
+            "memory_growth_percent": round(100.0 * slope * seconds / 2 / 3600.0 / mean_memory, 2),
+            "server_cpu_milliseconds_per_batch": round(1000.0 * cpu / max(1, workers.acknowledged), 2),
+            "server_core_percent": round(100.0 * cpu / seconds, 1),
+            "clients_idle_percent": round(100.0 * idle / len(others) / seconds, 1),
+            "frames_sent": workers.frames,
+            "view_frames_per_second": round(watched.messages / watched.seconds, 1) if watched.seconds else 0.0,
+            "stream_megabytes": round(streams.bytes / 2**20, 1),
+            "streams_and_views_that_ended": streams.ended + watched.ended,
+            "errors": sum(errors.values()),
+            "errors_by_text": errors,
+        }
+
+
+def _percentile(seconds: list[float], share: int) -> float:
+    return round(1000.0 * float(np.percentile(seconds, share)), 1) if seconds else 0.0
+
+
+def main() -> None:
+    """Measure and print."""
+    options = parser(__doc__)
+    options.add_argument("--database", choices=("sqlite", "postgresql"), default="sqlite")
+    options.add_argument("--runs", type=int, default=100)
+    options.add_argument("--series", type=int, default=43, help="in each report")
+    options.add_argument("--batches", type=float, default=2.0, help="reports a second of each run")
+    options.add_argument("--browsers", type=int, default=200)
+    options.add_argument("--views", type=int, default=20)
+    options.add_argument("--minutes", type=float, default=10.0)
+    arguments = options.parse_args()
+    figures = load(
+        database=arguments.database,
+        runs=arguments.runs,
+        series=arguments.series,
+        batches=arguments.batches,
+        browsers=arguments.browsers,
+        views=arguments.views,
+        seconds=60.0 * arguments.minutes,
+    )
+    finish(
+        "load",
+        figures,
+        at_least={"view_frames_per_second": MIN_VIEW_FRAMES} if arguments.views else {},
+        at_most={
+            "leases_lost": 0.0,
+            "items_not_acknowledged": 0.0,
+            "page_p95_milliseconds": MAX_PAGE_MILLISECONDS,
+            "memory_growth_percent": MAX_GROWTH_PERCENT,
+            "errors": 0.0,
+            "streams_and_views_that_ended": 0.0,
+        },
+        check=arguments.check,
+    )
+
+
+if __name__ == "__main__":
+    main()

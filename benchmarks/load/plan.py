@@ -1,0 +1,90 @@
+"""What the processes that make the load are told, and what they tell when it is over."""
+
+import sys
+import time
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Plan(BaseModel):
+    """One process's part.
+
+    Attributes:
+        server_url: base URL.
+        token, worker_token: of logins and of workers.
+        run_ids: the runs that report, in the order of their numbers.
+        experiment_ids: theirs.
+        series: in each report.
+        batches: reports a second of each run.
+        browsers: open pages.
+        page_seconds: between two pages that a browser opens.
+        views: watched runs.
+        seconds: how long it lasts.
+        end: when it is over, on the machine's clock; known when everybody is ready.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    server_url: str
+    token: str
+    worker_token: str
+    run_ids: tuple[str, ...]
+    experiment_ids: tuple[str, ...]
+    series: int
+    batches: float
+    browsers: int
+    page_seconds: float
+    views: int
+    seconds: float
+    end: float = 0.0
+
+    @property
+    def over(self) -> bool:
+        """Whether the time has come."""
+        return time.time() >= self.end
+
+
+class WorkersTold(BaseModel):
+    """Of the synthetic workers: items made and acknowledged, leases lost, frames sent, errors by their text."""
+
+    items: int = 0
+    acknowledged: int = 0
+    leases_lost: int = 0
+    frames: int = 0
+    errors: dict[str, int] = {}
+
+
+class PagesTold(BaseModel):
+    """Of the pages: seconds until each page had all its answers, and errors by their text."""
+
+    seconds: list[float] = []
+    errors: dict[str, int] = {}
+
+
+class StreamsTold(BaseModel):
+    """Of the event streams: bytes read, streams that ended early."""
+
+    bytes: int = 0
+    ended: int = 0
+
+
+class ViewsTold(BaseModel):
+    """Of the live views: messages and bytes, seconds watched by all of them together, views that ended early."""
+
+    messages: int = 0
+    bytes: int = 0
+    seconds: float = 0.0
+    ended: int = 0
+
+
+def read_plan() -> Plan:
+    """The plan on standard input; returns when everybody is ready."""
+    plan = Plan.model_validate_json(sys.stdin.readline())
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    return plan.model_copy(update={"end": float(sys.stdin.readline())})
+
+
+def tell(told: BaseModel) -> None:
+    """What is told goes to standard output."""
+    sys.stdout.write(told.model_dump_json())
