@@ -14,8 +14,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from benchmarks.chaos.recorder import Attempt
-from server import models
-from server.database import Database
+from server.database import tables
+from server.database.engine import Database
 from server.metrics.points import Points
 from server.runs.repository import RunRepository
 from workers.checkpoints import read_checkpoint
@@ -97,9 +97,9 @@ class Proof:
                     expected.update(_point(name, item["step"], item["at"], value) for name, value in item["values"].items())
         found: Counter[Point] = Counter()
         # The tables as they are: whoever reads curves sees one point a step, and would hide what is there twice.
-        for row in session.scalars(select(models.MetricRow).where(models.MetricRow.run_id == run_id)):
+        for row in session.scalars(select(tables.MetricRow).where(tables.MetricRow.run_id == run_id)):
             found.update(_point(name, row.step, row.wall_time, value) for name, value in row.values.items())
-        for chunk in session.scalars(select(models.MetricChunk).where(models.MetricChunk.run_id == run_id)):
+        for chunk in session.scalars(select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id)):
             points = Points.decode(chunk.points, chunk.count)
             rows = zip(points.steps.tolist(), points.times.tolist(), points.values.tolist(), strict=True)
             found.update(_point(chunk.name, step, at, value) for step, at, value in rows)
@@ -119,7 +119,7 @@ class Proof:
                 self.verdict.events_wrong += times > 1 or (needed and times == 0)
 
     def _check_archives(self, session: Session, run_id: str) -> None:
-        query = select(models.Checkpoint).where(models.Checkpoint.run_id == run_id)
+        query = select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id)
         for checkpoint in session.scalars(query):
             if checkpoint.id in self._damaged:
                 continue
@@ -129,8 +129,8 @@ class Proof:
             self.verdict.torn += not whole
 
     def _final_state(self, session: Session, run_id: str) -> dict[str, bytes]:
-        query = select(models.Checkpoint.id).where(models.Checkpoint.run_id == run_id)
-        last = session.scalars(query.order_by(models.Checkpoint.step.desc()).limit(1)).one()
+        query = select(tables.Checkpoint.id).where(tables.Checkpoint.run_id == run_id)
+        last = session.scalars(query.order_by(tables.Checkpoint.step.desc()).limit(1)).one()
         checkpoint = read_checkpoint(self._archives / f"{last}.zip")
         return {
             "counters": checkpoint.counters.model_dump_json().encode(),
