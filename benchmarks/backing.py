@@ -3,9 +3,11 @@
 import os
 import pwd
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
+from tempfile import mkdtemp
 
 import psutil
 
@@ -17,6 +19,9 @@ _SYSTEM_USER = "postgres"
 
 class Backing:
     """A process that others connect to. `start` returns once it answers; its data outlive `kill`."""
+
+    # What ends it in order.
+    stop_signal = signal.SIGTERM
 
     def __init__(self, name: str, directory: Path) -> None:
         self.name = name
@@ -63,7 +68,9 @@ class Backing:
         self._process.send_signal(self.stop_signal)
         self._process.wait(_PATIENCE_SECONDS)
 
-    stop_signal = 15
+    def close(self) -> None:
+        """End it for good."""
+        self.kill()
 
 
 class Redis(Backing):
@@ -84,14 +91,14 @@ class Redis(Backing):
 
 
 class Postgres(Backing):
-    """A cluster of its own in `directory`; it refuses to be root's, so it is the system user's where root asks."""
+    """A cluster of its own; it refuses to be root's, so it is the system user's where root asks."""
 
-    stop_signal = 2  # SIGINT: "fast", which ends connections
+    stop_signal = signal.SIGINT  # "fast", which ends connections
 
     def __init__(self, directory: Path) -> None:
         super().__init__("postgres", directory)
-        self._data = directory / "postgres"
-        self._data.mkdir()
+        # Of its own: the system user may not look into root's directories.
+        self._data = Path(mkdtemp(prefix="mapless-postgres-"))
         self._as_user: list[str] = []
         if os.getuid() == 0:
             user = pwd.getpwnam(_SYSTEM_USER)
@@ -112,6 +119,11 @@ class Postgres(Backing):
         """With one socket, on 127.0.0.1."""
         options = ("-k", "", "-h", "127.0.0.1", "-p", str(self.port), "-D", str(self._data))
         return [*self._as_user, str(self._bin / "postgres"), *options]
+
+    def close(self) -> None:
+        """End it and remove its data."""
+        super().close()
+        shutil.rmtree(self._data, ignore_errors=True)
 
     def answers(self) -> bool:
         """Whether connections are accepted."""

@@ -19,6 +19,7 @@ from server.database.engine import Database
 from server.metrics.points import Points
 from server.runs.repository import RunRepository
 from workers.checkpoints import read_checkpoint
+from workers.errors import ArchiveError
 
 # A series' name, a step, and the bits of the time and of the value: what the database keeps of a reported number.
 Point = tuple[str, int, bytes]
@@ -86,7 +87,8 @@ class Proof:
             self._check_events(session, run_id, limits)
             self._check_archives(session, run_id)
             self.verdict.runs += 1
-            if self._final_state(session, run_id) != self._final_state(session, reference_id):
+            ours, theirs = self._final_state(session, run_id), self._final_state(session, reference_id)
+            if ours is None or ours != theirs:
                 self.verdict.differing.append(run_id)
 
     def _check_points(self, session: Session, run_id: str, limits: Mapping[int, float]) -> None:
@@ -128,10 +130,14 @@ class Proof:
             whole = path.exists() and hashlib.sha256(path.read_bytes()).hexdigest() == checkpoint.sha256
             self.verdict.torn += not whole
 
-    def _final_state(self, session: Session, run_id: str) -> dict[str, bytes]:
+    def _final_state(self, session: Session, run_id: str) -> dict[str, bytes] | None:
+        """Weights and everything else that a resumed training would go on from; None where the archive cannot be read."""
         query = select(tables.Checkpoint.id).where(tables.Checkpoint.run_id == run_id)
         last = session.scalars(query.order_by(tables.Checkpoint.step.desc()).limit(1)).one()
-        checkpoint = read_checkpoint(self._archives / f"{last}.zip")
+        try:
+            checkpoint = read_checkpoint(self._archives / f"{last}.zip")
+        except (ArchiveError, OSError):
+            return None
         return {
             "counters": checkpoint.counters.model_dump_json().encode(),
             **{f"weights {name}": _bits(array) for name, array in checkpoint.weights.items()},

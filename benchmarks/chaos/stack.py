@@ -246,7 +246,7 @@ class Stack:
                 proxy.close()
         for backing in (self.postgres, self.redis):
             if backing is not None:
-                backing.kill()
+                backing.close()
         for disk in (self.disk, *(node.disk for node in self.nodes)):
             disk.close()
         self.api.close()

@@ -78,7 +78,7 @@ def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -
         kill(tree(process.pid))
         process.wait()
         if postgres is not None:
-            postgres.stop()
+            postgres.close()
 
 
 def _answers(url: str) -> bool:
@@ -143,7 +143,15 @@ class _Part:
 
 
 def load(
-    *, database: Database, runs: int, series: int, batches: float, browsers: int, views: int, seconds: float
+    *,
+    database: Database,
+    runs: int,
+    series: int,
+    batches: float,
+    browsers: int,
+    views: int,
+    seconds: float,
+    page_seconds: float = 10.0,
 ) -> dict[str, object]:
     """Make the load for a while; the figures."""
     usable = sorted(os.sched_getaffinity(0))
@@ -163,7 +171,7 @@ def load(
             series=series,
             batches=batches,
             browsers=browsers,
-            page_seconds=10.0,
+            page_seconds=page_seconds,
             views=views,
             seconds=seconds,
         )

@@ -1,0 +1,21 @@
+"""A small form of the load benchmark: synthetic runs, browsers and a watched run against one server, and nothing gives way.
+
+How quickly pages come is the benchmark's to say, with a core for the server alone.
+"""
+
+import pytest
+
+from benchmarks.load.__main__ import Database, load
+from tests.conftest import POSTGRES, require_service
+
+
+@pytest.mark.parametrize("database", ["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
+def test_a_small_lab_is_carried(database: Database) -> None:
+    if database == "postgresql":
+        require_service("PostgreSQL", *POSTGRES)
+    figures = load(database=database, runs=6, series=43, batches=1.0, browsers=4, views=1, seconds=12.0, page_seconds=3.0)
+    assert figures["leases_lost"] == figures["items_not_acknowledged"] == figures["errors"] == 0, figures
+    for name in ("batches_per_second", "pages", "page_p95_milliseconds", "frames_sent", "view_frames_per_second"):
+        value = figures[name]
+        assert isinstance(value, int | float)
+        assert value > 0, figures
