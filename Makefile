@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
-STACK_TESTS := tests/browser tests/services
+STACK_TESTS := tests/benchmarks tests/browser tests/services
 .PHONY: help run test check format lock pages types
 
 help:
