@@ -13,6 +13,9 @@ import anyio
 from anyio import from_thread
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+# What takes time: the pages' files are there at once.
+_PREFIXES = ("/api/", "/replays/")
+
 
 def stop_if_abandoned() -> None:
     """Raise if the request that this thread works for was abandoned; to be called between pieces of long work.
@@ -33,7 +36,7 @@ class AbandonedRequestsMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""
-        if scope["type"] != "http" or scope["method"] not in ("GET", "HEAD") or not scope["path"].startswith("/api/"):
+        if scope["type"] != "http" or scope["method"] not in ("GET", "HEAD") or not scope["path"].startswith(_PREFIXES):
             await self._app(scope, receive, send)
             return
         left = anyio.Event()

@@ -37,6 +37,7 @@ from server.settings import Settings
 from server.slow_clients import SlowClientMiddleware
 from server.sweeper import dispatch
 from server.system import endpoints as system
+from server.system.readiness import ReadinessProbe
 from server.version import version
 from server.worker_api import endpoints as worker_api
 
@@ -105,6 +106,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     app = describe(lifespan, max_body_size=services.settings.max_body_bytes)
     app.state.services = services
+    app.state.readiness = ReadinessProbe(services)
     pages.mount_pages(app, services.settings.web_dist)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)

@@ -14,6 +14,7 @@ ServiceError                        500
 ├── ExportFailedError               500  a policy could not be exported faithfully
 ├── ReplayFailedError               500  an evaluation could not be driven again
 ├── DatabaseBusyError               503  other writers take too long
+├── BusyError                       503  as much of this kind of work waits as may
 ├── ExportTimeoutError              503  exporting took too long
 └── ReplayTimeoutError              503  driving an evaluation again took too long
 """
@@ -116,6 +117,12 @@ class ExportFailedError(ServiceError):
 
 class ExportTimeoutError(ServiceError):
     """Exporting took too long; later it may not."""
+
+    status = 503
+
+
+class BusyError(ServiceError):
+    """As much of this kind of work waits as may; later there is room."""
 
     status = 503
 

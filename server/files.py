@@ -96,6 +96,16 @@ class FileStore:
         """Remove an archive; one that is not there is none to remove."""
         self._remove(self._path(identifier))
 
+    def ping(self) -> None:
+        """Ask the store for an answer.
+
+        Raises:
+            OSError: it is not there.
+        """
+        self._filesystem.invalidate_cache()
+        if not self._filesystem.exists(self._root):
+            raise FileNotFoundError(f"There is no store at {self._root}.")
+
     def ids(self) -> set[str]:
         """The ids of all archives in the store."""
         return {PurePosixPath(path).stem for path in self._list() if path.endswith(_SUFFIX)}

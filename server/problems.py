@@ -16,11 +16,11 @@ NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"
 CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
 EXPORT_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not exported: the reason is in the detail"},
-    503: {"model": ErrorBody, "description": "Took too long"},
+    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
 }
 REPLAY_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
-    503: {"model": ErrorBody, "description": "Took too long"},
+    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
 }
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 

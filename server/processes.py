@@ -3,10 +3,17 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
+
+from server.abandoned import stop_if_abandoned
 
 ROOT = Path(__file__).resolve().parents[1]
 """Of the packages that such processes run."""
+
+
+# Between two looks at whether somebody still waits.
+_LOOK_SECONDS = 0.2
 
 
 class ProcessFailedError(Exception):
@@ -25,23 +32,37 @@ def run_module(module: str, *arguments: str, timeout: float) -> None:
         arguments: of its command line.
         timeout: seconds.
 
+    On a thread of anyio's that works for a request, it is ended when the request is cancelled.
+
     Raises:
         ProcessFailedError: it failed.
         ProcessTimeoutError: it took longer.
     """
     path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    deadline = time.monotonic() + timeout
+    with subprocess.Popen(
+        [sys.executable, "-m", module, *arguments],
+        env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            while (words := _last_words(process)) is None:
+                if time.monotonic() > deadline:
+                    raise ProcessTimeoutError
+                stop_if_abandoned()
+        finally:
+            process.kill()
+    if process.returncode != 0:
+        reason = words.strip().splitlines()[-1:] or [f"exit status {process.returncode}"]
+        raise ProcessFailedError(reason[0].removeprefix("mapless: "))
+
+
+def _last_words(process: "subprocess.Popen[str]") -> str | None:
+    """What it said on standard error, once it has ended; None while it goes on."""
     try:
-        subprocess.run(
-            [sys.executable, "-m", module, *arguments],
-            env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=timeout,
-            check=True,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise ProcessTimeoutError from error
-    except subprocess.CalledProcessError as error:
-        reason = error.stderr.strip().splitlines()[-1:] or [f"exit status {error.returncode}"]
-        raise ProcessFailedError(reason[0].removeprefix("mapless: ")) from error
+        return process.communicate(timeout=_LOOK_SECONDS)[1]
+    except subprocess.TimeoutExpired:
+        return None

@@ -11,6 +11,7 @@ from server.database.engine import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
 from server.files import FileStore
+from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
@@ -18,6 +19,7 @@ from server.replays.recordings import RecordingStore
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
+from server.system.pulse import Pulse
 from server.worker_api.leases import Leases
 
 
@@ -37,6 +39,8 @@ class Services:
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
     leases: Leases = field(init=False)
+    lanes: Lanes = field(default_factory=Lanes)
+    pulse: Pulse = field(default_factory=Pulse)
     login_limiter: GuessLimiter = field(default_factory=GuessLimiter)
 
     def __post_init__(self) -> None:

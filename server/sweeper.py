@@ -94,7 +94,7 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     services.doorbell = doorbell
     ingest = Ingest(WorkerService(services).receive)
     services.links = OpenLinks(asyncio.get_running_loop(), ingest)
-    task = asyncio.create_task(_sweep_regularly(Sweeper(services)))
+    task = asyncio.create_task(_sweep_regularly(services))
     try:
         yield
     finally:
@@ -105,10 +105,12 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
         await run_in_threadpool(doorbell.close)
 
 
-async def _sweep_regularly(sweeper: Sweeper) -> None:
+async def _sweep_regularly(services: Services) -> None:
+    sweeper = Sweeper(services)
     while True:
         try:
-            await run_in_threadpool(sweeper.sweep)
+            await services.lanes.sweeper.run(sweeper.sweep)
+            services.pulse.beat()
         except Exception:
             # Leases must expire for all runs, whatever is wrong with one of them, or with the database for a while.
             logger.exception("a sweep failed: the next one tries again")

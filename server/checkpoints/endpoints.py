@@ -29,15 +29,16 @@ def list_checkpoints(run_id: str, service: CheckpointServiceDep) -> list[Checkpo
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/download", response_class=StreamingResponse, responses=NOT_FOUND | _ZIP)
-def download_checkpoint(checkpoint_id: str, service: CheckpointServiceDep) -> StreamingResponse:
+async def download_checkpoint(checkpoint_id: str, service: CheckpointServiceDep, services: ServicesDep) -> StreamingResponse:
     """The archive: weights as safetensors, manifest as JSON, and the state to resume."""
-    download = service.download(checkpoint_id)
+    lane = services.lanes.downloads
+    download = await lane.run(service.download, checkpoint_id)
     headers = {
         "Content-Disposition": f'attachment; filename="{download.file_name}"',
         "Content-Length": str(download.size),
         "ETag": f'"{download.sha256}"',
     }
-    return StreamingResponse(download.blocks, media_type="application/zip", headers=headers)
+    return StreamingResponse(lane.each(download.blocks), media_type="application/zip", headers=headers)
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND)

@@ -2,8 +2,8 @@
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
 
+from server.exports.response import BundleResponse
 from server.exports.service import ExportService
 from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
 from server.services import ServicesDep
@@ -18,12 +18,6 @@ _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "str
     response_class=FileResponse,
     responses=NOT_FOUND | EXPORT_FAILED | _ZIP,
 )
-def download_bundle(checkpoint_id: str, services: ServicesDep) -> FileResponse:
+async def download_bundle(checkpoint_id: str, services: ServicesDep) -> FileResponse:
     """All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch just now."""
-    bundle = ExportService(services).bundle(checkpoint_id)
-    return FileResponse(
-        bundle.path,
-        media_type="application/zip",
-        filename=bundle.file_name,
-        background=BackgroundTask(bundle.discard),
-    )
+    return BundleResponse(await services.lanes.exports.run(ExportService(services).bundle, checkpoint_id))

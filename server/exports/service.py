@@ -4,7 +4,6 @@ import shutil
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from threading import BoundedSemaphore
 
 from server.checkpoints.service import CheckpointService
 from server.errors import ExportFailedError, ExportTimeoutError
@@ -13,8 +12,6 @@ from server.services import Services
 
 # Imports take most of the three seconds that an export needs; a machine that is busy training needs longer.
 _TIMEOUT = 120.0
-# An export takes a core and 0.5 GB; who comes third waits.
-_SLOTS = BoundedSemaphore(2)
 
 
 @dataclass(frozen=True)
@@ -68,13 +65,12 @@ def bundle_of(archive: Path, file_name: str) -> BundleFile:
 
 
 def _run(archive: Path, out: Path) -> None:
-    with _SLOTS:
-        try:
-            run_module("workers.export", str(archive), "--format", "bundle", "--out", str(out), timeout=_TIMEOUT)
-        except ProcessTimeoutError as error:
-            raise ExportTimeoutError(
-                f"Exporting took longer than {_TIMEOUT:.0f} s: the machine is busy; try again, or download the checkpoint "
-                "and run `mapless export` on it elsewhere."
-            ) from error
-        except ProcessFailedError as error:
-            raise ExportFailedError(f"The policy was not exported: {error}") from error
+    try:
+        run_module("workers.export", str(archive), "--format", "bundle", "--out", str(out), timeout=_TIMEOUT)
+    except ProcessTimeoutError as error:
+        raise ExportTimeoutError(
+            f"Exporting took longer than {_TIMEOUT:.0f} s: the machine is busy; try again, or download the checkpoint "
+            "and run `mapless export` on it elsewhere."
+        ) from error
+    except ProcessFailedError as error:
+        raise ExportFailedError(f"The policy was not exported: {error}") from error

@@ -2,12 +2,13 @@
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
 
+from server.exports.response import BundleResponse
 from server.exports.service import bundle_of
 from server.policies import service
 from server.policies.schemas import PolicyEpisodes, ReferencePolicy
 from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from server.services import ServicesDep
 from workers.reference.library import reference_policies
 
 router = APIRouter(prefix="/api/policies", tags=["policies"])
@@ -41,10 +42,8 @@ def download_policy(name: str) -> FileResponse:
 
 
 @router.get("/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | EXPORT_FAILED | _ZIP)
-def download_policy_bundle(name: str) -> FileResponse:
+async def download_policy_bundle(name: str, services: ServicesDep) -> FileResponse:
     """All that it takes to drive a robot with it; compared with torch just now."""
     policy = service.find(name)
-    bundle = bundle_of(policy.archive, f"mapless-{policy.card.name}-bundle.zip")
-    return FileResponse(
-        bundle.path, media_type="application/zip", filename=bundle.file_name, background=BackgroundTask(bundle.discard)
-    )
+    file_name = f"mapless-{policy.card.name}-bundle.zip"
+    return BundleResponse(await services.lanes.exports.run(bundle_of, policy.archive, file_name))

@@ -27,43 +27,58 @@ def _checkpoint(checkpoint_id: str, services: ServicesDep) -> Subject:
     return checkpoint_subject(services, checkpoint_id)
 
 
+class Player:
+    """Answers with an episode's page, made in the replays' lane."""
+
+    def __init__(self, services: ServicesDep) -> None:
+        self._services = services
+
+    async def __call__(self, request: Request, subject: Subject, episode: int, theme: Theme) -> Response:
+        """The episode is inside the page. viser's client would do more that its address asks for: what is not ours goes."""
+        if request.query_params.keys() - {_DOWNLOAD}:
+            return RedirectResponse(request.url.path)
+        headers = dict(HEADERS)
+        if _DOWNLOAD in request.query_params:
+            name = f"{subject.file_name.removesuffix('.zip')}-episode{episode}.html"
+            headers["Content-Disposition"] = f'attachment; filename="{name}"'
+        service = ReplayService(self._services.recordings)
+        page = await self._services.lanes.replays.run(service.page, subject, episode, theme)
+        return HTMLResponse(page, headers=headers)
+
+
 ReplayServiceDep = Annotated[ReplayService, Depends(_service)]
+PlayerDep = Annotated[Player, Depends()]
 CheckpointDep = Annotated[Subject, Depends(_checkpoint)]
 PolicyDep = Annotated[Subject, Depends(policy_subject)]
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
-def replay_checkpoint(checkpoint_id: str, subject: CheckpointDep, episode: int, service: ReplayServiceDep) -> Replay:
+async def replay_checkpoint(
+    checkpoint_id: str, subject: CheckpointDep, episode: int, service: ReplayServiceDep, services: ServicesDep
+) -> Replay:
     """Drive an episode of a checkpoint's evaluation again: a few seconds for the first one, then at once."""
-    return service.prepare(subject, episode, f"/replays/checkpoints/{checkpoint_id}/{episode}/")
+    page = f"/replays/checkpoints/{checkpoint_id}/{episode}/"
+    return await services.lanes.replays.run(service.prepare, subject, episode, page)
 
 
 @router.get("/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
-def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int, service: ReplayServiceDep) -> Replay:
+async def replay_policy(
+    name: str, suite: str, subject: PolicyDep, episode: int, service: ReplayServiceDep, services: ServicesDep
+) -> Replay:
     """Drive an episode of a reference policy again: a few seconds for the first one, then at once."""
-    return service.prepare(subject, episode, f"/replays/policies/{name}/{suite}/{episode}/")
+    page = f"/replays/policies/{name}/{suite}/{episode}/"
+    return await services.lanes.replays.run(service.prepare, subject, episode, page)
 
 
 @router.get("/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False)
-def play_checkpoint(
-    request: Request, subject: CheckpointDep, episode: int, theme: Theme, service: ReplayServiceDep
+async def play_checkpoint(
+    request: Request, subject: CheckpointDep, episode: int, theme: Theme, player: PlayerDep
 ) -> Response:
     """The player of an episode of a checkpoint's evaluation."""
-    return _page(request, subject, episode, theme, service)
+    return await player(request, subject, episode, theme)
 
 
 @router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False)
-def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, service: ReplayServiceDep) -> Response:
+async def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, player: PlayerDep) -> Response:
     """The player of an episode of a reference policy."""
-    return _page(request, subject, episode, theme, service)
-
-
-def _page(request: Request, subject: Subject, episode: int, theme: Theme, service: ReplayService) -> Response:
-    """The episode is inside the page. viser's client would do more that its address asks for: what is not ours goes."""
-    if request.query_params.keys() - {_DOWNLOAD}:
-        return RedirectResponse(request.url.path)
-    headers = dict(HEADERS)
-    if _DOWNLOAD in request.query_params:
-        name = f"{subject.file_name.removesuffix('.zip')}-episode{episode}.html"
-        headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    return HTMLResponse(service.page(subject, episode, theme), headers=headers)
+    return await player(request, subject, episode, theme)

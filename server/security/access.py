@@ -3,7 +3,8 @@
 - *Host* must be one of ours: a foreign name that resolves to this machine (DNS rebinding) is refused.
 - *Origin*, where a browser sends one with a request that changes something or opens a WebSocket, must be the page's own.
 - Everything under /api, /live and /replays needs the login token, as a cookie or as `Authorization: Bearer`; /api/worker
-  needs the workers' token instead, which opens nothing else. The pages themselves, /healthz and the login are open.
+  needs the workers' token instead, which opens nothing else. The pages themselves, /healthz, /readyz and the
+  login are open.
 """
 
 import hmac

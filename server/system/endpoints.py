@@ -1,12 +1,23 @@
 """Routes of the service itself."""
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response, status
 
 from server.services import ServicesDep
 from server.system import service
-from server.system.schemas import Status, Version
+from server.system.readiness import ReadinessProbe
+from server.system.schemas import Readiness, Status, Version
 
 router = APIRouter(tags=["system"])
+
+
+def _readiness(request: Request) -> ReadinessProbe:
+    probe: ReadinessProbe = request.app.state.readiness
+    return probe
+
+
+ReadinessDep = Annotated[ReadinessProbe, Depends(_readiness)]
 
 
 @router.get("/api/version")
@@ -22,7 +33,15 @@ def get_status(services: ServicesDep) -> Status:
 
 
 @router.api_route("/healthz", methods=["GET", "HEAD"], include_in_schema=False)
-def check_health(services: ServicesDep) -> dict[str, str]:
-    """Answers once the database does; open to everybody, and tells nothing."""
-    services.database.ping()
+async def check_health() -> dict[str, str]:
+    """The process is alive and answers; open to everybody."""
     return {"status": "ok"}
+
+
+@router.api_route("/readyz", methods=["GET", "HEAD"], include_in_schema=False)
+async def check_readiness(probe: ReadinessDep, response: Response) -> Readiness:
+    """Whether database, store, sweeper and threads answer, 503 where one does not; open to everybody, tells no more."""
+    readiness = await probe.ask()
+    if not readiness.ready:
+        response.status_code = status.HTTP_503_SERVICE_UNAVAILABLE
+    return readiness

@@ -20,6 +20,13 @@ class WorkerStatus(Schema):
     run_id: str | None = Field(description="The run that it trains now.")
 
 
+class Readiness(Schema):
+    """Whether the service can do its work."""
+
+    ready: bool
+    checks: dict[str, str] = Field(description="Of each part `ok`, or what is wrong.")
+
+
 class Status(Version):
     """The service at a glance."""
 

@@ -9,7 +9,6 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Request, WebSocket
 from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
-from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocketDisconnect
 
 from server.errors import TooLargeError
@@ -47,15 +46,15 @@ StepPath = Annotated[int, Path(ge=0, le=MAX_INTEGER)]
 
 
 @router.post("/heartbeat", status_code=204)
-def heartbeat(body: Heartbeat, service: WorkerServiceDep) -> None:
+async def heartbeat(body: Heartbeat, service: WorkerServiceDep, services: ServicesDep) -> None:
     """A worker is there."""
-    service.heartbeat(body)
+    await services.lanes.workers.run(service.heartbeat, body)
 
 
 @router.post("/runs/{run_id}/claim")
-def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep) -> Claim:
+async def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep, services: ServicesDep) -> Claim:
     """Take up a run; 409 where it is not to be had."""
-    return service.claim(run_id, body)
+    return await services.lanes.workers.run(service.claim, run_id, body)
 
 
 # The file store has a cap of its own, which the settings say.
@@ -66,20 +65,22 @@ async def put_checkpoint(
     """One line of JSON (`CheckpointUpload`), then the archive."""
     stream = request.stream()
     upload, archive = await _split(stream, services.settings.max_body_bytes)
-    await run_in_threadpool(service.check, run_id, attempt, upload.after_seq)
+    lane = services.lanes.workers
+    await lane.run(service.check, run_id, attempt, upload.after_seq)
     file = await services.files.write(new_id(), archive, upload.sha256)
     registered = False
     try:
-        registered = await run_in_threadpool(service.register, run_id, attempt, step, file, upload)
+        registered = await lane.run(service.register, run_id, attempt, step, file, upload)
     finally:
         if not registered:
-            await run_in_threadpool(services.files.delete, file.id)
+            await lane.run(services.files.delete, file.id)
 
 
 @router.get("/checkpoints/{checkpoint_id}")
-def get_checkpoint(checkpoint_id: str, service: WorkerServiceDep) -> StreamingResponse:
+async def get_checkpoint(checkpoint_id: str, service: WorkerServiceDep, services: ServicesDep) -> StreamingResponse:
     """The archive of a checkpoint."""
-    return StreamingResponse(service.download(checkpoint_id), media_type="application/zip")
+    lane = services.lanes.workers
+    return StreamingResponse(lane.each(await lane.run(service.download, checkpoint_id)), media_type="application/zip")
 
 
 @router.websocket("/runs/{run_id}/link")

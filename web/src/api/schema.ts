@@ -4886,7 +4886,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Took too long */
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -5052,7 +5052,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Took too long */
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -5730,7 +5730,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Took too long */
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -6000,7 +6000,7 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Took too long */
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
             503: {
                 headers: {
                     [name: string]: unknown;
