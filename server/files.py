@@ -1,15 +1,18 @@
 """Where checkpoint archives lie: a directory or any fsspec store, under names that the service generates."""
 
 import hashlib
+import os
 from collections.abc import AsyncIterable, Iterator
 from dataclasses import dataclass
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import IO, Any, cast
 
 import fsspec
+from fsspec.implementations.local import LocalFileSystem
 from starlette.concurrency import run_in_threadpool
 
 from server.errors import CorruptUploadError, NotFoundError, ServiceError, TooLargeError
+from workers.checkpoints import sync_directory
 
 _BLOCK = 256 * 1024
 _SUFFIX = ".zip"
@@ -32,6 +35,8 @@ class StoredFile:
 class FileStore:
     """Archives by id, each complete: while it is being written it goes by another name.
 
+    What was written is on disk when `write` returns, where the store is a directory; other stores promise that themselves.
+
     Args:
         url: a directory, or an fsspec URL.
         max_bytes: of one archive.
@@ -46,6 +51,7 @@ class FileStore:
         except (ImportError, ValueError) as error:
             raise UnusableStoreError(f"Checkpoints can't be kept at {url} (MAPLESS_FILES_URL): {error}") from error
         self._max_bytes = max_bytes
+        self._local = isinstance(self._filesystem, LocalFileSystem)
         self._filesystem.makedirs(self._root, exist_ok=True)
 
     async def write(self, identifier: str, stream: AsyncIterable[bytes], sha256: str | None = None) -> StoredFile:
@@ -70,15 +76,28 @@ class FileStore:
                         )
                     digest.update(block)
                     await run_in_threadpool(file.write, block)
+                await run_in_threadpool(self._sync, file)
             finally:
                 await run_in_threadpool(file.close)
             if sha256 is not None and digest.hexdigest() != sha256.lower():
                 raise CorruptUploadError("What arrived does not have the SHA-256 that was announced: send it again.")
             await run_in_threadpool(self._filesystem.mv, torn, path)
+            await run_in_threadpool(self._sync_root)
         except BaseException:
             await run_in_threadpool(self._remove, torn)
             raise
         return StoredFile(identifier, size, digest.hexdigest())
+
+    def open(self, identifier: str) -> IO[bytes]:
+        """The archive as a file to read and seek in; the caller closes it.
+
+        Raises:
+            NotFoundError: the store has no such archive.
+        """
+        try:
+            return cast("IO[bytes]", self._filesystem.open(self._path(identifier), "rb"))
+        except FileNotFoundError as error:
+            raise NotFoundError(f"The archive of checkpoint {identifier} is gone from the store.") from error
 
     def read(self, identifier: str) -> Iterator[bytes]:
         """The archive's bytes, block by block.
@@ -86,11 +105,7 @@ class FileStore:
         Raises:
             NotFoundError: at once, if the store has no such archive.
         """
-        try:
-            file = cast("IO[bytes]", self._filesystem.open(self._path(identifier), "rb"))
-        except FileNotFoundError as error:
-            raise NotFoundError(f"The archive of checkpoint {identifier} is gone from the store.") from error
-        return _blocks(file)
+        return _blocks(self.open(identifier))
 
     def delete(self, identifier: str) -> None:
         """Remove an archive; one that is not there is none to remove."""
@@ -115,6 +130,15 @@ class FileStore:
         for path in self._list():
             if path.endswith(_SUFFIX + _TORN_SUFFIX):
                 self._remove(path)
+
+    def _sync(self, file: IO[bytes]) -> None:
+        file.flush()
+        if self._local:
+            os.fsync(file.fileno())
+
+    def _sync_root(self) -> None:
+        if self._local:
+            sync_directory(Path(self._root))
 
     def _list(self) -> list[str]:
         self._filesystem.invalidate_cache()

@@ -14,20 +14,18 @@ from server.doorbell import CeleryDoorbell, prepare_broker
 from server.experiments.stored import training_of
 from server.runs.repository import RunRepository
 from server.services import Services
-from server.system.repository import WorkerRepository
+from server.system.repository import SILENCE_SECONDS, WorkerRepository
 from server.worker_api.ingest import Ingest
 from server.worker_api.leases import Attempt
 from server.worker_api.links import OpenLinks
 from server.worker_api.service import WorkerService
-from workers.protocol import HEARTBEAT_SECONDS, queue_of
+from workers.protocol import queue_of
 
 logger = logging.getLogger(__name__)
 
 _SWEEPS_PER_LEASE = 5
 # A run that waits although a worker is idle is rung again after this long: its message was lost.
 RING_AGAIN_SECONDS = 10.0
-# A worker is there if it was heard of within so many heartbeats.
-_HEARTBEATS = 3
 
 
 class Sweeper:
@@ -71,7 +69,7 @@ class Sweeper:
         moment = time.time()
         with self._services.database.read() as session:
             waiting = RunRepository(session).queued()
-            idle = WorkerRepository(session).idle_by_queue(moment - _HEARTBEATS * HEARTBEAT_SECONDS, moment)
+            idle = WorkerRepository(session).idle_by_queue(moment - SILENCE_SECONDS, moment)
         # Whoever queued a run has rung for it: one that is new here was rung a moment ago.
         quiet_since = {(run.id, run.attempt): self._quiet_since.get((run.id, run.attempt), now) for run in waiting}
         rung: dict[str, int] = defaultdict(int)

@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ Arrays = Mapping[str, NDArray[np.generic]]
 
 # Far above what any configuration makes, far below what hurts.
 _SIZE_LIMITS = {MANIFEST: 2**20, POLICY: 2**26, STATE_ARRAYS: 2**31, STATE_COUNTERS: 2**16}
+
+_BLOCK = 256 * 1024
 
 # The same content gives the same bytes, whenever it is written.
 _TIMESTAMP = (1980, 1, 1, 0, 0, 0)
@@ -88,9 +91,19 @@ def _write(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> None
             file.flush()
             os.fsync(file.fileno())
             Path(file.name).replace(path)
+            sync_directory(path.parent)
         except BaseException:
             Path(file.name).unlink(missing_ok=True)
             raise
+
+
+def sync_directory(directory: Path) -> None:
+    """Bring a folder's entries to disk: until then a crash may take back that a file was created or renamed."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -99,7 +112,7 @@ def read_manifest(path: Path) -> Manifest:
     Raises:
         ArchiveError: it is not an archive that this release reads.
     """
-    with _open(path) as archive:
+    with _open(path, path.name) as archive:
         return _manifest(archive)
 
 
@@ -109,7 +122,7 @@ def read_policy(path: Path) -> tuple[Manifest, Policy]:
     Raises:
         ArchiveError: it is not an archive that this release reads, or it is damaged.
     """
-    with _open(path) as archive:
+    with _open(path, path.name) as archive:
         manifest = _manifest(archive)
         return manifest, Policy(manifest.training.algorithm.network, _weights(archive, manifest))
 
@@ -120,7 +133,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         ArchiveError: it is not an archive that this release reads, or it is damaged.
     """
-    with _open(path) as archive:
+    with _open(path, path.name) as archive:
         manifest = _manifest(archive)
         try:
             counters = TrainingCounters.model_validate_json(_member(archive, manifest, STATE_COUNTERS))
@@ -130,14 +143,37 @@ def read_checkpoint(path: Path) -> Checkpoint:
         return Checkpoint(manifest, _weights(archive, manifest), arrays, counters)
 
 
+def check_archive(file: IO[bytes], name: str) -> None:
+    """Compares every file of an archive with what its manifest promises, a block at a time.
+
+    Raises:
+        ArchiveError: it is not an archive that this release reads, or it is damaged.
+    """
+    with _open(file, name) as archive:
+        for member, entry in _manifest(archive).files.items():
+            if member not in archive.namelist():
+                raise ArchiveIntegrityError(f"{member} is missing in {name}")
+            with archive.open(member) as data:
+                if sha256_of(data) != entry.sha256:
+                    raise ArchiveIntegrityError(f"{member} in {name} is not the file that the manifest describes")
+
+
+def sha256_of(file: IO[bytes]) -> str:
+    """The SHA-256 of what is left to read of a file, in lower-case hexadecimal."""
+    digest = hashlib.sha256()
+    while block := file.read(_BLOCK):
+        digest.update(block)
+    return digest.hexdigest()
+
+
 @contextmanager
-def _open(path: Path) -> Iterator[zipfile.ZipFile]:
+def _open(source: Path | IO[bytes], name: str) -> Iterator[zipfile.ZipFile]:
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(source) as archive:
             names = archive.namelist()
             if len(set(names)) != len(names) or not {MANIFEST, POLICY} <= set(names) <= set(_SIZE_LIMITS):
                 raise ArchiveFormatError(
-                    f"{path.name} is not a checkpoint: it should hold {', '.join(_SIZE_LIMITS)}, each once, and nothing else"
+                    f"{name} is not a checkpoint: it should hold {', '.join(_SIZE_LIMITS)}, each once, and nothing else"
                 )
             for info in archive.infolist():
                 if info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size:
@@ -146,7 +182,7 @@ def _open(path: Path) -> Iterator[zipfile.ZipFile]:
                     raise ArchiveFormatError(f"{info.filename} has {info.file_size} bytes, more than any checkpoint's")
             yield archive
     except zipfile.BadZipFile as error:
-        raise ArchiveFormatError(f"{path.name} is not a readable archive ({error}): download it again") from error
+        raise ArchiveFormatError(f"{name} is not a readable archive ({error}): download it again") from error
 
 
 def _manifest(archive: zipfile.ZipFile) -> Manifest:

@@ -9,6 +9,9 @@ WorkerError
 ├── ExportError            a policy cannot be taken to another format
 ├── UnknownPolicyError     there is no such reference policy
 ├── EpisodesTooLongError   episodes do not fit into memory to be replayed
+├── LocalError             something is wrong with this worker or its machine, not with the run
+│   ├── UnfitError             it cannot take up a run now: no space, or no trainer starts
+│   └── SpoolDamagedError      what a training reported is no longer what was written to disk
 ├── ArchiveError           a checkpoint archive is refused
 │   ├── ArchiveFormatError       not an archive of this project, or of a newer version
 │   ├── ArchiveIntegrityError    its content is not what its manifest says
@@ -16,6 +19,7 @@ WorkerError
 └── ServerError            the server does not do what a worker asks of it
     ├── ServerUnavailableError   not reached, or not able to answer: ask again later
     ├── RunRefusedError          the run is not this worker's (any more)
+    ├── CheckpointGoneError      it no longer has a checkpoint's archive
     └── RequestRefusedError      it would refuse the same request again
 """
 
@@ -56,6 +60,18 @@ class EpisodesTooLongError(WorkerError):
     """The moments of an evaluation do not fit into memory."""
 
 
+class LocalError(WorkerError):
+    """Something is wrong with this worker or its machine: another one may do better."""
+
+
+class UnfitError(LocalError):
+    """This worker cannot take up a run now."""
+
+
+class SpoolDamagedError(LocalError):
+    """What a training reported is no longer what was written to disk."""
+
+
 class ArchiveError(WorkerError):
     """A checkpoint archive is refused."""
 
@@ -82,6 +98,10 @@ class ServerUnavailableError(ServerError):
 
 class RunRefusedError(ServerError):
     """The run is not this worker's: somebody else has it, or it has ended."""
+
+
+class CheckpointGoneError(ServerError):
+    """The server no longer has a checkpoint's archive; an older one may be there."""
 
 
 class RequestRefusedError(ServerError):

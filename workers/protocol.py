@@ -63,11 +63,12 @@ Text = Annotated[str, BeforeValidator(_storable), Field(max_length=MAX_TEXT)]
 Queue = Literal["cpu", "gpu"]
 """The Celery queue that a worker listens to."""
 
-FinalOutcome = Literal["completed", "stopped", "failed", "released", "lost"]
+FinalOutcome = Literal["completed", "stopped", "failed", "released", "lost", "damaged"]
 """How an attempt ended.
 
 completed: all steps are done. stopped: as asked to, with a checkpoint. failed: an error that would come again.
 released: the worker shuts down, and the run waits for the next one. lost: the trainer died; another attempt may do better.
+damaged: the checkpoint that it should have gone on from cannot be read; an older one may be whole.
 """
 
 
@@ -82,10 +83,13 @@ class ClaimRequest(Frozen):
     Attributes:
         worker: its name.
         published_attempt: the attempt that the message which woke it was published for.
+        claim_id: chosen by the worker, new for each run that it takes up: asked again under the same id, because the answer
+            got lost, the server grants the same attempt once more. None claims anew each time.
     """
 
     worker: WorkerName
     published_attempt: int = Field(ge=0)
+    claim_id: str | None = Field(None, pattern="^[0-9a-f]{32}$")
 
 
 class CheckpointReference(Frozen):
@@ -115,10 +119,15 @@ class Claim(Frozen):
 
 
 class Heartbeat(Frozen):
-    """A worker is there, busy or not."""
+    """A worker is there, busy or not.
+
+    Attributes:
+        trouble: why it takes up no run now; None while it does.
+    """
 
     worker: WorkerName
     queue: Queue
+    trouble: str | None = Field(None, max_length=10_000)
 
 
 class MetricItem(Frozen):

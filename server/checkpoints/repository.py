@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from pydantic import TypeAdapter
-from sqlalchemy import func, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session, defer
 
 from server.database import tables
@@ -57,15 +57,14 @@ class CheckpointRepository:
         return checkpoint
 
     def at_step(self, run_id: str, step: int) -> tables.Checkpoint | None:
-        """The run's checkpoint of exactly this step, if there is one."""
-        query = select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id, tables.Checkpoint.step == step)
+        """The run's whole checkpoint of exactly this step, if there is one."""
+        query = _whole(run_id).where(tables.Checkpoint.step == step)
         return self._session.scalars(query.order_by(tables.Checkpoint.created_at.desc())).first()
 
     def last(self, run_id: str) -> tables.Checkpoint | None:
-        """The run's checkpoint of the highest step, from which it is resumed."""
-        query = select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id)
+        """The run's whole checkpoint of the highest step, from which it is resumed."""
         return self._session.scalars(
-            query.order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
+            _whole(run_id).order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
         ).first()
 
     def of_run(self, run_id: str) -> Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]:
@@ -115,6 +114,10 @@ class CheckpointRepository:
         if run_ids is not None:
             query = query.where(tables.Checkpoint.run_id.in_(run_ids))
         return set(self._session.scalars(query))
+
+
+def _whole(run_id: str) -> Select[tables.Checkpoint]:
+    return select(tables.Checkpoint).where(tables.Checkpoint.run_id == run_id, tables.Checkpoint.damaged_at.is_(None))
 
 
 def decode_episodes(evaluation: tables.Evaluation) -> tuple[EpisodeResult, ...]:

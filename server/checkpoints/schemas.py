@@ -26,6 +26,7 @@ class Checkpoint(Schema):
     size: int = Field(description="Bytes of the archive.")
     sha256: str
     created_at: float
+    damaged: bool = Field(description="Its archive was found damaged or gone: the run went on from an older one.")
     best: bool = Field(description="Highest success rate of the run; of equal ones, fewest steps to the target.")
     evaluation: Evaluation | None
 

@@ -49,6 +49,7 @@ def checkpoint_views(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation |
             size=checkpoint.size,
             sha256=checkpoint.sha256,
             created_at=checkpoint.created_at,
+            damaged=checkpoint.damaged_at is not None,
             best=checkpoint.id == best,
             evaluation=evaluation_view(evaluation) if evaluation else None,
         )
@@ -57,8 +58,9 @@ def checkpoint_views(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation |
 
 
 def best_checkpoint(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
-    """The id of a run's best checkpoint; of its last where none was evaluated, None where there is none."""
-    return _best_evaluated(rows) or (rows[-1][0].id if rows else None)
+    """The id of a run's best whole checkpoint; of its last where none was evaluated, None where there is none."""
+    whole = [checkpoint.id for checkpoint, _ in rows if checkpoint.damaged_at is None]
+    return _best_evaluated(rows) or (whole[-1] if whole else None)
 
 
 def _best_evaluated(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
@@ -69,5 +71,9 @@ def _best_evaluated(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | 
         steps = evaluation.steps_mean if evaluation.steps_mean is not None else float("inf")
         return evaluation.arrivals / evaluation.episode_count, -steps, checkpoint.step
 
-    evaluated = [(checkpoint, evaluation) for checkpoint, evaluation in rows if evaluation is not None]
+    evaluated = [
+        (checkpoint, evaluation)
+        for checkpoint, evaluation in rows
+        if evaluation is not None and checkpoint.damaged_at is None
+    ]
     return max(evaluated, key=merit)[0].id if evaluated else None

@@ -50,8 +50,11 @@ class Run(Base):
     attempt: Mapped[int] = mapped_column(Integer, default=0)
     lease_until: Mapped[float | None] = mapped_column(Float)
     worker: Mapped[str | None] = mapped_column(String(120))
-    # Attempts lost since the last new checkpoint; the run fails after three.
+    # Chosen by the worker that has it: asked again under the same one, its claim is the same.
+    claim_id: Mapped[str | None] = mapped_column(String(32))
+    # Attempts lost since the last new checkpoint, and how many of them by each worker.
     losses: Mapped[int] = mapped_column(Integer, default=0)
+    lost_by: Mapped[dict[str, int] | None] = mapped_column(JSON)
     step: Mapped[int] = mapped_column(BigInteger, default=0)
     last_seq: Mapped[int] = mapped_column(BigInteger, default=0)
     error: Mapped[str | None] = mapped_column(Text)
@@ -123,6 +126,8 @@ class Checkpoint(Base):
     size: Mapped[int] = mapped_column(BigInteger)
     sha256: Mapped[str] = mapped_column(String(64))
     created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    # When its archive was found damaged or gone: no run goes on from it any more. Null while it is whole.
+    damaged_at: Mapped[float | None] = mapped_column(Float)
 
 
 class Evaluation(Base):
@@ -151,3 +156,5 @@ class Worker(Base):
     name: Mapped[str] = mapped_column(String(120), primary_key=True)
     queue: Mapped[Queue] = mapped_column(String(8))
     last_seen: Mapped[float] = mapped_column(Float)
+    # Why it takes up no run, in its own words; null while it does.
+    trouble: Mapped[str | None] = mapped_column(Text)

@@ -98,7 +98,7 @@ def resume_run(session: Session, run: tables.Run) -> None:
     """Move the row as `resume` says, with a clean slate of losses."""
     run.state = states.next_state(run.state, "resume")
     run.error = None
-    run.losses = 0
+    run.losses, run.lost_by = 0, None
     run.finished_at = None
     run.queued_at = time.time()
     RunRepository(session).add_event(run.id, "info", "Resume requested.", run.step)

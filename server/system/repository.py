@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import func, select
+from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.runs.states import ACTIVE
-from workers.protocol import Queue
+from workers.protocol import HEARTBEAT_SECONDS, Queue
+
+SILENCE_SECONDS = 3 * HEARTBEAT_SECONDS
+"""A worker that was silent for longer is not counted on."""
 
 
 class WorkerRepository:
@@ -21,19 +24,29 @@ class WorkerRepository:
         query = select(tables.Worker).where(tables.Worker.last_seen >= moment).order_by(tables.Worker.name)
         return self._session.scalars(query).all()
 
-    def seen(self, name: str, queue: Queue, moment: float) -> None:
-        """Note that a worker of this queue has just been heard of."""
-        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment))
+    def seen(self, name: str, queue: Queue, moment: float, trouble: str | None = None) -> None:
+        """Note that a worker of this queue has just been heard of, and why it takes up no run where it does not."""
+        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment, trouble=trouble))
+
+    def fit(self, queue: Queue, since: float, until: float) -> Sequence[str]:
+        """The workers of a queue that were heard of between these moments and take up runs."""
+        return self._session.scalars(
+            select(tables.Worker.name).where(tables.Worker.queue == queue, *_there(since, until))
+        ).all()
 
     def idle_by_queue(self, since: float, until: float) -> dict[Queue, int]:
-        """How many workers heard of between these moments train nothing, by queue; a queue without any is absent.
+        """How many workers heard of between these moments could take up a run, by queue; a queue without any is absent.
 
         One heard of in the future was heard before the clock was set back, and not since.
         """
         busy = select(tables.Run.worker).where(tables.Run.state.in_(ACTIVE), tables.Run.worker.is_not(None))
         query = (
             select(tables.Worker.queue, func.count())
-            .where(tables.Worker.last_seen.between(since, until), tables.Worker.name.not_in(busy))
+            .where(*_there(since, until), tables.Worker.name.not_in(busy))
             .group_by(tables.Worker.queue)
         )
         return {row[0]: row[1] for row in self._session.execute(query)}
+
+
+def _there(since: float, until: float) -> tuple[ColumnElement[bool], ...]:
+    return tables.Worker.last_seen.between(since, until), tables.Worker.trouble.is_(None)

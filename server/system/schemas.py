@@ -18,6 +18,7 @@ class WorkerStatus(Schema):
     name: str
     last_seen: float
     run_id: str | None = Field(description="The run that it trains now.")
+    trouble: str | None = Field(description="Why it takes up no run, a full disk say; null while it does.")
 
 
 class Readiness(Schema):

@@ -37,7 +37,13 @@ def status(services: Services) -> Status:
         version=version(),
         commit=commit(),
         workers=[
-            WorkerStatus(name=worker.name, last_seen=worker.last_seen, run_id=trained.get(worker.name)) for worker in workers
+            WorkerStatus(
+                name=worker.name,
+                last_seen=worker.last_seen,
+                run_id=trained.get(worker.name),
+                trouble=worker.trouble,
+            )
+            for worker in workers
         ],
         queued=counts.get("queued", 0),
         running=counts.get("running", 0) + counts.get("stopping", 0),

@@ -5,6 +5,7 @@ its run changes nothing.
 """
 
 import time
+from collections.abc import Collection
 
 from sqlalchemy.orm import Session
 
@@ -14,9 +15,9 @@ from server.errors import ConflictError, NotFoundError
 from server.metrics.repository import MetricRepository
 from server.runs import states
 from server.runs.repository import RunRepository
-from workers.protocol import Final
+from workers.protocol import ClaimRequest, Final
 
-# Attempts in a row that may be lost without a new checkpoint before the run fails.
+# Attempts in a row, without a new checkpoint, that one worker may lose while others wait; and workers that may lose one.
 MAX_LOSSES = 3
 
 
@@ -24,30 +25,39 @@ class FencedError(ConflictError):
     """The attempt is over: a newer one runs, its lease ran out, or the run has ended or was deleted."""
 
 
-def begin(session: Session, run: tables.Run, worker: str, published_attempt: int) -> tables.Checkpoint | None:
+def begin(session: Session, run: tables.Run, request: ClaimRequest, others: Collection[str]) -> tables.Checkpoint | None:
     """Give the run to a worker; what was reported beyond its last checkpoint is dropped.
+
+    Args:
+        session: the transaction.
+        run: locked.
+        request: what the worker asks for. Asked again under the same claim id, because the answer got lost, the run is its.
+        others: the workers that take up runs of this queue now.
 
     Returns:
         The checkpoint to go on from; None for a fresh start.
 
     Raises:
-        ConflictError: the run does not wait for a worker at this attempt (any more).
+        ConflictError: the run does not wait for this worker at this attempt (any more).
     """
-    if run.state != "queued" or run.attempt != published_attempt:
-        raise ConflictError(
-            f"Run {run.id} is {run.state} at attempt {run.attempt}: it is not to be had at {published_attempt}."
-        )
-    now = time.time()
     checkpoint = CheckpointRepository(session).last(run.id)
+    if run.state in states.ACTIVE and run.claim_id is not None and run.claim_id == request.claim_id:
+        return checkpoint
+    if run.state != "queued" or run.attempt != request.published_attempt:
+        raise ConflictError(
+            f"Run {run.id} is {run.state} at attempt {run.attempt}: it is not to be had at {request.published_attempt}."
+        )
+    if _exhausted(run, request.worker) and _hopeful(run, others):
+        raise ConflictError(f"{request.worker} lost run {run.id} {MAX_LOSSES} times: it waits for another worker.")
     run.state = states.next_state(run.state, "claim")
     run.attempt += 1
-    run.worker = worker
-    run.started_at = run.started_at or now
-    run.step = checkpoint.step if checkpoint else 0
-    # A step of its own for a fresh start: points at step 0 go too.
-    MetricRepository(session).drop_beyond(run.id, checkpoint.step if checkpoint else -1)
+    run.worker = request.worker
+    run.claim_id = request.claim_id
+    run.started_at = run.started_at or time.time()
+    _rewind(session, run, checkpoint)
     origin = f"from step {checkpoint.step:,}" if checkpoint else "from the start"
-    RunRepository(session).add_event(run.id, "info", f"Attempt {run.attempt} begins {origin} on {worker}.", run.step)
+    message = f"Attempt {run.attempt} begins {origin} on {request.worker}."
+    RunRepository(session).add_event(run.id, "info", message, run.step)
     return checkpoint
 
 
@@ -64,8 +74,22 @@ def unfenced(run: tables.Run | None, run_id: str, attempt: int) -> tables.Run:
     return run
 
 
-def end(session: Session, run: tables.Run, final: Final) -> None:
-    """The worker has said its last word."""
+def end(
+    session: Session,
+    run: tables.Run,
+    final: Final,
+    others: Collection[str] = (),
+    damaged: tables.Checkpoint | None = None,
+) -> None:
+    """The worker has said its last word.
+
+    Args:
+        session: the transaction.
+        run: locked.
+        final: the last word.
+        others: the workers that take up runs of this queue now.
+        damaged: the checkpoint that it could not read, where the one in the store is damaged indeed.
+    """
     events = RunRepository(session)
     match final.outcome:
         case "completed":
@@ -83,19 +107,30 @@ def end(session: Session, run: tables.Run, final: Final) -> None:
             run.error = final.error
             events.add_event(run.id, "error", f"Failed: {final.error}", run.step)
         case "lost":
-            lose(session, run, final.error or "The trainer process died.")
+            lose(session, run, final.error or "The trainer process died.", others)
+            return
+        case "damaged":
+            _fall_back(session, run, damaged, final.error or "it cannot be read", others)
             return
     _settle(run)
 
 
-def lose(session: Session, run: tables.Run, reason: str) -> None:
-    """The attempt was lost for a reason: another one may do better, unless too many were lost without a new checkpoint."""
+def lose(session: Session, run: tables.Run, reason: str, others: Collection[str]) -> None:
+    """The attempt was lost for a reason: another one may do better, unless too many were lost without a new checkpoint.
+
+    Too many are three by each worker that there is (`others`: those that take up runs of this queue now), or one by each of
+    three workers. A sick machine alone cannot fail a run that a healthy one would finish.
+    """
     events = RunRepository(session)
     events.add_event(run.id, "warning", f"Attempt {run.attempt} was lost: {reason}", run.step)
     losses = f"Attempt {run.attempt}: {reason}"
     run.error = f"{run.error}\n{losses}" if run.error else losses
     run.losses += 1
-    if run.state == "running" and run.losses >= MAX_LOSSES:
+    if run.worker is not None:
+        name = machine_of(run.worker)
+        run.lost_by = {**(run.lost_by or {}), name: (run.lost_by or {}).get(name, 0) + 1}
+    too_many = len(run.lost_by or {}) >= MAX_LOSSES or (run.losses >= MAX_LOSSES and not _hopeful(run, others))
+    if run.state == "running" and too_many:
         run.state = states.next_state(run.state, "fail")
         run.error = f"{run.losses} attempts in a row were lost without a new checkpoint.\n{run.error}"
         events.add_event(run.id, "error", f"Failed: {run.losses} attempts in a row were lost.", run.step)
@@ -106,14 +141,55 @@ def lose(session: Session, run: tables.Run, reason: str) -> None:
 
 def progressed(run: tables.Run) -> None:
     """A new checkpoint was registered: what went wrong before it counts no more."""
-    run.losses = 0
+    run.losses, run.lost_by = 0, None
     run.error = None
+
+
+def machine_of(worker: str) -> str:
+    """A worker without the number of its process: what fails one of its trainings fails the others too."""
+    return worker.partition("/")[0]
+
+
+def _exhausted(run: tables.Run, worker: str) -> bool:
+    """Whether this worker has lost the run so often that another one should try."""
+    return (run.lost_by or {}).get(machine_of(worker), 0) >= MAX_LOSSES
+
+
+def _hopeful(run: tables.Run, workers: Collection[str]) -> bool:
+    """Whether one of these workers has not lost the run that often."""
+    return any(not _exhausted(run, worker) for worker in workers)
+
+
+def _rewind(session: Session, run: tables.Run, checkpoint: tables.Checkpoint | None) -> None:
+    """Forget what was reported beyond a checkpoint."""
+    run.step = checkpoint.step if checkpoint else 0
+    # A step of its own for a fresh start: points at step 0 go too.
+    MetricRepository(session).drop_beyond(run.id, checkpoint.step if checkpoint else -1)
+
+
+def _fall_back(
+    session: Session, run: tables.Run, damaged: tables.Checkpoint | None, reason: str, others: Collection[str]
+) -> None:
+    """The worker could not read the checkpoint to go on from: go on from the one before, where it is damaged indeed."""
+    if damaged is None:
+        lose(session, run, f"{reason}, although the checkpoint is whole where it is kept.", others)
+        return
+    damaged.damaged_at = time.time()
+    session.flush()
+    checkpoint = CheckpointRepository(session).last(run.id)
+    _rewind(session, run, checkpoint)
+    origin = f"step {checkpoint.step:,}" if checkpoint else "the start"
+    message = f"The checkpoint of step {damaged.step:,} is damaged ({reason}): the run goes on from {origin}."
+    RunRepository(session).add_event(run.id, "warning", message, run.step)
+    run.state = states.next_state(run.state, "lose")
+    _settle(run)
 
 
 def _settle(run: tables.Run) -> None:
     """What holds for every run that no worker has."""
     now = time.time()
     run.worker = None
+    run.claim_id = None
     if run.state in states.FINISHED:
         run.finished_at = now
     else:

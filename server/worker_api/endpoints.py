@@ -122,7 +122,11 @@ async def _receive(
                 services.live.frames(run_id, frame)
             else:
                 batch, refused = read_batch(message["text"])
-                opened.tell(await ingest.receive(Report(run_id, attempt, batch, refused)))
+                damaged = None
+                if batch.final is not None and batch.final.outcome == "damaged":
+                    # Here and not with the other reports: reading an archive takes longer than storing them.
+                    damaged = await run_in_threadpool(WorkerService(services).damaged, run_id)
+                opened.tell(await ingest.receive(Report(run_id, attempt, batch, refused, damaged)))
     except FencedError:
         opened.fence()
         # The worker answers the close; waiting for that lets it arrive.

@@ -28,12 +28,14 @@ class Report:
         attempt: its fencing token.
         batch: what it reports.
         refused: what came behind the batch and can never be stored.
+        damaged: the checkpoint that the worker could not go on from, where its archive is damaged indeed.
     """
 
     run_id: str
     attempt: int
     batch: Batch
     refused: Refusal | None = None
+    damaged: str | None = None
 
 
 Outcome = Orders | Exception

@@ -1,5 +1,6 @@
 """What workers may do, each in one transaction, and what follows from it for everybody else."""
 
+import logging
 import time
 from collections.abc import Iterator, Sequence
 
@@ -7,23 +8,25 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from server.arenas.references import with_geometry
+from server.checkpoints.integrity import is_whole
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.errors import ConflictError, NotFoundError
 from server.events.bus import Change, ChangeKind
-from server.experiments.stored import read_training
+from server.experiments.stored import read_training, training_of
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService
 from server.services import Services
-from server.system.repository import WorkerRepository
+from server.system.repository import SILENCE_SECONDS, WorkerRepository
 from server.worker_api import attempts
 from server.worker_api.attempts import FencedError
 from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
 from server.worker_api.ingest import Outcome, Report
+from workers.config import TrainingConfig
 from workers.protocol import (
     CheckpointReference,
     CheckpointUpload,
@@ -34,7 +37,10 @@ from workers.protocol import (
     Heartbeat,
     MetricItem,
     Orders,
+    queue_of,
 )
+
+logger = logging.getLogger(__name__)
 
 # Compaction is looked at once in so many items: counting rows costs a query.
 _COMPACT_EVERY = 64
@@ -49,7 +55,7 @@ class WorkerService:
     def heartbeat(self, heartbeat: Heartbeat) -> None:
         """Note that a worker is there."""
         with self._services.database.write() as session:
-            WorkerRepository(session).seen(heartbeat.worker, heartbeat.queue, time.time())
+            WorkerRepository(session).seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble)
 
     def claim(self, run_id: str, request: ClaimRequest) -> Claim:
         """Give a run to a worker, if it is still to be had.
@@ -61,8 +67,8 @@ class WorkerService:
         problem: str | None = None
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
-            checkpoint = attempts.begin(session, run, request.worker, request.published_attempt)
             stored = read_training(run.experiment.training)
+            checkpoint = attempts.begin(session, run, request, _takers(session, stored.training))
             training = stored.training
             if stored.unreadable:
                 problem = f"This version can't read {', '.join(stored.unreadable)}: launch the training anew."
@@ -127,7 +133,8 @@ class WorkerService:
                 batch, gap = in_turn(report.batch, run.last_seq)
                 self._store(session, run, batch.items)
                 if batch.final is not None:
-                    attempts.end(session, run, batch.final)
+                    damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
+                    attempts.end(session, run, batch.final, _takers(session, training_of(run.experiment)), damaged)
                     ended.append(run)
                 outcomes.append(
                     Orders(
@@ -145,6 +152,16 @@ class WorkerService:
         for run in ended:
             self._announce(run)
         return outcomes
+
+    def damaged(self, run_id: str) -> str | None:
+        """The id of the checkpoint that the run should go on from, where its archive is damaged; reads all of it."""
+        with self._services.database.read() as session:
+            checkpoint = CheckpointRepository(session).last(run_id)
+        try:
+            return None if checkpoint is None or is_whole(self._services.files, checkpoint) else checkpoint.id
+        except OSError:
+            logger.exception("checkpoint %s cannot be looked at: it counts as whole", run_id)
+            return None
 
     def check(self, run_id: str, attempt: int, after_seq: int) -> None:
         """Before a checkpoint's bytes are taken in: whether it would be registered.
@@ -194,7 +211,7 @@ class WorkerService:
             ]
             for run in runs:
                 reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
-                attempts.lose(session, run, reason)
+                attempts.lose(session, run, reason, _takers(session, training_of(run.experiment)))
         for run in runs:
             self._services.links.cut(run.id)
             self._announce(run)
@@ -238,3 +255,9 @@ class WorkerService:
 
     def _publish(self, run: tables.Run, kind: ChangeKind) -> None:
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))
+
+
+def _takers(session: Session, training: TrainingConfig) -> Sequence[str]:
+    """The workers that would take up a training now."""
+    now = time.time()
+    return WorkerRepository(session).fit(queue_of(training), now - SILENCE_SECONDS, now)

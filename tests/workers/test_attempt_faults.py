@@ -1,10 +1,13 @@
 """What a worker does where the machine or the server's store fails it: it waits, or says what is wrong."""
 
 import hashlib
+import stat
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -14,10 +17,12 @@ from websockets.sync.server import Server, ServerConnection, serve
 
 from tests.workers.test_link import until
 from workers.config import TrainingConfig
-from workers.protocol import Batch, CheckpointReference, Claim, Final, Orders
-from workers.runtime import attempt, slot
+from workers.errors import UnfitError
+from workers.protocol import Batch, CheckpointReference, Claim, ClaimRequest, Final, Orders
+from workers.runtime import attempt, fitness, slot, tasks
 from workers.runtime.attempt import Attempt
 from workers.runtime.client import ServerClient
+from workers.runtime.fitness import Fitness, make_private
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.slot import Slot
 
@@ -67,9 +72,9 @@ def service() -> Iterator[Service]:
     service.close()
 
 
-def settings_for(url: str, directory: Path) -> WorkerSettings:
+def settings_for(url: str, directory: Path, **more: object) -> WorkerSettings:
     return WorkerSettings.model_validate(
-        {"server_url": url, "broker_url": "memory://", "worker_token": "secret", "work_dir": directory}
+        {"server_url": url, "broker_url": "memory://", "worker_token": "secret", "work_dir": directory, **more}
     )
 
 
@@ -97,12 +102,20 @@ def last_word(resumed: Attempt, service: Service) -> Final:
     return service.final
 
 
-def test_a_checkpoint_that_stays_damaged_fails_the_run_with_that_reason(resumed: Attempt, service: Service) -> None:
+def test_a_checkpoint_that_stays_damaged_is_said_to_be(resumed: Attempt, service: Service) -> None:
     final = last_word(resumed, service)
-    assert final.outcome == "failed"
+    assert final.outcome == "damaged"
     assert "checkpoint of step 81,920 is not what was stored there" in (final.error or "")
     # It may have been damaged on its way: it was asked for again.
     assert service.downloads == 3
+
+
+def test_a_checkpoint_that_is_gone_is_asked_for_once(resumed: Attempt, service: Service) -> None:
+    service.status = HTTPStatus.NOT_FOUND
+    final = last_word(resumed, service)
+    assert final.outcome == "damaged"
+    assert "checkpoint of step 81,920 is gone" in (final.error or "")
+    assert service.downloads == 1
 
 
 def test_who_waits_for_a_store_that_does_not_answer_listens_to_stop(resumed: Attempt, service: Service) -> None:
@@ -110,22 +123,148 @@ def test_who_waits_for_a_store_that_does_not_answer_listens_to_stop(resumed: Att
     assert last_word(resumed, service).outcome == "stopped"
 
 
+class Place:
+    """A slot on a machine whose state a test decides."""
+
+    def __init__(self, directory: Path, **settings: object) -> None:
+        self.slot = Slot(settings_for("http://127.0.0.1:9", directory, **settings), 0, lambda: False)
+
+    def taken(self) -> bool:
+        """Whether a trainer could be had; it is put back."""
+        try:
+            self.slot.put_back(self.slot.take_trainer())
+        except UnfitError:
+            return False
+        return True
+
+
+@pytest.fixture
+def places() -> Iterator[Callable[..., Place]]:
+    opened: list[Place] = []
+
+    def open_place(directory: Path, **settings: object) -> Place:
+        opened.append(Place(directory, **settings))
+        return opened[-1]
+
+    yield open_place
+    for place in opened:
+        place.slot.close()
+
+
 def test_a_slot_gets_over_a_machine_that_can_start_no_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, places: Callable[..., Place]
 ) -> None:
     monkeypatch.setattr(slot, "_FIRST_RETRY_SECONDS", 0.05)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
-    place = Slot(settings_for("http://127.0.0.1:9", tmp_path), 0, lambda: False)
-    try:
-        until(lambda: "no trainer can be started" in caplog.text)
-        monkeypatch.undo()
-        taken = threading.Event()
+    place = places(tmp_path)
+    # No run is claimed meanwhile: who waits for a trainer with a run in hand keeps it from others.
+    with pytest.raises(UnfitError, match="no trainer can be started"):
+        place.slot.take_trainer()
+    assert "no trainer can be started" in (place.slot.trouble or "")
+    monkeypatch.undo()
+    until(place.taken, 30.0)
+    until(lambda: place.slot.trouble is None)
 
-        def take() -> None:
-            place.take_trainer().close()
-            taken.set()
 
-        threading.Thread(target=take, daemon=True).start()
-        assert taken.wait(10.0)
-    finally:
-        place.close()
+def test_a_slot_whose_trainers_die_while_they_start_takes_no_run_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, places: Callable[..., Place]
+) -> None:
+    dying = tmp_path / "python"
+    dying.write_text("#!/bin/sh\necho no such library\nexit 3\n")
+    dying.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(dying))
+    place = places(tmp_path)
+    with pytest.raises(UnfitError, match=r"ended with exit code 3\. It printed last:\nno such library"):
+        place.slot.take_trainer()
+
+
+def test_a_worker_without_room_takes_no_run_and_says_how_much_is_missing(
+    tmp_path: Path, places: Callable[..., Place]
+) -> None:
+    place = places(tmp_path, min_free_bytes=2**60)
+    with pytest.raises(UnfitError, match="MiB free, less than 1,099,511,627,776"):
+        place.slot.take_trainer()
+    assert "MAPLESS_WORK_DIR" in (place.slot.trouble or "")
+
+
+def test_a_worker_whose_folder_is_gone_takes_no_run(tmp_path: Path, places: Callable[..., Place]) -> None:
+    place = places(tmp_path / "unmounted")
+    with pytest.raises(UnfitError, match="can't be written to"):
+        place.slot.take_trainer()
+    (tmp_path / "unmounted").mkdir()
+    until(place.taken, 30.0)
+
+
+def test_from_fault_to_fault_a_worker_rests_longer_until_an_attempt_goes_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(fitness, "_FIRST_REST_SECONDS", 0.5)
+    machine = Fitness(tmp_path, 0)
+    rests: list[float] = []
+
+    def rest() -> None:
+        started = time.monotonic()
+        machine.rest("the disk is full", lambda: False)
+        rests.append(time.monotonic() - started)
+
+    for _ in range(3):
+        rest()
+    machine.well()
+    rest()
+    assert rests[0] < rests[1] < rests[2] > rests[3]
+    assert "takes up no run for 2 s: the disk is full" in caplog.text
+    machine.rest("the disk is full", lambda: True)  # a worker that is to end does not rest first
+    assert machine.trouble is None
+
+
+def test_other_users_can_neither_read_nor_exchange_what_a_run_keeps(tmp_path: Path) -> None:
+    mine = tmp_path / "cache" / "work"
+    make_private(mine)
+    assert stat.S_IMODE(mine.stat().st_mode) == 0o700
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    with pytest.raises(UnfitError, match="Other users of this machine can exchange"):
+        make_private(shared)
+    shared.chmod(0o1777)  # as the system's temporary folder: what is in it stays its owner's
+    make_private(shared)
+
+
+def test_an_attempts_folder_is_its_owners_alone(resumed: Attempt, tmp_path: Path) -> None:
+    assert stat.S_IMODE((tmp_path / "attempt").stat().st_mode) == 0o700
+    resumed.run(NoTrainer())  # type: ignore[arg-type] # none comes to train
+
+
+def test_a_claim_whose_answer_got_lost_is_asked_for_again_as_the_same(tmp_path: Path) -> None:
+    asked: list[ClaimRequest] = []
+    granted = Claim(
+        attempt=1, seed=0, training=TrainingConfig(), last_seq=0, checkpoint=None, lease_seconds=15.0
+    ).model_dump_json()
+
+    class Answers(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            if self.path.endswith("/claim"):
+                asked.append(ClaimRequest.model_validate_json(body))
+                if len(asked) < 3:
+                    self.close_connection = True  # the run is granted, and nobody hears of it
+                    return
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(granted)))
+            self.end_headers()
+            self.wfile.write(granted.encode())
+
+        def log_message(self, *_: object) -> None: ...
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Answers) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        place = Slot(settings_for(f"http://127.0.0.1:{server.server_address[1]}", tmp_path), 0, lambda: False)
+        try:
+            claim = tasks._claim(place, "r", 0)
+        finally:
+            place.close()
+            server.shutdown()
+    assert claim is not None
+    assert len(asked) == 3
+    assert len({request.claim_id for request in asked}) == 1
+    assert asked[0].claim_id is not None

@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import Server, ServerConnection, serve
 
-from workers.protocol import CLOSE_FENCED, Batch, Final, Orders
+from workers.protocol import CLOSE_FENCED, CLOSE_NOT_UNDERSTOOD, Batch, Final, Orders, Refusal
 from workers.reporting import WatchRequest
 from workers.runtime.link import Link
 from workers.runtime.spool import Spool
@@ -29,6 +29,8 @@ class Peer:
         self.deaf = threading.Event()
         self.seconds_per_frame = 0.0
         self.fence = threading.Event()
+        self.unstorable: int | None = None
+        self.puzzled = False
         self._server: Server | None = None
         self.port = 0
 
@@ -63,6 +65,14 @@ class Peer:
                     continue
                 batch = Batch.model_validate_json(message)
                 self.batches.append(batch)
+                if self.puzzled and batch.items:
+                    connection.close(CLOSE_NOT_UNDERSTOOD)
+                    return
+                if self.unstorable is not None and any(item.seq >= self.unstorable for item in batch.items):
+                    self.stored += [item.seq for item in batch.items if self.ack < item.seq < self.unstorable]
+                    refusal = Refusal(seq=self.unstorable, reason="its name is too long")
+                    connection.send(Orders(ack=self.ack, refused=refusal).model_dump_json())
+                    continue
                 if self.deaf.is_set():
                     # Received, perhaps even stored, but the answer is lost.
                     connection.socket.close()
@@ -87,7 +97,10 @@ class Worker:
     def __init__(self, directory: Path, port: int) -> None:
         self.orders: list[Orders] = []
         self.spool = Spool(directory / "spool", last_seq=0)
-        self.link = Link(f"http://127.0.0.1:{port}", "secret", "run1", 3, self.spool, LEASE, self.orders.append)
+        self.broken: list[str] = []
+        self.link = Link(
+            f"http://127.0.0.1:{port}", "secret", "run1", 3, self.spool, LEASE, self.orders.append, self.broken.append
+        )
 
     def report(self, count: int) -> None:
         for _ in range(count):
@@ -222,3 +235,52 @@ def test_frames_on_a_slow_line_do_not_keep_metrics_waiting(peer: Peer, worker: W
     finally:
         stop.set()
         watcher.join()
+
+
+@pytest.mark.parametrize("damage", [b"x" * 40, b""], ids=["overwritten", "truncated"])
+def test_what_follows_a_damaged_line_is_given_up_and_the_attempt_is_lost_whatever_its_trainer_says(
+    tmp_path: Path, peer: Peer, damage: bytes
+) -> None:
+    peer.stop()
+    worker = Worker(tmp_path, peer.port)
+    worker.report(3)
+    lines = (tmp_path / "spool").read_bytes().splitlines(keepends=True)
+    (tmp_path / "spool").write_bytes(lines[0] + damage)
+    peer.start()
+    until(lambda: worker.broken != [])
+    assert peer.stored == [1]
+    assert "after item 1 cannot be read back" in worker.broken[0]
+    # The lease is kept meanwhile, by messages without items.
+    beats = len(peer.batches)
+    until(lambda: len(peer.batches) > beats + 1)
+    worker.link.finish(Final(outcome="completed"))
+    assert worker.link.wait(10)
+    assert peer.batches[-1].final == Final(outcome="lost", error=worker.broken[0])
+    assert peer.stored == [1]
+    assert len(worker.broken) == 1
+    worker.link.close()
+    worker.spool.close()
+
+
+def test_what_the_server_can_never_store_ends_the_attempt_with_its_reason(peer: Peer, worker: Worker) -> None:
+    peer.unstorable = 3
+    worker.report(5)
+    until(lambda: worker.broken != [])
+    assert worker.broken == ["the server can't store item 3: its name is too long"]
+    worker.link.finish(Final(outcome="stopped"))
+    assert worker.link.wait(10)
+    assert peer.stored == [1, 2]
+    assert peer.batches[-1].final == Final(outcome="lost", error=worker.broken[0])
+
+
+def test_what_the_server_never_understands_ends_the_attempt_instead_of_being_sent_for_ever(
+    peer: Peer, worker: Worker
+) -> None:
+    until(lambda: worker.orders != [])
+    peer.puzzled = True
+    worker.report(1)
+    until(lambda: worker.broken != [])
+    worker.link.finish(Final(outcome="completed"))
+    assert worker.link.wait(10)
+    assert peer.batches[-1].final is not None
+    assert peer.batches[-1].final.outcome == "lost"

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from workers.errors import SpoolDamagedError
 from workers.protocol import EventItem, MetricItem
 from workers.runtime.spool import Spool
 
@@ -83,3 +84,63 @@ def test_what_is_acknowledged_is_cut_off_and_numbers_go_on(tmp_path: Path) -> No
     assert spool.metrics(1, 0.0, {"a": 1.0}) == last + 1
     assert numbers(spool) == [last + 1]
     assert [item.seq for item in Spool(path, last_seq=last).pending()] == [last + 1]
+
+
+def test_a_number_that_was_altered_on_disk_is_noticed_though_the_line_still_parses(tmp_path: Path) -> None:
+    path = tmp_path / "spool"
+    spool = Spool(path, last_seq=0)
+    for step in (10, 20, 30):
+        spool.metrics(step, 0.0, {"a": 1.0})
+    path.write_bytes(path.read_bytes().replace(b'"step":20', b'"step":25'))
+    assert numbers(spool) == [1]
+    spool.acknowledge(1)
+    with pytest.raises(SpoolDamagedError, match="after item 1 cannot be read back"):
+        spool.pending()
+
+
+@pytest.mark.parametrize("kept", [0, 1])
+def test_a_spool_that_was_cut_short_is_noticed(tmp_path: Path, kept: int) -> None:
+    path = tmp_path / "spool"
+    spool = Spool(path, last_seq=0)
+    spool.metrics(10, 0.0, {"a": 1.0})
+    first = path.stat().st_size
+    spool.metrics(20, 0.0, {"a": 1.0})
+    with path.open("r+b") as file:
+        file.truncate(kept * first + 5)
+    # What is reported afterwards follows the stump, and cannot hide it.
+    spool.metrics(30, 0.0, {"a": 1.0})
+    assert numbers(spool) == [1] if kept else True
+    spool.acknowledge(kept)
+    with pytest.raises(SpoolDamagedError):
+        spool.pending()
+
+
+def test_a_whole_line_in_anothers_place_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "spool"
+    spool = Spool(path, last_seq=0)
+    for step in (10, 20, 30):
+        spool.metrics(step, 0.0, {"a": 1.0})
+    first, _, third = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(first + first + third)
+    assert numbers(spool) == [1]
+
+
+@given(st.data())
+def test_whatever_byte_changes_only_what_was_reported_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    path = tmp_path_factory.mktemp("spool") / "spool"
+    spool = Spool(path, last_seq=0)
+    for step in range(5):
+        spool.metrics(step, 0.5, {"a": step / 7})
+    whole, written = spool.pending(), bytearray(path.read_bytes())
+    place = data.draw(st.integers(0, len(written) - 1))
+    written[place] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(written)
+    line = bytes(path.read_bytes()[:place]).count(b"\n")
+    if line == 0:
+        with pytest.raises(SpoolDamagedError):
+            spool.pending()
+    else:
+        assert spool.pending() == whole[:line]
+    spool.close()

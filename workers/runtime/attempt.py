@@ -7,7 +7,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.errors import (
+    ArchiveIntegrityError,
+    CheckpointGoneError,
+    RequestRefusedError,
+    ServerUnavailableError,
+)
 from workers.protocol import Claim, Final, FinalOutcome, Orders
 from workers.reporting import EvaluationResult
 from workers.runtime.client import ServerClient
@@ -63,10 +68,11 @@ class Attempt:
         self._telling = threading.Lock()
         self._ended: Ended | None = None
         self._broken: str | None = None
+        self._local_fault: str | None = None
         self._trainer: TrainerHandle | None = None
         self._last_call: float | None = None
         self._step = claim.checkpoint.step if claim.checkpoint else 0
-        directory.mkdir(parents=True)
+        directory.mkdir(mode=0o700)
         self._spool = Spool(directory / "spool.jsonl", claim.last_seq)
         self._uploads = Uploads(client, run_id, claim.attempt, self._spool)
         self._link = Link(
@@ -77,7 +83,13 @@ class Attempt:
             self._spool,
             claim.lease_seconds,
             self._on_orders,
+            self._on_link_broken,
         )
+
+    @property
+    def local_fault(self) -> str | None:
+        """What was wrong with this worker or its machine rather than with the run; None where nothing was."""
+        return self._local_fault
 
     def run(self, trainer: TrainerHandle) -> FinalOutcome | None:
         """Train, and return how that ended once the server knows it too; None where it fenced the attempt out or is gone.
@@ -89,7 +101,9 @@ class Attempt:
             if final is None:
                 return None
             self._link.finish(final)
-            return final.outcome if self._until_acknowledged() else None
+            if not self._until_acknowledged():
+                return None
+            return final.outcome if self._broken is None else "lost"
         finally:
             trainer.close()
             self._uploads.close()
@@ -105,6 +119,7 @@ class Attempt:
             return self._train(trainer)
         except Exception as error:
             logger.exception("run %s: attempt %d broke", self._run_id, self._claim.attempt)
+            self._local_fault = f"{type(error).__name__}: {error}"
             return Final(outcome="lost", error=f"{type(error).__name__}: {error}"[-_EXPLANATION_CHARACTERS:])
 
     def _train(self, trainer: TrainerHandle) -> Final | None:
@@ -112,7 +127,9 @@ class Attempt:
             resume = self._fetch_checkpoint()
         except ServerUnavailableError:
             return Final(outcome="stopped" if self._orders.stop else "released")
-        except (RunRefusedError, RequestRefusedError, ArchiveIntegrityError) as error:
+        except (CheckpointGoneError, ArchiveIntegrityError) as error:
+            return Final(outcome="damaged", error=str(error))
+        except RequestRefusedError as error:
             return Final(outcome="failed", error=f"The checkpoint to go on from cannot be fetched: {error}")
         if self._link.fenced():
             return None
@@ -139,6 +156,10 @@ class Attempt:
                 return None
         if self._uploads.refusal is not None:
             return Final(outcome="failed", error=self._uploads.refusal)
+        if self._uploads.fault is not None and self._broken is None:
+            self._break(self._uploads.fault)
+        if self._broken is not None:
+            return Final(outcome="lost", error=self._broken[:_EXPLANATION_CHARACTERS])
         return None if self._link.fenced() else final
 
     def _fetch_checkpoint(self) -> Path | None:
@@ -164,6 +185,8 @@ class Attempt:
         """Wait for the trainer's end, or bring it about; returns whether it had to be killed after a stop."""
         deadline: float | None = None
         while self._ended is None and trainer.alive:
+            if self._uploads.fault is not None:
+                self._break(self._uploads.fault)
             if self._link.fenced() or self._uploads.refusal is not None or self._broken is not None:
                 trainer.kill()
                 return False
@@ -185,11 +208,16 @@ class Attempt:
         """What the end of the trainer means for the run."""
         ended = self._ended
         if self._broken is not None:
-            return Final(outcome="lost", error=self._broken)
+            return Final(outcome="lost", error=self._broken[:_EXPLANATION_CHARACTERS])
         if ended is not None and ended.outcome == "completed":
             return Final(outcome="completed")
         if ended is not None and ended.outcome == "failed":
             return Final(outcome="failed", error=(ended.error or "")[-_EXPLANATION_CHARACTERS:])
+        if ended is not None and ended.outcome == "damaged":
+            return Final(outcome="damaged", error=(ended.error or "")[-_EXPLANATION_CHARACTERS:])
+        if ended is not None and ended.outcome == "unfit":
+            self._local_fault = ended.error
+            return Final(outcome="lost", error=f"The trainer could not go on here: {ended.error}"[:_EXPLANATION_CHARACTERS])
         if killed:
             self._spool.event(
                 self._step, "warning", "The trainer did not end in time and was killed: it goes on from its last checkpoint."
@@ -207,8 +235,7 @@ class Attempt:
             self._take(report)
         except (OSError, ValueError) as error:
             # A full disk, say: this attempt can tell no more, and the trainer must not wait for somebody who listens.
-            self._broken = f"The worker could not pass on what the training reports: {error}"
-            self._changed.set()
+            self._break(f"The worker could not pass on what the training reports: {error}")
 
     def _take(self, report: Report) -> None:
         match report:
@@ -228,6 +255,16 @@ class Attempt:
             case Ended():
                 self._ended = report
                 self._changed.set()
+
+    def _on_link_broken(self, reason: str) -> None:
+        """Something that was reported will never arrive: the run goes back to a checkpoint from before."""
+        self._break(f"What the training reported can't be told to the server: {reason}")
+        self._uploads.drop_beyond(self._spool.acked)
+
+    def _break(self, reason: str) -> None:
+        logger.error("run %s: attempt %d cannot go on: %s", self._run_id, self._claim.attempt, reason)
+        self._local_fault = self._broken = reason
+        self._changed.set()
 
     def _on_orders(self, orders: Orders) -> None:
         self._orders = orders

@@ -8,7 +8,13 @@ from typing import Self
 
 import httpx
 
-from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.errors import (
+    ArchiveIntegrityError,
+    CheckpointGoneError,
+    RequestRefusedError,
+    RunRefusedError,
+    ServerUnavailableError,
+)
 from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, Queue
 from workers.reporting import EvaluationResult
 
@@ -43,13 +49,14 @@ class ServerClient:
         """Close the connections."""
         self._http.close()
 
-    def heartbeat(self, worker: str, queue: Queue) -> None:
-        """Tell that this worker is there."""
-        self._send("POST", "/api/worker/heartbeat", content=Heartbeat(worker=worker, queue=queue).model_dump_json())
+    def heartbeat(self, worker: str, queue: Queue, trouble: str | None = None) -> None:
+        """Tell that this worker is there, and why it takes up no run where it does not."""
+        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble)
+        self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
 
-    def claim(self, run_id: str, worker: str, published_attempt: int) -> Claim:
-        """Take up a run."""
-        request = ClaimRequest(worker=worker, published_attempt=published_attempt)
+    def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str) -> Claim:
+        """Take up a run; asked again with the same `claim_id`, it is the same attempt."""
+        request = ClaimRequest(worker=worker, published_attempt=published_attempt, claim_id=claim_id)
         response = self._send("POST", f"/api/worker/runs/{run_id}/claim", content=request.model_dump_json())
         return Claim.model_validate_json(response.content)
 
@@ -58,8 +65,9 @@ class ServerClient:
 
         Raises:
             ArchiveIntegrityError: the bytes are others than those that were registered.
+            CheckpointGoneError: it is gone.
             ServerUnavailableError: not now; ask again later.
-            RequestRefusedError, RunRefusedError: never.
+            RequestRefusedError: never.
         """
         digest = hashlib.sha256()
         try:
@@ -72,6 +80,8 @@ class ServerClient:
                     file.write(block)
         except httpx.TransportError as error:
             raise _unavailable(error) from error
+        except RunRefusedError as error:
+            raise CheckpointGoneError(f"the checkpoint of step {checkpoint.step:,} is gone: {error}") from error
         if digest.hexdigest() != checkpoint.sha256:
             raise ArchiveIntegrityError(f"the checkpoint of step {checkpoint.step:,} is not what was stored there")
 

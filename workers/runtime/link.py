@@ -1,7 +1,8 @@
 """The link of a run: a thread that brings what is spooled, and frames, to the server, and hears what the server wants.
 
 It renews the lease whatever the trainer does, reconnects for as long as it takes, and ends when the server has the final
-message or fences the attempt out.
+message or fences the attempt out. Where an item can never arrive, because the spool is damaged or the server does not take
+it, it says so (`on_broken`), keeps the lease, and sends no item any more: the attempt is lost, however its trainer ended.
 """
 
 import asyncio
@@ -14,7 +15,17 @@ from pydantic import ValidationError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from workers.protocol import CLOSE_FENCED, MAX_MESSAGE_BYTES, Batch, Final, Orders
+from workers.errors import SpoolDamagedError
+from workers.protocol import (
+    CLOSE_FENCED,
+    CLOSE_NOT_UNDERSTOOD,
+    MAX_MESSAGE_BYTES,
+    Batch,
+    EventItem,
+    Final,
+    MetricItem,
+    Orders,
+)
 from workers.runtime.spool import Spool
 
 logger = logging.getLogger(__name__)
@@ -26,6 +37,10 @@ _LAST_RETRY_SECONDS = 3.0
 _OPEN_TIMEOUT_SECONDS = 5.0
 # A server that has not acknowledged for this long gets a new connection.
 _ACK_TIMEOUT_SECONDS = 20.0
+# What the server does not understand as often as this it never will; a frame on its own is not sent again.
+_MISUNDERSTOOD = 3
+# The server takes 10,000 in an explanation.
+_EXPLANATION_CHARACTERS = 9_000
 # Messages in a third of the lease each: two may be lost before the lease is.
 _RENEWALS_PER_LEASE = 3
 
@@ -41,6 +56,7 @@ class Link:
         spool: where the items come from; acknowledged as the server confirms them.
         lease_seconds: how long the server waits for a sign of life.
         on_orders: called on the link's thread with each of the server's messages; must return at once.
+        on_broken: called on the link's thread, once, with the reason why the next item can never arrive; must return too.
     """
 
     def __init__(
@@ -52,12 +68,17 @@ class Link:
         spool: Spool,
         lease_seconds: float,
         on_orders: Callable[[Orders], None],
+        on_broken: Callable[[str], None],
     ) -> None:
         self._url = f"ws{server_url.removeprefix('http')}/api/worker/runs/{run_id}/link?attempt={attempt}"
         self._headers = {"Authorization": f"Bearer {token}"}
         self._spool = spool
         self._renewal_seconds = lease_seconds / _RENEWALS_PER_LEASE
         self._on_orders = on_orders
+        self._on_broken = on_broken
+        self._broken: str | None = None
+        self._misunderstood = 0
+        self._waiting = False
         self._frames: deque[bytes] = deque(maxlen=_FRAME_BACKLOG)
         self._final: Final | None = None
         self._fenced = False
@@ -129,18 +150,32 @@ class Link:
                     proxy=None,
                 ) as connection:
                     retry = _FIRST_RETRY_SECONDS
+                    self._linked()
                     await self._serve(connection)
             except ConnectionClosed as closed:
                 self._fenced = self._fenced or (closed.rcvd is not None and closed.rcvd.code == CLOSE_FENCED)
-                if not self._over():
-                    logger.info("link lost: %s", closed)
+                if closed.rcvd is not None and closed.rcvd.code == CLOSE_NOT_UNDERSTOOD:
+                    self._misunderstood += 1
+                    if self._misunderstood == _MISUNDERSTOOD:
+                        self._break(f"the server does not understand what comes after item {self._spool.acked}: {closed}")
+                self._wait_for_server(closed)
             except (OSError, TimeoutError, InvalidHandshake) as error:
-                logger.info("no link to the server: %s", error)
+                self._wait_for_server(error)
             except ValidationError:
                 logger.exception("the server says what this worker does not understand: do their versions agree?")
             if not self._over():
                 await self._pause(retry)
                 retry = min(2 * retry, _LAST_RETRY_SECONDS)
+
+    def _wait_for_server(self, reason: Exception) -> None:
+        if not self._over() and not self._waiting:
+            logger.warning("%s: no link to the server, what is reported waits here: %s", self._thread.name, reason)
+            self._waiting = True
+
+    def _linked(self) -> None:
+        if self._waiting:
+            logger.info("%s: linked to the server again", self._thread.name)
+            self._waiting = False
 
     def _over(self) -> bool:
         return self._closed or self._fenced or self._done.is_set()
@@ -171,7 +206,11 @@ class Link:
     async def _read(self, connection: ClientConnection, acked: asyncio.Event) -> None:
         async for message in connection:
             orders = Orders.model_validate_json(message)
+            if orders.ack > self._spool.acked:
+                self._misunderstood = 0
             self._spool.acknowledge(orders.ack)
+            if orders.refused is not None:
+                self._break(f"the server can't store item {orders.refused.seq}: {orders.refused.reason}")
             self._on_orders(orders)
             acked.set()
             if orders.over:
@@ -196,10 +235,10 @@ class Link:
             if not in_flight:
                 # The final message is read first: it is set after the last item, so no item can be behind it.
                 final = self._final
-                items = self._spool.pending()
+                items = self._pending()
                 if items or final or now - sent >= self._renewal_seconds:
                     acked.clear()
-                    await connection.send(Batch(items=items, final=None if items else final).model_dump_json())
+                    await connection.send(Batch(items=items, final=None if items else self._honest(final)).model_dump_json())
                     sent, in_flight = now, True
             elif now - sent > _ACK_TIMEOUT_SECONDS:
                 raise TimeoutError("the server does not acknowledge")
@@ -207,6 +246,28 @@ class Link:
                 await asyncio.sleep(0)  # the reader's turn, before the next frame
             else:
                 await self._wait(acked if in_flight else None)
+
+    def _pending(self) -> tuple[MetricItem | EventItem, ...]:
+        """What is to be sent next; nothing any more once that can never arrive."""
+        if self._broken is not None:
+            return ()
+        try:
+            return self._spool.pending()
+        except SpoolDamagedError as error:
+            self._break(str(error))
+            return ()
+
+    def _break(self, reason: str) -> None:
+        if self._broken is not None:
+            return
+        self._broken = reason[:_EXPLANATION_CHARACTERS]
+        self._on_broken(self._broken)
+
+    def _honest(self, final: Final | None) -> Final | None:
+        """A final message that counted on everything to arrive is not sent where something never will."""
+        if final is None or self._broken is None or final.outcome in ("lost", "failed"):
+            return final
+        return Final(outcome="lost", error=self._broken)
 
     async def _wait(self, acked: asyncio.Event | None) -> None:
         """Until there is something to send, the acknowledgement has come, or the lease wants renewing."""

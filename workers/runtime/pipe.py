@@ -3,6 +3,7 @@
 task                             trainer process
   | --- Job ------------------------> |      once; the process may have waited for it
   | --- Control --------------------> |      whenever stop or watch change
+  | <-- Ready ----------------------- |      once, first: it has imported all that it needs
   | <-- MetricsReport, EventReport, CheckpointReport, FrameReport ---
   | <-- Ended ----------------------- |      once, last
 """
@@ -37,6 +38,10 @@ class Control(msgspec.Struct, frozen=True, tag="control"):
     watch: str | None
 
 
+class Ready(msgspec.Struct, frozen=True, tag="ready"):
+    """The process is up and can take a job."""
+
+
 class MetricsReport(msgspec.Struct, frozen=True, tag="metrics"):
     """Numbers at an environment step, taken at `at` (seconds since the epoch)."""
 
@@ -68,13 +73,17 @@ class FrameReport(msgspec.Struct, frozen=True, tag="frame"):
 
 
 class Ended(msgspec.Struct, frozen=True, tag="ended"):
-    """The training is over: `completed`, `stopped`, or `failed` with an error that would come again."""
+    """The training is over: `completed` or `stopped`, or with an error.
+
+    `failed`: it would come again. `damaged`: the archive to resume from is not whole. `unfit`: this machine is not, its disk
+    is full say.
+    """
 
     outcome: str
     error: str | None = None
 
 
-Report: TypeAlias = MetricsReport | EventReport | CheckpointReport | FrameReport | Ended
+Report: TypeAlias = Ready | MetricsReport | EventReport | CheckpointReport | FrameReport | Ended
 Order: TypeAlias = Job | Control
 
 

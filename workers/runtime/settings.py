@@ -1,5 +1,6 @@
 """What a worker is told from outside: environment variables with the prefix MAPLESS_, set by `mapless worker`."""
 
+import os
 import socket
 import tempfile
 from pathlib import Path
@@ -8,6 +9,15 @@ from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from workers.protocol import Queue
+
+
+def _private_place() -> Path:
+    """A folder that other users of the machine can neither guess their way into nor make first."""
+    cache = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return (Path(cache) if cache else Path.home() / ".cache") / "mapless" / "work"
+    except RuntimeError:  # a user without a home
+        return Path(tempfile.gettempdir()) / f"mapless-{os.geteuid()}"
 
 
 class WorkerSettings(BaseSettings):
@@ -22,7 +32,11 @@ class WorkerSettings(BaseSettings):
     worker_queue: Queue = Field("cpu", description="The queue to listen to.")
     worker_name: str = Field("worker", description="Tells workers of one machine apart.")
     work_dir: Path = Field(
-        Path(tempfile.gettempdir()) / "mapless-work", description="Reports and checkpoints on their way to the server."
+        default_factory=_private_place,
+        description="Reports and checkpoints on their way to the server; in the user's cache folder if not given.",
+    )
+    min_free_bytes: int = Field(
+        256 * 2**20, ge=0, description="Free space in the work folder below which a worker takes up no run."
     )
     stop_grace_seconds: float = Field(
         20.0, gt=0.0, description="A trainer that was asked to stop is killed after this long."

@@ -4,21 +4,28 @@ import logging
 import os
 import shutil
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
-from workers.errors import ServerError
+from workers.errors import ServerError, UnfitError
 from workers.protocol import HEARTBEAT_SECONDS
 from workers.runtime.client import ServerClient
+from workers.runtime.fitness import Fitness
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.trainer_handle import TrainerHandle
 
 logger = logging.getLogger(__name__)
 
 _TICK_SECONDS = 0.5
+_READY_POLL_SECONDS = 0.05
+# The server takes 10,000.
+_TROUBLE_CHARACTERS = 2_000
 # Between two trials to keep a trainer ready, where it dies on its own.
 _FIRST_RETRY_SECONDS = 1.0
 _LAST_RETRY_SECONDS = 60.0
+# Imports take seconds; on a fresh checkout the simulation's kernels are compiled first, which takes a minute.
+_TRAINER_PATIENCE_SECONDS = 300.0
 
 
 class Slot:
@@ -45,6 +52,9 @@ class Slot:
         self._closed = threading.Event()
         self._spare: TrainerHandle | None = None
         self._patience = _FIRST_RETRY_SECONDS
+        self._no_trainer: str | None = None
+        self._answered = True
+        self._fitness = Fitness(settings.work_dir, settings.min_free_bytes)
         threading.Thread(target=self._keep, name="keeper", daemon=True).start()
         threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
 
@@ -56,22 +66,53 @@ class Slot:
         """Where an attempt keeps its files; named after this process, so that what a killed one leaves behind is found."""
         return self.settings.work_dir / f"{os.getpid()}-{run_id}-{attempt}"
 
+    @property
+    def trouble(self) -> str | None:
+        """Why no run is taken up here now; None where one would be."""
+        return self._no_trainer or self._fitness.trouble
+
     def take_trainer(self) -> TrainerHandle:
-        """The trainer process that waits, or a new one; `give_back` must follow once it has ended."""
+        """The trainer process that waits, once it is ready for a job; `put_back` or `give_back` must follow.
+
+        Raises:
+            UnfitError: no run should be taken up here now: the disk is full, or no trainer starts.
+        """
+        self._fitness.look()
+        deadline = time.monotonic() + _TRAINER_PATIENCE_SECONDS
         with self._condition:
-            self._wanted = True
+            self._wanted, self._no_trainer = True, None
             self._condition.notify_all()
-            self._condition.wait_for(lambda: self._spare is not None and self._spare.alive)
-            spare, self._spare = self._spare, None
-            assert spare is not None
-            self._wanted, self._busy = False, True
-            return spare
+            try:
+                while self._spare is None or not (self._spare.alive and self._spare.ready):
+                    if self._no_trainer is not None:
+                        raise UnfitError(self._no_trainer)
+                    if self.shutting_down() or time.monotonic() > deadline:
+                        raise UnfitError("no trainer process was ready in time")
+                    self._condition.wait(_READY_POLL_SECONDS)
+                spare, self._spare = self._spare, None
+                self._busy = True
+                return spare
+            finally:
+                self._wanted = False
+
+    def put_back(self, trainer: TrainerHandle) -> None:
+        """The trainer was not needed after all, and waits on."""
+        with self._condition:
+            self._busy, self._spare = False, trainer
 
     def give_back(self) -> None:
         """The training has ended: keep another process ready."""
         with self._condition:
             self._busy = False
             self._condition.notify_all()
+
+    def rest(self, fault: str) -> None:
+        """Something here has failed: take no run for a while."""
+        self._fitness.rest(fault, self.shutting_down)
+
+    def well(self) -> None:
+        """An attempt went as it should."""
+        self._fitness.well()
 
     def close(self) -> None:
         """The process ends: so does the trainer that waits, and there are no more heartbeats."""
@@ -86,6 +127,8 @@ class Slot:
         while not self._closed.is_set():
             with self._condition:
                 died = self._bury_spare()
+                if self._spare is not None and self._spare.ready:
+                    self._no_trainer, self._patience = None, _FIRST_RETRY_SECONDS
                 if self._spare is None and (self._wanted or not (self._busy or died or self.shutting_down())):
                     died = not self._start_spare()
                 if os.getppid() != self._parent and not self._busy:
@@ -96,9 +139,8 @@ class Slot:
         """Whether a trainer could be started: a machine may be out of processes, memory or files for a while."""
         try:
             self._spare = TrainerHandle()
-        except OSError:
-            logger.exception("no trainer can be started")
-            self._be_patient()
+        except OSError as error:
+            self._be_patient(f"no trainer can be started: {error}")
             return False
         self._condition.notify_all()
         return True
@@ -108,12 +150,15 @@ class Slot:
         if self._spare is None or self._spare.alive:
             return False
         self._spare.close()
-        logger.error("no trainer is ready. %s", self._spare.cause_of_death())
+        cause = self._spare.cause_of_death()
         self._spare = None
-        self._be_patient()
+        self._be_patient(f"no trainer is ready. {cause}")
         return True
 
-    def _be_patient(self) -> None:
+    def _be_patient(self, reason: str) -> None:
+        self._no_trainer = reason[:_TROUBLE_CHARACTERS]
+        logger.error("%s The next trial is in %g s.", reason, self._patience)
+        self._condition.notify_all()
         self._patience = min(2 * self._patience, _LAST_RETRY_SECONDS)
 
     def _leave(self) -> None:
@@ -128,13 +173,22 @@ class Slot:
 
     def _beaten(self) -> bool:
         """Whether the server has heard that this worker is there."""
+        trouble = self.trouble
+        self._fitness.say(trouble)
         try:
-            self.client.heartbeat(self.name, self.settings.worker_queue)
+            self.client.heartbeat(self.name, self.settings.worker_queue, trouble)
             # For who watches over this worker without asking the server, as a container's health check does.
             (self.settings.work_dir / "heartbeat").touch()
-        except (ServerError, OSError) as error:
-            logger.warning("heartbeat: %s", error)
+        except ServerError as error:
+            if self._answered:
+                logger.warning("Waiting for the server at %s: %s", self.settings.server_url, error)
+            self._answered = False
             return False
+        except OSError as error:
+            logger.warning("heartbeat: %s", error)
+        if not self._answered:
+            logger.info("The server at %s answers again.", self.settings.server_url)
+        self._answered = True
         return True
 
 

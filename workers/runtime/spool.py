@@ -1,19 +1,26 @@
 """What a training reports, in a local file first: kept until the server has it, however long the server is away.
 
-One JSON line an item. Memory stays constant: what waits is read back from the file.
+One line an item: the CRC-32 of its JSON in eight hexadecimal digits, a space, the JSON. A line that a disk, or somebody,
+has altered is noticed even where it still parses. Memory stays constant: what waits is read back from the file.
 """
 
 import threading
 import time
+import zlib
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from workers.errors import SpoolDamagedError
 from workers.protocol import ITEM, MAX_BATCH_ITEMS, EventItem, MetricItem
 from workers.reporting import EventLevel
 
 # What is acknowledged is cut off once there is this much of it: a training may last for days.
 _SHORTEN_BYTES = 2**20
+# Far above any line: an event has 10,000 characters, an item of metrics 256 values.
+_MAX_LINE_BYTES = 2**20
 
 
 class Spool:
@@ -22,6 +29,9 @@ class Spool:
     Args:
         path: the file; one that is there already is gone on with, without its last line if that was torn by a crash.
         last_seq: number of the last item that the server has.
+
+    Raises:
+        SpoolDamagedError: the file that is there already is damaged before its last line.
     """
 
     def __init__(self, path: Path, last_seq: int) -> None:
@@ -34,7 +44,7 @@ class Spool:
         for line in self._file.read().splitlines(keepends=True):
             if not line.endswith(b"\n"):
                 break
-            self._seq = max(self._seq, ITEM.validate_json(line).seq)
+            self._seq = max(self._seq, _decode(line).seq)
             self._end += len(line)
         self._file.truncate(self._end)
 
@@ -60,20 +70,21 @@ class Spool:
         return self._acked
 
     def pending(self, limit: int = MAX_BATCH_ITEMS) -> tuple[MetricItem | EventItem, ...]:
-        """The oldest items that the server has not acknowledged, at most `limit`."""
+        """The oldest items that the server has not acknowledged, at most `limit`; where one is damaged, those before it.
+
+        Raises:
+            SpoolDamagedError: the oldest of them is not what was written, or cannot be read.
+        """
         with self._lock:
             items: list[MetricItem | EventItem] = []
-            self._file.seek(self._acked_offset)
-            offset = self._acked_offset
-            with open(self._file.fileno(), "rb", closefd=False) as lines:
-                while offset < self._end and len(items) < limit:
-                    line = lines.readline()
-                    offset += len(line)
-                    item = ITEM.validate_json(line)
-                    if item.seq > self._acked:
-                        items.append(item)
-                    elif not items:
-                        self._acked_offset = offset
+            try:
+                self._read(items, limit)
+            except (SpoolDamagedError, OSError) as error:
+                if not items:
+                    raise SpoolDamagedError(
+                        f"what the training reported after item {self._acked} cannot be read back from {self._file.name}: "
+                        f"{error}"
+                    ) from error
             return tuple(items)
 
     def acknowledge(self, seq: int) -> None:
@@ -88,8 +99,28 @@ class Spool:
         """Close the file; it stays where it is."""
         self._file.close()
 
+    def _read(self, items: list[MetricItem | EventItem], limit: int) -> None:
+        """Fill `items`, as far as the file is whole."""
+        self._file.seek(self._acked_offset)
+        offset = self._acked_offset
+        before: int | None = None
+        with open(self._file.fileno(), "rb", closefd=False) as lines:
+            while offset < self._end and len(items) < limit:
+                line = lines.readline(_MAX_LINE_BYTES)
+                offset += len(line)
+                item = _decode(line)
+                if before is not None and item.seq != before + 1:
+                    raise SpoolDamagedError(f"item {item.seq} follows item {before}")
+                before = item.seq
+                if item.seq > self._acked:
+                    if not items and item.seq != self._acked + 1:
+                        raise SpoolDamagedError(f"item {item.seq} follows item {self._acked}")
+                    items.append(item)
+                elif not items:
+                    self._acked_offset = offset
+
     def _append(self, item: MetricItem | EventItem) -> int:
-        line = item.model_dump_json().encode() + b"\n"
+        line = _encode(item)
         written = self._file.write(line)
         if written != len(line):
             # A full disk: nothing may follow half a line.
@@ -98,3 +129,18 @@ class Spool:
         self._end += len(line)
         self._seq = item.seq
         return item.seq
+
+
+def _encode(item: MetricItem | EventItem) -> bytes:
+    document = item.model_dump_json().encode()
+    return b"%08x %s\n" % (zlib.crc32(document), document)
+
+
+def _decode(line: bytes) -> MetricItem | EventItem:
+    checksum, _, document = line.removesuffix(b"\n").partition(b" ")
+    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(document):
+        raise SpoolDamagedError("a line is not as it was written")
+    try:
+        return ITEM.validate_json(document)
+    except ValidationError as error:
+        raise SpoolDamagedError("a line is no item of the protocol") from error

@@ -3,18 +3,21 @@
 import logging
 import multiprocessing
 import time
+import uuid
 from typing import Any
 
 import billiard
 from celery import shared_task
 from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_shutting_down
 
-from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError
+from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError, UnfitError
 from workers.protocol import Claim
 from workers.runtime.app import TRAIN_TASK
 from workers.runtime.attempt import Attempt
+from workers.runtime.fitness import make_private
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.slot import Slot, remove_leftovers
+from workers.runtime.trainer_handle import TrainerHandle
 
 logger = logging.getLogger(__name__)
 
@@ -31,7 +34,7 @@ def _prepare_worker(**_: Any) -> None:
     # A line for every heartbeat would bury what matters.
     logging.getLogger("httpx").setLevel(logging.WARNING)
     settings = WorkerSettings()
-    settings.work_dir.mkdir(parents=True, exist_ok=True)
+    make_private(settings.work_dir)
     remove_leftovers(settings.work_dir)
 
 
@@ -59,25 +62,51 @@ worker_process_shutdown.connect(_close_slot)
 def train(run_id: str, attempt: int) -> None:
     """Train a run, if it is still to be had at `attempt`; every other message is one too many, and dropped."""
     assert _slot is not None
-    claim = _claim(_slot, run_id, attempt)
+    try:
+        trainer = _slot.take_trainer()
+    except UnfitError as error:
+        # The server rings again, and while this worker rests another one hears it.
+        _slot.rest(str(error))
+        return
+    try:
+        claim = _claim(_slot, run_id, attempt)
+    except BaseException:
+        _slot.put_back(trainer)
+        raise
     if claim is None:
+        _slot.put_back(trainer)
         return
     logger.info("run %s: attempt %d begins", run_id, claim.attempt)
-    # The attempt's link opens first: it keeps the lease while a trainer is being started.
-    work = Attempt(_slot.settings, _slot.client, run_id, claim, _slot.directory(run_id, claim.attempt), _slot.shutting_down)
-    trainer = _slot.take_trainer()
     try:
-        outcome = work.run(trainer)
+        fault = _see_through(_slot, run_id, claim, trainer)
     finally:
+        trainer.close()
         _slot.give_back()
+    if fault is None:
+        _slot.well()
+    else:
+        _slot.rest(fault)
+
+
+def _see_through(slot: Slot, run_id: str, claim: Claim, trainer: TrainerHandle) -> str | None:
+    """Bring a claimed run to the end of its attempt; returns what was wrong with this machine, if anything was."""
+    try:
+        work = Attempt(slot.settings, slot.client, run_id, claim, slot.directory(run_id, claim.attempt), slot.shutting_down)
+    except OSError as error:
+        logger.exception("run %s: attempt %d cannot keep its files; it goes on after its lease", run_id, claim.attempt)
+        return f"{type(error).__name__}: {error}"
+    outcome = work.run(trainer)
     logger.info("run %s: attempt %d ended: %s", run_id, claim.attempt, outcome or "given up")
+    return work.local_fault
 
 
 def _claim(slot: Slot, run_id: str, attempt: int) -> Claim | None:
     deadline = time.monotonic() + _CLAIM_PATIENCE_SECONDS
+    claim_id = uuid.uuid4().hex
+    waited = False
     while time.monotonic() < deadline and not slot.shutting_down():
         try:
-            return slot.client.claim(run_id, slot.name, attempt)
+            return slot.client.claim(run_id, slot.name, attempt, claim_id)
         except RunRefusedError as refusal:
             logger.info("run %s is not to be had at attempt %d: %s", run_id, attempt, refusal)
             return None
@@ -85,6 +114,8 @@ def _claim(slot: Slot, run_id: str, attempt: int) -> Claim | None:
             logger.exception("run %s cannot be claimed", run_id)
             return None
         except ServerUnavailableError as error:
-            logger.warning("run %s waits: %s", run_id, error)
+            if not waited:
+                logger.warning("run %s waits for the server to answer: %s", run_id, error)
+            waited = True
             time.sleep(_CLAIM_RETRY_SECONDS)
     return None

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from workers.runtime.pipe import Control, Job, Order, Report, Sender, reports
+from workers.runtime.pipe import Control, Job, Order, Ready, Report, Sender, reports
 
 _ROOT = Path(__file__).resolve().parents[2]
 # What a crash is explained with.
@@ -53,7 +53,10 @@ class TrainerHandle:
             target=self._read_output, args=(self._process.stdout,), name="trainer output", daemon=True
         )
         self._output_thread.start()
-        self._report_thread: threading.Thread | None = None
+        self._ready = threading.Event()
+        self._on_report: Callable[[Report], None] | None = None
+        self._report_thread = threading.Thread(target=self._read_reports, name="trainer reports", daemon=True)
+        self._report_thread.start()
 
     @property
     def pid(self) -> int:
@@ -65,12 +68,14 @@ class TrainerHandle:
         """Whether it still runs."""
         return self._process.poll() is None
 
+    @property
+    def ready(self) -> bool:
+        """Whether it has come as far as to wait for its job."""
+        return self._ready.is_set()
+
     def train(self, job: Job, on_report: Callable[[Report], None]) -> None:
         """Give it its one job; `on_report` is called with all that it reports, in order, on a thread of its own."""
-        self._report_thread = threading.Thread(
-            target=self._read_reports, args=(on_report,), name="trainer reports", daemon=True
-        )
-        self._report_thread.start()
+        self._on_report = on_report
         self._send(job)
 
     def control(self, control: Control) -> None:
@@ -95,8 +100,7 @@ class TrainerHandle:
         """Kill it if it still runs, and hear the last of its reports."""
         self.kill()
         self._process.wait()
-        if self._report_thread is not None:
-            self._report_thread.join()
+        self._report_thread.join()
         self._output_thread.join()
         self._reports.close()
         for stream in (self._process.stdin, self._process.stdout):
@@ -125,10 +129,13 @@ class TrainerHandle:
             except (BrokenPipeError, ValueError):
                 return  # it has ended, and whoever waits for it notices
 
-    def _read_reports(self, on_report: Callable[[Report], None]) -> None:
+    def _read_reports(self) -> None:
         receiver = reports(self._reports)
         while (report := receiver.receive()) is not None:
-            on_report(report)
+            if isinstance(report, Ready):
+                self._ready.set()
+            elif self._on_report is not None:  # it says nothing else before it has its job
+                self._on_report(report)
 
     def _read_output(self, stream: IO[bytes]) -> None:
         for line in stream:

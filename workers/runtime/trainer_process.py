@@ -16,7 +16,7 @@ from pathlib import Path
 
 from sim.errors import SimError
 from workers.config import TrainingConfig
-from workers.errors import WorkerError
+from workers.errors import ArchiveFormatError, ArchiveIntegrityError, WorkerError
 from workers.frames import Frame
 from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
@@ -29,6 +29,7 @@ from workers.runtime.pipe import (
     Job,
     MetricsReport,
     Order,
+    Ready,
     Receiver,
     Report,
     Sender,
@@ -127,8 +128,9 @@ def _listen(incoming: Receiver[Order], reporter: PipeReporter) -> None:
 def main(descriptor: int, parent: int) -> None:
     """Wait for a job, train, report."""
     die_with_parent(parent)
-    # Ctrl-C reaches the whole terminal; ending in order is the worker's decision.
+    # Ctrl-C reaches the whole terminal, a batch system's SIGTERM all of a job; ending in order is the worker's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
     # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
     from workers.live.viewer import LiveViewer
@@ -138,11 +140,13 @@ def main(descriptor: int, parent: int) -> None:
     warm_up()
 
     incoming = orders(sys.stdin.buffer)
-    job = incoming.receive()
-    if not isinstance(job, Job):
-        return
     with os.fdopen(descriptor, "wb") as stream:
-        reporter = PipeReporter(Sender(stream))
+        sender = Sender(stream)
+        sender.send(Ready())
+        job = incoming.receive()
+        if not isinstance(job, Job):
+            return
+        reporter = PipeReporter(sender)
         threading.Thread(target=_listen, args=(incoming, reporter), name="orders", daemon=True).start()
         try:
             config = TrainingConfig.model_validate_json(job.training)
@@ -154,6 +158,11 @@ def main(descriptor: int, parent: int) -> None:
                 Path(job.resume) if job.resume else None,
                 viewer=LiveViewer(config.task, reporter),
             )
+        except (ArchiveFormatError, ArchiveIntegrityError) as error:
+            # Whether it is damaged where it is kept as well is for the server to say.
+            reporter.end("damaged", str(error))
+        except OSError as error:
+            reporter.end("unfit", f"{type(error).__name__}: {error}")
         except (WorkerError, SimError, ValueError) as error:
             # Typed, or about a value of the configuration: another attempt would meet it again.
             reporter.end("failed", f"{type(error).__name__}: {error}")

@@ -36,7 +36,9 @@ class Uploads:
         self._condition = threading.Condition()
         self._queue: deque[_Upload] = deque()
         self._closed = False
+        self._last_seq: int | None = None
         self._refusal: str | None = None
+        self._fault: str | None = None
         self._thread = threading.Thread(target=self._run, name=f"uploads {run_id}", daemon=True)
         self._thread.start()
 
@@ -44,6 +46,11 @@ class Uploads:
     def refusal(self) -> str | None:
         """Why the server will never take a checkpoint of this attempt; None while all is well."""
         return self._refusal
+
+    @property
+    def fault(self) -> str | None:
+        """Why this machine cannot bring a checkpoint up; None while all is well."""
+        return self._fault
 
     @property
     def idle(self) -> bool:
@@ -55,6 +62,14 @@ class Uploads:
         """Bring this archive up once everything that is in the spool by now has been acknowledged."""
         with self._condition:
             self._queue.append(_Upload(step, archive, self._spool.last_seq, evaluation))
+            self._drop_hopeless()
+            self._condition.notify()
+
+    def drop_beyond(self, seq: int) -> None:
+        """No item after `seq` will ever be acknowledged: what waits for one, now or later, does so in vain."""
+        with self._condition:
+            self._last_seq = seq
+            self._drop_hopeless()
             self._condition.notify()
 
     def notify(self) -> None:
@@ -83,9 +98,11 @@ class Uploads:
                 retry = min(2 * retry, _LAST_RETRY_SECONDS)
                 continue
             except RunRefusedError:
-                self._end(None)  # fenced: the link hears of it too
-            except (RequestRefusedError, OSError) as error:
-                self._end(f"A checkpoint could not be brought to the server: {error}")
+                self._end()  # fenced: the link hears of it too
+            except RequestRefusedError as error:
+                self._end(refusal=f"A checkpoint could not be brought to the server: {error}")
+            except OSError as error:
+                self._end(fault=f"A checkpoint could not be read: {error}")
             retry = _FIRST_RETRY_SECONDS
             upload.archive.unlink(missing_ok=True)
             with self._condition:
@@ -97,7 +114,11 @@ class Uploads:
             self._condition.wait_for(lambda: self._closed or (self._queue and self._queue[0].after_seq <= self._spool.acked))
             return None if self._closed else self._queue[0]
 
-    def _end(self, refusal: str | None) -> None:
+    def _drop_hopeless(self) -> None:
+        while self._last_seq is not None and self._queue and self._queue[-1].after_seq > self._last_seq:
+            self._queue.pop().archive.unlink(missing_ok=True)
+
+    def _end(self, *, refusal: str | None = None, fault: str | None = None) -> None:
         with self._condition:
-            self._refusal = refusal
+            self._refusal, self._fault = refusal, fault
             self._closed = True

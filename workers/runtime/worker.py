@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
+from workers.errors import UnfitError
 from workers.protocol import Queue
+from workers.runtime.fitness import make_private
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.supervised import end_with_supervisor
 
@@ -26,6 +28,9 @@ def worker(
         int | None, typer.Option("--concurrency", "-c", min=1, help="Trainings side by side; one a core if not given.")
     ] = None,
     name: Annotated[str | None, typer.Option(help="Tells workers of one machine apart.")] = None,
+    work_dir: Annotated[
+        Path | None, typer.Option(help="Where runs keep their files until the server has them [MAPLESS_WORK_DIR].")
+    ] = None,
 ) -> None:
     """Start a worker for a server, here or on another machine."""
     given = {
@@ -33,6 +38,7 @@ def worker(
         "broker_url": broker,
         "worker_token": token,
         "worker_queue": queue,
+        "work_dir": work_dir,
         "worker_name": name or os.environ.get("MAPLESS_WORKER_NAME") or f"worker{os.getpid()}",
     }
     try:
@@ -43,11 +49,18 @@ def worker(
             reason = "is needed (mapless worker --help)" if problem["type"] == "missing" else problem["msg"]
             sys.stderr.write(f"mapless: {variable} {reason}\n")
         raise typer.Exit(1) from None
+    try:
+        make_private(settings.work_dir)
+    except UnfitError as error:
+        sys.stderr.write(f"mapless: {error}\n")
+        raise typer.Exit(1) from None
     run_worker(settings, concurrency or usable_cores())
 
 
 def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     """Work until SIGTERM or SIGINT; trainings under way are then handed back, with a checkpoint."""
+    # What runs keep here is their owner's alone.
+    os.umask(0o077)
     # The processes that Celery forks read the settings anew.
     os.environ.update(_environment(settings))
     end_with_supervisor()
@@ -87,5 +100,6 @@ def _environment(settings: WorkerSettings) -> dict[str, str]:
         "WORKER_QUEUE": settings.worker_queue,
         "WORKER_NAME": settings.worker_name,
         "WORK_DIR": str(Path(settings.work_dir).resolve()),
+        "MIN_FREE_BYTES": str(settings.min_free_bytes),
     }
     return {f"MAPLESS_{name}": value for name, value in values.items()}
