@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import os
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -89,3 +90,23 @@ def test_an_id_is_never_a_path(store: FileStore, identifier: str) -> None:
         store.read(identifier)
     with pytest.raises(NotFoundError):
         write(store, identifier, b"x")
+
+
+def test_an_archive_and_its_name_are_on_disk_before_anybody_is_told_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row must never outlive its file in a power cut: the file is synced under its first name, then the folder."""
+    store = FileStore(str(tmp_path), max_bytes=1_000)
+    synced: list[tuple[int, list[str]]] = []
+    sync = os.fsync
+
+    def note(descriptor: int) -> None:
+        sync(descriptor)
+        synced.append((os.fstat(descriptor).st_ino, sorted(path.name for path in tmp_path.iterdir())))
+
+    monkeypatch.setattr(os, "fsync", note)
+    write(store, "abc", b"weights")
+    assert synced == [
+        ((tmp_path / "abc.zip").stat().st_ino, ["abc.zip.part"]),
+        (tmp_path.stat().st_ino, ["abc.zip"]),
+    ]

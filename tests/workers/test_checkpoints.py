@@ -1,6 +1,7 @@
 """A checkpoint archive gives back what was put in, and refuses whatever is not one."""
 
 import hashlib
+import io
 import json
 import os
 import zipfile
@@ -12,9 +13,9 @@ import pytest
 import torch
 from safetensors.numpy import load, save
 
-from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, read_policy, write_checkpoint
+from workers.checkpoints import Checkpoint, check_archive, read_checkpoint, read_manifest, read_policy, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork, TrainingConfig
-from workers.errors import ArchiveFormatError, ArchiveIntegrityError
+from workers.errors import ArchiveError, ArchiveFormatError, ArchiveIntegrityError
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.networks.layout import layout, weight_shapes
 from workers.networks.modules import bound_actions, build_network
@@ -70,6 +71,18 @@ def test_archive_gives_back_everything(tmp_path: Path, network: Network) -> None
         for name, array in mine.items():
             assert (array.dtype, array.shape) == (theirs[name].dtype, theirs[name].shape)
             np.testing.assert_array_equal(array, theirs[name])
+
+
+def test_an_archive_is_compared_block_by_block_without_being_loaded(archive: Path) -> None:
+    with archive.open("rb") as file:
+        check_archive(file, archive.name)
+    whole = archive.read_bytes()
+    for place in range(0, len(whole), 997):
+        data = bytearray(whole)
+        data[place] ^= 4
+        if place > whole.index(b"layers.0.bias"):  # from the policy's file on; what stands before it is the manifest
+            with pytest.raises(ArchiveError):
+                check_archive(io.BytesIO(data), archive.name)
 
 
 def test_same_content_gives_same_bytes(tmp_path: Path, archive: Path) -> None:

@@ -1289,6 +1289,11 @@ export interface components {
             best: boolean;
             /** Created At */
             created_at: number;
+            /**
+             * Damaged
+             * @description Its archive was found damaged or gone: the run went on from an older one.
+             */
+            damaged: boolean;
             evaluation: components["schemas"]["Evaluation"] | null;
             /** Id */
             id: string;
@@ -4553,6 +4558,11 @@ export interface components {
              * @description The run that it trains now.
              */
             run_id: string | null;
+            /**
+             * Trouble
+             * @description Why it takes up no run, a full disk say; null while it does.
+             */
+            trouble: string | null;
         };
     };
     responses: never;

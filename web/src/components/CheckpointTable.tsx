@@ -61,6 +61,17 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                     Best
                   </Badge>
                 )}
+                {checkpoint.damaged && (
+                  <Badge
+                    size="sm"
+                    color="red"
+                    variant="light"
+                    miw="fit-content"
+                    title="Its archive is no longer what was stored: the run went on from the one before"
+                  >
+                    Damaged
+                  </Badge>
+                )}
               </Table.Td>
               <Table.Td>
                 <SuccessEstimate estimate={checkpoint.evaluation?.success ?? null} episodes />
@@ -82,7 +93,12 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                 {dateTime(checkpoint.created_at)}
               </Table.Td>
               <Table.Td>
-                <Group gap={6} justify="flex-end" className={classes.buttons}>
+                <Group
+                  gap={6}
+                  justify="flex-end"
+                  className={classes.buttons}
+                  display={checkpoint.damaged ? 'none' : undefined}
+                >
                   {checkpoint.evaluation && (
                     <Button
                       size="compact-sm"

@@ -99,7 +99,9 @@ function ServiceState({ status, offline }: { status: Status | undefined; offline
     <Badge
       tone={running > 0 ? 'busy' : 'idle'}
       text={`${plural(workers.length, 'worker')}${running > 0 ? `, ${running} running` : ''}${waiting}`}
-      hint={workers.map((worker) => `${worker.name}: ${worker.run_id ? 'training' : 'free'}`).join('\n')}
+      hint={workers
+        .map((worker) => `${worker.name}: ${worker.trouble ?? (worker.run_id ? 'training' : 'free')}`)
+        .join('\n')}
     />
   )
 }

@@ -21,8 +21,8 @@ export const status: Status = {
   version: '0.1.0',
   commit: 'c0ffee1',
   workers: [
-    { name: 'worker-1', last_seen: NOW, run_id: 'run1' },
-    { name: 'worker-2', last_seen: NOW, run_id: null },
+    { name: 'worker-1', last_seen: NOW, run_id: 'run1', trouble: null },
+    { name: 'worker-2', last_seen: NOW, run_id: null, trouble: null },
   ],
   queued: 0,
   running: 1,
@@ -102,6 +102,7 @@ export const checkpoints: Checkpoint[] = [
     size: 436_112,
     sha256: 'ab'.repeat(32),
     created_at: NOW - 40,
+    damaged: false,
     best: false,
     evaluation: null,
   },
@@ -111,6 +112,7 @@ export const checkpoints: Checkpoint[] = [
     size: 436_112,
     sha256: 'cd'.repeat(32),
     created_at: NOW - 20,
+    damaged: false,
     best: true,
     evaluation: {
       suite: 'simple-200',
