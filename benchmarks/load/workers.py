@@ -8,6 +8,7 @@ import logging
 import random
 import threading
 import time
+import uuid
 from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,12 +46,14 @@ class SyntheticRun:
         self._spool: Spool | None = None
         self._link: Link | None = None
         self._first_seq = 0
+        self._broken: str | None = None
         self.items = self.acknowledged = self.frames = 0
 
     def claim(self, attempt: int) -> None:
         """Take the run up at this attempt, and open its link."""
         self.close()
-        claim = self._client.claim(self.run_id, self.worker, attempt)
+        self._broken = None
+        claim = self._client.claim(self.run_id, self.worker, attempt, uuid.uuid4().hex)
         self._first_seq = claim.last_seq
         self._spool = Spool(self._directory / f"{self.run_id}-{claim.attempt}.jsonl", claim.last_seq)
         self._link = Link(
@@ -61,12 +64,13 @@ class SyntheticRun:
             self._spool,
             claim.lease_seconds,
             self._obey,
+            self._give_up,
         )
 
     @property
     def lost(self) -> bool:
         """Whether the server has given the run to nobody, or somebody else."""
-        return self._link is None or self._link.fenced()
+        return self._link is None or self._link.fenced() or self._broken is not None
 
     def report(self) -> None:
         """One item of made-up numbers."""
@@ -109,6 +113,10 @@ class SyntheticRun:
 
     def _obey(self, orders: Orders) -> None:
         self._watch = orders.watch
+
+    def _give_up(self, reason: str) -> None:
+        logging.error("run %s: %s", self.run_id, reason)
+        self._broken = reason
 
 
 def _heartbeats(plan: Plan, client: ServerClient, runs: list[SyntheticRun], errors: Counter[str]) -> None:
