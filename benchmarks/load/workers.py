@@ -26,6 +26,8 @@ from workers.runtime.client import ServerClient
 from workers.runtime.link import Link
 from workers.runtime.spool import Spool
 
+logger = logging.getLogger(__name__)
+
 _FRAMES_PER_SECOND = 30.0
 _STEPS_PER_ITEM = 8_192
 
@@ -115,7 +117,7 @@ class SyntheticRun:
         self._watch = orders.watch
 
     def _give_up(self, reason: str) -> None:
-        logging.error("run %s: %s", self.run_id, reason)
+        logger.error("run %s: %s", self.run_id, reason)
         self._broken = reason
 
 

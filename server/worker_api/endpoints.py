@@ -125,7 +125,7 @@ async def _receive(
                 damaged = None
                 if batch.final is not None and batch.final.outcome == "damaged":
                     # Here and not with the other reports: reading an archive takes longer than storing them.
-                    damaged = await run_in_threadpool(WorkerService(services).damaged, run_id)
+                    damaged = await services.lanes.workers.run(WorkerService(services).damaged, run_id)
                 opened.tell(await ingest.receive(Report(run_id, attempt, batch, refused, damaged)))
     except FencedError:
         opened.fence()
