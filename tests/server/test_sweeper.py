@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Iterator
 
 import pytest
 from sqlalchemy import select
@@ -46,17 +47,24 @@ class Clock:
 
 
 @pytest.fixture
+def settings(settings: Settings, database_url: str) -> Settings:
+    """On both kinds of database."""
+    return settings.model_copy(update={"database_url": database_url})
+
+
+@pytest.fixture
 def clock() -> Clock:
     return Clock()
 
 
 @pytest.fixture
-def services(settings: Settings, clock: Clock) -> Services:
+def services(settings: Settings, clock: Clock) -> Iterator[Services]:
     """Without the application around it: here the clock is the test's."""
     services = create_services(settings)
     services.doorbell = Bell()
     services.leases = Leases(LEASE, clock)
-    return services
+    yield services
+    services.database.dispose()
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from server.metrics.repository import MetricRepository
 from server.services import Services
+from server.settings import Settings
 from server.worker_api.leases import Leases
 from workers.protocol import (
     CLOSE_FENCED,
@@ -48,6 +49,12 @@ class Bell:
 
     def ring(self, run_id: str, attempt: int, queue: Queue) -> None:
         self.rings.append((run_id, attempt, queue))
+
+
+@pytest.fixture
+def settings(settings: Settings, database_url: str) -> Settings:
+    """On both kinds of database."""
+    return settings.model_copy(update={"database_url": database_url})
 
 
 @pytest.fixture
