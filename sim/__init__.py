@@ -1,1 +1,3 @@
 """The world: arenas, robot, LiDAR, rewards, observations, Gymnasium environments and suites."""
+
+from sim.envs import registration as registration

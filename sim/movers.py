@@ -12,10 +12,9 @@ from sim.kernels.movers import DECISION, move_movers, place_movers
 from sim.kernels.random import seed_streams
 from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
 from sim.shapes import Shapes, hulls
+from sim.streams import MOVERS, Stream
 
 _KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}
-# Other streams than the robots', for the same seed.
-_STREAM = (1,)
 
 
 class Movers:
@@ -77,9 +76,9 @@ class Movers:
     def __len__(self) -> int:
         return len(self._records)
 
-    def seed(self, seed: int | None) -> None:
-        """Start every mover's generator anew; None takes a seed from the operating system."""
-        streams = seed_streams(seed, len(self) // self._copies, key=_STREAM)
+    def seed(self, seed: int | None, stream: Stream) -> None:
+        """Start every mover's generator anew, from the movers' child of a stream; None takes a seed from the system."""
+        streams = seed_streams(seed, len(self) // self._copies, key=(*stream, *MOVERS))
         self._records["random"] = np.tile(streams, self._copies)
 
     def place(self) -> None:

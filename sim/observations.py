@@ -9,9 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sim.config import ObservationName, TaskConfig
-
-EXTRA = 6
-"""Numbers of an observation that are not the scan."""
+from sim.kernels.records import EXTRA
 
 
 @dataclass(frozen=True)

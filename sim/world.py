@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,15 +35,20 @@ from sim.kernels.records import (
     RATE,
     ROBOT,
 )
-from sim.kernels.step import reset_robots, step_robots
+from sim.kernels.step import ARRIVAL_MARGIN, MIN_TARGET_DISTANCE, reset_robots, step_robots
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.movers import Movers
 from sim.observations import near_distance, observation_size
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.shapes import pack_shapes
+from sim.streams import ENVIRONMENT, Stream
 
 SPAWN_MARGIN = 0.2
 """Metres that starts and targets keep from obstacles beyond what a robot needs to pass: 0.4 m in all by default."""
+
+Restart = Literal["same step", "next step", "reset"]
+"""When a robot whose episode has ended begins the next one: in that step, in the one after it whatever its action, or when
+`World.reset` is called."""
 
 _OBSERVATIONS = {"paper": PAPER, "improved": IMPROVED}
 _REWARDS = {"basic": BASIC, "clearance": CLEARANCE, "alignment": ALIGNMENT}
@@ -70,8 +76,14 @@ def _path_samples(task: TaskConfig) -> int:
     return math.ceil(float(fastest) * task.control_period / robot.inscribed_radius)
 
 
-def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
-    """A task as the kernels read it: (1,) of `sim.kernels.records.PARAMETERS`."""
+def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) -> NDArray[np.void]:
+    """A task as the kernels read it: (1,) of `sim.kernels.records.PARAMETERS`.
+
+    Args:
+        task: robot, LiDAR, observation, reward and limits.
+        arrival_ends: whether an arrival ends the episode.
+        starts_anew: whether the next episode begins in the step that ended one.
+    """
     parameters = np.zeros(1, dtype=PARAMETERS)
     spans = quantity_spans(task)
     half_length, half_width = task.robot.half_extents or (0.0, 0.0)
@@ -101,7 +113,10 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
         "arrival_distance": task.arrival_distance,
         "collision_distance": task.collision_distance,
         "step_limit": task.step_limit,
+        "arrival_ends": arrival_ends,
+        "starts_anew": starts_anew,
         "spawn_clearance": task.passable_clearance + SPAWN_MARGIN,
+        "min_target_distance": max(float(MIN_TARGET_DISTANCE), task.arrival_distance + ARRIVAL_MARGIN),
         "path_samples": _path_samples(task),
     }
     for name, value in values.items():
@@ -112,8 +127,8 @@ def pack_parameters(task: TaskConfig) -> NDArray[np.void]:
 class World:
     """Robots in a pool of arenas: LiDAR, physics, outcomes, rewards, observations and resets.
 
-    A robot goes on after an arrival, with a new target; after a collision or a time-out it starts anew, in an arena drawn
-    from the pool. Its fate depends on the seed and its own index, never on the number of robots. Robots do not see one
+    A robot goes on after an arrival, with a new target, unless that ends the episode; after a collision or a time-out it
+    starts anew, in an arena drawn from the pool. Its fate depends on the seed and its own index, never on the number of robots. Robots do not see one
     another; they see movers, which take no notice of them.
 
     Args:
@@ -121,6 +136,9 @@ class World:
         arenas: the pool.
         robots: how many.
         seed: of all that is random; None takes one from the operating system.
+        stream: of random numbers, see `sim.streams`.
+        arrival_ends: whether an arrival ends the episode.
+        restart: when the next episode begins.
         respawn: False saves looking for free space where every pose and target is given: robots then stay where they end,
             and all copies of an arena have the same movers.
 
@@ -135,7 +153,16 @@ class World:
     """
 
     def __init__(
-        self, task: TaskConfig, arenas: Sequence[Arena], robots: int, *, seed: int | None = None, respawn: bool = True
+        self,
+        task: TaskConfig,
+        arenas: Sequence[Arena],
+        robots: int,
+        *,
+        seed: int | None = None,
+        stream: Stream = ENVIRONMENT,
+        arrival_ends: bool = False,
+        restart: Restart = "same step",
+        respawn: bool = True,
     ) -> None:
         self.task = task
         self.arenas = tuple(arenas)
@@ -189,12 +216,13 @@ class World:
             held_ranges=np.zeros((robots if holds else 0, task.lidar.rays), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
-        self._parameters = pack_parameters(task)
+        self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=restart == "same step")
         self._parameters["replica_stride"] = len(self.arenas)
-        self._parameters["closing"] = (task.robot.max_linear_speed + self.movers.fastest) * task.control_period
+        self._parameters["closing"] = (spans[MAX_LINEAR, 1] + self.movers.fastest) * task.control_period
         self.robots.records["replica"] = np.arange(robots) // (ROBOTS_PER_TILE * len(self.arenas))
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self._placed = np.zeros(robots, dtype=np.int32)
+        self._restart, self._stream = restart, stream
         self.seed(seed)
 
     def __len__(self) -> int:
@@ -202,8 +230,8 @@ class World:
 
     def seed(self, seed: int | None) -> None:
         """Start every robot's and mover's generator anew; None takes a seed from the operating system."""
-        self.robots.records["random"] = seed_streams(seed, len(self))
-        self.movers.seed(seed)
+        self.robots.records["random"] = seed_streams(seed, len(self), key=self._stream)
+        self.movers.seed(seed, self._stream)
 
     def reset(
         self, *, poses: ArrayLike | None = None, targets: ArrayLike | None = None, arenas: ArrayLike | None = None
@@ -233,7 +261,8 @@ class World:
         self.movers.place()
         space = self._space
         self.movers.write_places(space.state[len(self) : -1])
-        reset_robots(placed, aimed, self.robots, self.geometry, self._parameters, space.state)
+        everybody = np.ones(n, dtype=np.bool_)
+        reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
 
     def reset_with(self, options: Mapping[str, ArrayLike] | None) -> None:
@@ -284,11 +313,15 @@ class World:
 
         Args:
             actions: (N, 2) float32, linear in [0, 1] and angular in [-1, 1] as fractions of the robot's limits; clipped.
+                What it is makes no difference to robots that begin their next episode in this step.
 
         Raises:
             ValueError: an action is not finite.
         """
         space = self._space
+        ended = self.robots.terminations | self.robots.truncations if self._restart == "next step" else None
+        if ended is not None:
+            self.robots.records["parked"][ended] = 1
         invalid = write_commands(actions, self.robots, space.state, space.command, self._parameters)
         if invalid >= 0:
             raise ValueError(f"the action of robot {invalid} is not finite: {actions[invalid].tolist()}")
@@ -298,6 +331,15 @@ class World:
         count = step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
         if count:
             space.put(self._placed[:count])
+        if ended is not None and ended.any():
+            self._begin(ended)
+
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        """Begin the next episode of some robots (N,), which are parked."""
+        self.robots.records["parked"][which] = 0
+        drawn = np.full((len(self), 3), np.nan, dtype=np.float32)
+        reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
+        self._space.put(np.flatnonzero(which).astype(np.int32))
 
     @property
     def fields_of_view(self) -> NDArray[np.float64]:

@@ -1,7 +1,8 @@
 """Where robots may start and targets may stand: the connected free space of an arena, as a list of square cells.
 
 A grid of cells is kept rather than a bounding rectangle so that sampling stays quick and never picks a pocket that the robot
-cannot leave, in a maze or an imported map as much as in an empty hall.
+cannot leave, in a maze or an imported map as much as in an empty hall. A gap that is wider than the robot needs by less than
+a cell may count as closed.
 """
 
 from dataclasses import dataclass
@@ -12,9 +13,7 @@ from numpy.typing import NDArray
 from sim.arenas.cells import Grid, components, obstacle_distance
 from sim.arenas.geometry import Arena
 from sim.errors import ArenaError
-
-CELL = 0.1
-"""Edge of a cell, metres. A gap that is wider than the robot needs by less than this may count as closed."""
+from sim.kernels.records import CELL
 
 MAX_CELLS = 4_000_000
 """Cells of the largest grid: 200 x 200 m."""

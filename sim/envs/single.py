@@ -32,12 +32,16 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 5}  # type: ignore[misc]
 
+    _ARRIVAL_ENDS: ClassVar[bool] = False
+    """Whether an arrival ends the episode."""
+
     def __init__(self, task: Task = None, *, render_mode: str | None = None) -> None:
         self.task = read_task(task)
         self.render_mode = known_mode(render_mode, self.metadata)
         self._window = Window("Mapless", self.task.control_period) if render_mode == "human" else None
         self.observation_space, self.action_space = single_spaces(self.task)
-        self._world = World(self.task, build_task_arenas(self.task), 1)
+        # The next episode waits for `reset`: pose and picture of a last step are those of the episode that it ends.
+        self._world = World(self.task, build_task_arenas(self.task), 1, arrival_ends=self._ARRIVAL_ENDS, restart="reset")
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode.
@@ -87,9 +91,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
                 "path_length": float(record["path_length"]),
                 "min_clearance": float(record["min_clearance"]),
             }
-        # The world has started the next episode already; Gymnasium wants the last observation of this one.
-        observation = robots.final_observations[0] if terminated or truncated else robots.observations[0]
-        return observation.copy(), float(robots.rewards[0]), terminated, truncated, info
+        return robots.observations[0].copy(), float(robots.rewards[0]), terminated, truncated, info
 
     def _info(self) -> dict[str, Any]:
         robots = self._world.robots

@@ -15,7 +15,7 @@ from sim.envs.render import render_robot
 from sim.kernels.bundles import REWARD_TERMS
 from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.observations import observation_layout
-from sim.world import World
+from sim.world import Restart, World
 
 Floats = NDArray[np.float32]
 Task = TaskConfig | Mapping[str, Any] | None
@@ -38,6 +38,9 @@ def single_spaces(task: TaskConfig) -> tuple[Space[Floats], Space[Floats]]:
     return observation, action
 
 
+_RESTARTS: dict[AutoresetMode, Restart] = {AutoresetMode.SAME_STEP: "same step", AutoresetMode.NEXT_STEP: "next step"}
+
+
 def known_mode(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
     """The render mode; raises ValueError where `metadata` has none of this name."""
     if render_mode is not None and render_mode not in metadata["render_modes"]:
@@ -49,9 +52,9 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     """Robots that drive to targets by their LiDAR, each alone in its arena.
 
     An *attempt* is the way to one target and ends with an arrival, a collision or a time-out. An arrival pays its reward
-    and brings a new target, and the episode goes on; a collision terminates the episode, a time-out truncates it. Both
-    start anew in the same step: the observation returned is the new episode's first, the last one is in
-    `final_observations` and in `infos["final_obs"]`.
+    and brings a new target, and the episode goes on; a collision terminates the episode, a time-out truncates it. Unless
+    asked otherwise, both start anew in the same step: the observation returned is the new episode's first, the last one is
+    in `final_observations` and in `infos["final_obs"]`.
 
     Args:
         task: arena, robot, LiDAR, observation, reward, limits.
@@ -60,11 +63,13 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         render_mode: None, or "rgb_array" for pictures of the first robots.
         copy: whether `step` and `reset` return copies; False returns the environment's own arrays, which the next step
             overwrites.
+        autoreset_mode: when the next episode of a robot begins: in the step that ended one, or, as Gymnasium's own vector
+            environments do, in the one after it, whose action makes no difference and whose reward is 0.
 
     Raises:
         pydantic.ValidationError: a value of the task is wrong.
         ArenaError: the robot does not fit into the arena.
-        ValueError: there is no such render mode, or not one robot.
+        ValueError: there is no such render mode, not one robot, or it should never reset.
 
     >>> envs = NavigationVectorEnv(num_envs=4, seed=1)
     >>> observations, infos = envs.reset()
@@ -78,6 +83,9 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         "render_fps": 5,
     }
 
+    _ARRIVAL_ENDS: ClassVar[bool] = False
+    """Whether an arrival ends the episode."""
+
     def __init__(
         self,
         task: Task = None,
@@ -86,9 +94,15 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         seed: int | None = None,
         render_mode: str | None = None,
         copy: bool = True,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ) -> None:
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, not {num_envs}")
+        mode = AutoresetMode(autoreset_mode)
+        if mode not in _RESTARTS:
+            raise ValueError(f"autoreset_mode must be {' or '.join(repr(one.value) for one in _RESTARTS)}")
+        self.metadata = {**self.metadata, "autoreset_mode": mode}
+        self._same_step = mode is AutoresetMode.SAME_STEP
         self.task = read_task(task)
         self.num_envs = num_envs
         self.render_mode = known_mode(render_mode, self.metadata)
@@ -96,7 +110,14 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._copy = copy
-        self._world = World(self.task, build_task_arenas(self.task), num_envs, seed=seed)
+        self._world = World(
+            self.task,
+            build_task_arenas(self.task),
+            num_envs,
+            seed=seed,
+            arrival_ends=self._ARRIVAL_ENDS,
+            restart=_RESTARTS[mode],
+        )
         robots = self._world.robots
         self.poses = robots.poses
         """(N, 3) x, y in metres, heading in radians: in the robot's arena, after the step and its resets."""
@@ -171,8 +192,9 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             actions: (N, 2) linear in [0, 1] and angular in [-1, 1], as fractions of the robot's limits; clipped.
 
         Returns:
-            Observations (N, numbers), rewards (N,), terminations (N,), truncations (N,), and infos: where episodes ended
-            `final_obs` and `final_info`, each with its mask `_final_obs`, `_final_info`.
+            Observations (N, numbers), rewards (N,), terminations (N,), truncations (N,), and infos: `attempt` where one
+            ended, and where the next episode has begun in this step already `final_obs` and `final_info`, each with its
+            mask `_attempt`, `_final_obs`, `_final_info`.
 
         Raises:
             ValueError: the actions have the wrong shape or are not finite.
@@ -183,7 +205,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self._world.step(actions)
         robots = self._world.robots
         results = (robots.observations, robots.rewards, robots.terminations, robots.truncations)
-        infos = self._infos() if robots.outcomes.any() else {}
+        infos = self._infos()
         if self._copy:
             observations, rewards, terminations, truncations = results
             return observations.copy(), rewards.copy(), terminations.copy(), truncations.copy(), infos
@@ -192,6 +214,8 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def _infos(self) -> dict[str, Any]:
         """What ended in this step, in Gymnasium's layout: values, and a mask that says where they mean something."""
         robots = self._world.robots
+        if not robots.outcomes.any():
+            return {}
         attempts = {
             "outcome": robots.outcomes.copy(),
             "steps": self.attempt_steps.copy(),
@@ -201,7 +225,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         }
         infos: dict[str, Any] = {"attempt": attempts, "_attempt": robots.outcomes > 0}
         ended = robots.terminations | robots.truncations
-        if ended.any():
+        if self._same_step and ended.any():
             infos |= {"final_obs": robots.final_observations.copy(), "_final_obs": ended}
             infos |= {"final_info": {"attempt": attempts, "_attempt": ended}, "_final_info": ended}
         return infos

@@ -73,7 +73,10 @@ def drift(i, dx, dy, turn, robots):
     """Let robot i's believed pose drift while it truly moves by dx, dy, metres, and turns by `turn`, radians."""
     heading_noise = robots.drawn[i, HEADING_NOISE] * math.sqrt(abs(turn))
     if heading_noise > 0.0:
-        robots.drift[i, 2] += heading_noise * normal(robots.records, i)
+        turned = robots.drift[i, 2] + heading_noise * normal(robots.records, i)
+        if abs(turned) > math.pi:  # a direction, and not how often it went round
+            turned -= 2.0 * math.pi * math.floor((turned + math.pi) / (2.0 * math.pi))
+        robots.drift[i, 2] = turned
     cos = math.cos(robots.drift[i, 2])
     sin = math.sin(robots.drift[i, 2])
     way = math.sqrt(dx * dx + dy * dy)

@@ -5,14 +5,13 @@ import math
 import numpy as np
 
 from sim.kernels.options import kernel
-from sim.kernels.records import PAPER
+from sim.kernels.records import EXTRA, PAPER
 from sim.kernels.sensing import FAST, nearest_of
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 PI = np.float32(math.pi)
 TWO_PI = np.float32(2.0 * math.pi)
-EXTRA = 6  # sim.observations.EXTRA
 
 
 @kernel(fastmath=FAST)

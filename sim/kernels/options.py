@@ -12,10 +12,12 @@ _njit: Any = numba.njit  # whose stubs leave out what is private
 
 
 def kernels_in(folder: Path) -> Callable[..., Callable[[Callable[..., Any]], Any]]:
-    """The decorator `kernel` for the kernels of a folder, which may call one another."""
-    # Compiled code holds the functions that it calls. Numba compiles anew when the file of a function has changed, but
-    # does not look at those of what it calls: kept by all sources, code is never older than any of them.
-    sources = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))).hexdigest()[:16]
+    """The decorator `kernel` for the kernels of a folder, which may call one another, but use nothing of ours beyond it."""
+    # Compiled code holds the functions that it calls and the numbers that it names. Numba compiles anew when the file of a
+    # function has changed, but does not look at those of what it calls: kept by all sources, code is never older than any of
+    # them. What kernels take from our other modules stands in none of these files, so they take nothing from there.
+    files = sorted({*folder.glob("*.py"), Path(__file__)})
+    sources = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
     kept = str(Path(_config.CACHE_DIR or folder / "__pycache__") / sources)
 
     def kernel(

@@ -38,13 +38,13 @@ def normal(records, i):
     return size * math.cos(2.0 * math.pi * uniform(records, i))
 
 
-def seed_streams(seed: int | None, count: int, *, key: tuple[int, ...] = ()) -> NDArray[np.uint64]:
+def seed_streams(seed: int | None, count: int, *, key: tuple[int, ...]) -> NDArray[np.uint64]:
     """Generator states for robots (or movers) 0 to count - 1; number i's depends on the seed, the key and i alone.
 
     Args:
         seed: any non-negative integer, or None for one from the operating system.
         count: how many.
-        key: gives other streams for the same seed.
+        key: of the stream, see `sim.streams`.
     """
     root = np.random.SeedSequence(seed, spawn_key=key).generate_state(1, np.uint64)[0]
     z = root + (np.arange(1, count + 1, dtype=np.uint64) << np.uint64(32))

@@ -2,6 +2,12 @@
 
 import numpy as np
 
+CELL = 0.1
+"""Edge of a cell of free space (`sim.arenas.freespace`), metres."""
+
+EXTRA = 6
+"""Numbers of an observation that are not the scan (`sim.observations`)."""
+
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
 
@@ -54,7 +60,10 @@ PARAMETERS = np.dtype(
         ("arrival_distance", "f4"),  # m
         ("collision_distance", "f4"),  # m
         ("step_limit", "i4"),
+        ("arrival_ends", "i4"),  # 1 where an arrival ends the episode, 0 where it brings the next target
+        ("starts_anew", "i4"),  # 1 where the next episode begins in the step that ended one, 0 where a call begins it
         ("spawn_clearance", "f4"),  # m
+        ("min_target_distance", "f4"),  # m, of a new target from its robot
         ("path_samples", "i4"),  # points of a step at which the body is checked
         ("replica_stride", "i4"),  # tiles between one replica of the pool and the next
         ("closing", "f4"),  # m that a robot and a mover may come nearer in one step

@@ -13,6 +13,7 @@ from sim.kernels.records import (
     ALIGNMENT,
     ARRIVAL,
     BASIC,
+    CELL,
     CLEARANCE,
     COLLISION,
     MAX_ANGULAR,
@@ -25,10 +26,13 @@ from sim.kernels.sensing import FAST, clearance_at, disc_clearance, nearest_of, 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 PI = np.float32(math.pi)
-CELL = np.float32(0.1)  # sim.arenas.freespace.CELL
+_CELL = np.float32(CELL)
 
 MIN_TARGET_DISTANCE = np.float32(0.5)
 """A new target is at least this far away, metres: a nearer one would count as an arrival almost at once."""
+
+ARRIVAL_MARGIN = 0.1
+"""And this far beyond the distance that counts as arrived, metres: nobody arrives without driving."""
 
 MAX_RATIO = np.float32(8.0)
 """Cap of d_{t-1}/d_t in the advanced reward, which would overflow when a robot stands on its target."""
@@ -62,11 +66,11 @@ def _draw_target(i, robots, geometry, p):
         return
     for _ in range(SPAWN_TRIES):
         cell = first + np.int64(uniform(records, i) * cells)
-        x = geometry.targets[cell, 0] + CELL * np.float32(uniform(records, i))
-        y = geometry.targets[cell, 1] + CELL * np.float32(uniform(records, i))
+        x = geometry.targets[cell, 0] + _CELL * np.float32(uniform(records, i))
+        y = geometry.targets[cell, 1] + _CELL * np.float32(uniform(records, i))
         robots.targets[i, 0] = x
         robots.targets[i, 1] = y
-        if _distance_to_target(i, robots) < MIN_TARGET_DISTANCE:
+        if _distance_to_target(i, robots) < p.min_target_distance:
             continue
         if clearance_at(x, y, index, geometry.bounds, geometry.circles, geometry.boxes) >= p.spawn_clearance:
             break
@@ -90,8 +94,8 @@ def _draw_start(i, robots, geometry, p, state):
     tile = records[i].replica * p.replica_stride + index
     for _ in range(SPAWN_TRIES):
         cell = first + np.int64(uniform(records, i) * cells)
-        x = geometry.starts[cell, 0] + CELL * np.float32(uniform(records, i))
-        y = geometry.starts[cell, 1] + CELL * np.float32(uniform(records, i))
+        x = geometry.starts[cell, 0] + _CELL * np.float32(uniform(records, i))
+        y = geometry.starts[cell, 1] + _CELL * np.float32(uniform(records, i))
         if disc_clearance(x, y, tile, geometry.discs) < MOVER_ROOM:
             continue
         if clearance_at(x, y, index, geometry.bounds, geometry.circles, geometry.boxes) >= p.spawn_clearance:
@@ -134,10 +138,11 @@ def _nothing_happened(i, robots):
 
 
 @kernel()
-def reset_robots(poses, targets, robots, geometry, parameters, state):
-    """Begin a new episode for every robot.
+def reset_robots(which, poses, targets, robots, geometry, parameters, state):
+    """Begin a new episode for some robots.
 
     Args:
+        which: (N,) bool, the robots.
         poses: (N, 3) float32 where each robot starts; NaN in the first column draws one.
         targets: (N, 2) float32 where each robot shall go; NaN in the first column draws one.
         robots: `sim.kernels.bundles.Robots`, whose arrays are written.
@@ -147,6 +152,8 @@ def reset_robots(poses, targets, robots, geometry, parameters, state):
     """
     p = parameters[0]
     for i in range(poses.shape[0]):
+        if not which[i]:
+            continue
         if math.isnan(poses[i, 0]):
             _draw_start(i, robots, geometry, p, state)
         else:
@@ -324,20 +331,22 @@ def step_robots(state, placed, robots, geometry, parameters):
         elif records[i].steps >= p.step_limit:
             outcome = TIMEOUT
         robots.outcomes[i] = outcome
-        robots.terminations[i] = outcome == COLLISION
+        ended = outcome in (COLLISION, TIMEOUT) or (outcome == ARRIVAL and p.arrival_ends)
+        robots.terminations[i] = ended and outcome != TIMEOUT
         robots.truncations[i] = outcome == TIMEOUT
         _reward(i, outcome, before, robots, p)
 
         # Outcomes and rewards are of the world as it is; the robot gets to see less.
         if p.perceives:
             perceive(i, robots, p)
-        if outcome == ARRIVAL:
+        if outcome == ARRIVAL and not ended:
             _draw_target(i, robots, geometry, p)
             find_itself(i, robots)
         observe(i, robots, geometry, p)
-        if outcome in (COLLISION, TIMEOUT):
+        if ended:
             for k in range(robots.observations.shape[1]):
                 robots.final_observations[i, k] = robots.observations[i, k]
+        if ended and p.starts_anew:
             _draw_start(i, robots, geometry, p, state)
             overwritten = True
             _draw_target(i, robots, geometry, p)

@@ -9,25 +9,26 @@ from numpy.typing import NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.document import to_arena
-from sim.arenas.freespace import CELL
 from sim.arenas.planner import Planner
 from sim.config import ArenaFile, TaskConfig
 from sim.errors import PlacementError
+from sim.kernels.records import CELL
 from sim.kernels.step import MIN_TARGET_DISTANCE, MOVER_ROOM, SPAWN_TRIES
+from sim.streams import EVALUATION
 from sim.world import World, spawn_space
 
 COLUMNS = ("arena", "x", "y", "heading", "target_x", "target_y", "shortest_path")
 """Of a scenario: the arena's index, metres and radians."""
 
 SEED = 0
-"""Of everything that is random while a suite is driven: every policy meets the same movers and the same noise."""
+"""Of the stream `EVALUATION`: every policy meets the same movers and the same noise."""
 
 _DECIMALS = 4  # a tenth of a millimetre
 
 
 def scenario_world(task: TaskConfig, arenas: Sequence[Arena], robots: int) -> World:
     """A world to drive a suite's scenarios in; wherever a scenario stands among the others, its movers go the same way."""
-    return World(task, arenas, robots, seed=SEED, respawn=False)
+    return World(task, arenas, robots, seed=SEED, stream=EVALUATION, respawn=False)
 
 
 def draw_scenarios(name: str, arenas: Sequence[Arena], count: int, task: TaskConfig | None = None) -> list[list[float]]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sim.arenas import Arena, build_arenas, free_distance
-from sim.arenas.freespace import CELL, free_space, largest_region
+from sim.arenas.freespace import free_space, largest_region
 from sim.config import ArenaConfig
 from sim.errors import ArenaError
+from sim.kernels.records import CELL
 
 
 def test_free_distance_worked_by_hand() -> None:

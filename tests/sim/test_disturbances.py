@@ -279,3 +279,19 @@ def test_what_nobody_asked_for_is_in_no_state() -> None:
 def test_spans_that_make_no_sense_are_refused(randomisation: dict[str, list[float]], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         TaskConfig.model_validate({"randomisation": randomisation})
+@pytest.mark.parametrize("observation", ["paper", "improved"])
+def test_a_heading_that_has_drifted_far_is_still_a_direction(observation: ObservationName) -> None:
+    # On the spot for 400 s: the belief drifts by 0.5 sqrt(400) = 10 rad, and is anywhere then.
+    task = TaskConfig(observation=observation, odometry=OdometryConfig(heading_noise=0.5), step_limit=10_000)
+    envs = NavigationVectorEnv(task, 2000, seed=0)
+    envs.reset(options={"poses": [0.0, 0.0, 0.0], "targets": [3.0, 0.0]})
+    for _ in range(2000):
+        observations = envs.step(np.tile(np.array([[0.0, 1.0]], dtype=np.float32), (2000, 1)))[0]
+    believed, bearing = observations[:, 14].astype(float), np.pi * observations[:, 15].astype(float)
+    turns = believed if observation == "paper" else 0.5 * believed + 0.5
+    assert np.histogram(turns, bins=8, range=(0.0, 1.0))[0] == pytest.approx(np.full(8, 250), abs=70)
+    # The position has not drifted, so that the target is where its bearing says.
+    heading = np.pi * believed * (2.0 if observation == "paper" else 1.0)
+    assert np.cos(bearing) == pytest.approx(np.cos(heading), abs=1e-4)
+
+

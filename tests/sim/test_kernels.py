@@ -1,17 +1,51 @@
 """What is compiled: that it is never older than what it was compiled from."""
 
-import hashlib
+import ast
 from pathlib import Path
+from types import ModuleType
+
+import pytest
 
 import sim.kernels
+import workers.kernels
 from sim.kernels.movers import move_movers
+from sim.kernels.options import kernels_in
 from sim.kernels.sensing import scan_poses
 from sim.kernels.step import step_robots
+from workers.kernels.dense import tanh
 
 
-def test_compiled_code_is_kept_by_the_sources_of_all_kernels() -> None:
+def folder_of(package: ModuleType) -> Path:
+    (folder,) = package.__path__
+    return Path(folder)
+
+
+def test_compiled_code_is_kept_by_the_sources_of_all_kernels(tmp_path: Path) -> None:
     # Numba alone would go on with a `step_robots` that was compiled with yesterday's `sense`.
-    (folder,) = sim.kernels.__path__
-    sources = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(folder).glob("*.py")))).hexdigest()
-    for kernel in (step_robots, move_movers, scan_poses):
-        assert Path(kernel.stats.cache_path).parent.name == sources[:16]
+    def key(folder: Path) -> str:
+        @kernels_in(folder)()
+        def nothing() -> None:
+            pass
+
+        return Path(nothing.stats.cache_path).parent.name
+
+    assert {Path(kernel.stats.cache_path).parent.name for kernel in (step_robots, move_movers, scan_poses)} == {
+        key(folder_of(sim.kernels))
+    }
+    assert Path(tanh.stats.cache_path).parent.name == key(folder_of(workers.kernels))
+    (tmp_path / "one.py").write_text("SLOPE = 0.01")
+    before = key(tmp_path)
+    assert key(tmp_path) == before
+    (tmp_path / "one.py").write_text("SLOPE = 0.02")
+    assert key(tmp_path) != before
+
+
+@pytest.mark.parametrize("package", [sim.kernels, workers.kernels])
+def test_kernels_use_nothing_of_ours_that_their_key_leaves_out(package: ModuleType) -> None:
+    for path in folder_of(package).glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            ours = [name for name in names if name.split(".")[0] in {"sim", "workers", "server"}]
+            beyond = [name for name in ours if not name.startswith(package.__name__) and name != "sim.kernels.options"]
+            assert not beyond, f"{path.name} takes from {beyond}"

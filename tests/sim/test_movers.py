@@ -14,10 +14,12 @@ from sim.config import ArenaConfig, JackalConfig, LidarConfig, MoverKind, Movers
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
+from sim.kernels.records import MAX_LINEAR
 from sim.kernels.surroundings import free_length, obstacle_lines
 from sim.movers import Movers
 from sim.physics import add_arena, robot_body, tile_origins
 from sim.shapes import hulls, pack_shapes
+from sim.streams import ENVIRONMENT
 from sim.suites import load_suite
 from sim.suites.scenarios import draw_scenarios, scenario_world
 from sim.world import World
@@ -44,7 +46,7 @@ def crowded_arena(seed: int) -> Arena:
 def alone(arena: Arena, *, seed: int = 0, period: float = 0.2) -> Movers:
     """Movers without a world around them."""
     movers = Movers((arena,), pack_shapes((arena,)), tile_origins((arena,), 1), period, alike=False)
-    movers.seed(seed)
+    movers.seed(seed, ENVIRONMENT)
     movers.place()
     return movers
 
@@ -212,6 +214,36 @@ def test_a_rectangular_body_meets_movers_as_chipmunk_says(seed: int) -> None:
             )
             if abs(nearest) > 0.01:  # 0.3 m in 16 parts: between two of them a way may come some millimetres nearer
                 assert (world.robots.outcomes[i] == 2) == (nearest < 0.0)
+
+
+def test_a_robot_that_is_drawn_fast_does_not_pass_through_movers() -> None:
+    # Up to 3 m/s and half a second: with a mover of 1.5 m/s that comes towards it 2.25 m in a step, while the robot's own
+    # setting of 0.25 m/s would only make 0.875 m.
+    task = TaskConfig(
+        collision_distance=0.0, control_period=0.5, randomisation=RandomisationConfig(max_linear_speed=(0.25, 3.0))
+    )
+    hall = Arena("hall", 8.0, 8.0, movers=(Mover("walker", 0.2, 1.5),) * 16)
+    world = World(task, (hall,), 64, seed=0)
+    world.reset()
+    ahead = np.tile(np.array([[1.0, 0.0]], dtype=np.float32), (64, 1))
+    passed = 0
+    for _ in range(40):
+        before = world.robots.poses[:, :2].astype(np.float64)
+        driven = world.robots.drawn[:, [MAX_LINEAR]] * 0.5
+        heading = world.robots.poses[:, 2].astype(np.float64)
+        after = before + driven * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        world.step(ahead)
+        discs = world.movers.discs[world.tiles()].astype(np.float64)
+        # A mover beside the robot that is held still: from where it was to where it came, less the robot's own way.
+        ends = discs[:, :, :2] - after[:, None]
+        starts = discs[:, :, :2] - discs[:, :, 3:] - before[:, None]
+        ways = ends - starts
+        part = -(starts * ways).sum(axis=-1) / np.maximum((ways * ways).sum(axis=-1), 1e-12)
+        nearest = np.hypot(*np.moveaxis(starts + np.clip(part, 0.0, 1.0)[..., None] * ways, -1, 0)) - discs[:, :, 2] - 0.105
+        through = (nearest < -0.01).any(axis=1) & (np.abs(after) < 7.5).all(axis=1) & (world.robots.outcomes != 1)
+        passed += np.count_nonzero(through)
+        assert (world.robots.outcomes[through] == 2).all()
+    assert passed > 20
 
 
 def test_a_crowded_cell_has_scenarios_too() -> None:

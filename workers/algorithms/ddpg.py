@@ -12,6 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.gradients.actor_critic import ActorCriticGradients, action_value, fastest_gradients
 from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
@@ -101,7 +102,7 @@ def build_noisy_networks(
 ) -> tuple[DeterministicActor, tuple[Body, ...]]:
     """Actor and critics, freshly initialised; the same seed gives the same weights on every device."""
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+        torch.manual_seed(stream_seed(seed, WEIGHTS))
         actor = DeterministicActor(build_network(config.network, observation_size, ACTION_SIZE), observation_size)
         networks = [build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(critics)]
     return actor.to(device), tuple(network.to(device) for network in networks)
@@ -110,4 +111,4 @@ def build_noisy_networks(
 def build_ddpg(config: DdpgConfig, observation_size: int, seed: int, device: torch.device) -> Ddpg:
     """DDPG with freshly initialised networks."""
     actor, critics = build_noisy_networks(config, 1, observation_size, seed, device)
-    return Ddpg(config, actor, critics, torch.Generator(device).manual_seed(seed))
+    return Ddpg(config, actor, critics, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

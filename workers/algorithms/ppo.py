@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
 from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
@@ -169,11 +170,11 @@ def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: Body) -> 
 def build_ppo(config: PpoConfig, observation_size: int, seed: int, device: torch.device) -> Ppo:
     """PPO with freshly initialised networks; the same seed gives the same weights on every device."""
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+        torch.manual_seed(stream_seed(seed, WEIGHTS))
         actor = GaussianActor(
             build_network(config.network, observation_size, ACTION_SIZE),
             (config.initial_std_linear, config.initial_std_angular),
         ).to(device)
         critic = build_network(config.network, observation_size, 1).to(device)
     storage = RolloutStorage(config.rollout_steps, config.robots, observation_size, device)
-    return Ppo(config, actor, critic, storage, torch.Generator(device).manual_seed(seed))
+    return Ppo(config, actor, critic, storage, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.gradients.actor_critic import action_value
 from workers.algorithms.gradients.sac import SacGradients, fastest_gradients, squashed_sample
@@ -123,7 +124,7 @@ class Sac(OffPolicyAlgorithm):
 def build_sac(config: SacConfig, observation_size: int, seed: int, device: torch.device) -> Sac:
     """SAC with freshly initialised networks; the same seed gives the same weights on every device."""
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+        torch.manual_seed(stream_seed(seed, WEIGHTS))
         actor = build_network(config.network, observation_size, 2 * ACTION_SIZE).to(device)
         critics = tuple(build_network(config.network, observation_size + ACTION_SIZE, 1).to(device) for _ in range(2))
-    return Sac(config, actor, critics, observation_size, torch.Generator(device).manual_seed(seed))
+    return Sac(config, actor, critics, observation_size, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

@@ -8,6 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.streams import EXPLORATION, stream_seed
 from workers.algorithms.base import Arrays
 from workers.algorithms.ddpg import NoisyPolicy, build_noisy_networks
 from workers.algorithms.gradients.actor_critic import action_value
@@ -66,4 +67,4 @@ class Td3(NoisyPolicy):
 def build_td3(config: Td3Config, observation_size: int, seed: int, device: torch.device) -> Td3:
     """TD3 with freshly initialised networks."""
     actor, critics = build_noisy_networks(config, 2, observation_size, seed, device)
-    return Td3(config, actor, critics, torch.Generator(device).manual_seed(seed))
+    return Td3(config, actor, critics, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

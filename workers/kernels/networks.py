@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workers.kernels.blas import multiply
+from workers.kernels.constants import LEAKY_SLOPE
 from workers.kernels.dense import (
     dense,
     dense_backward,
@@ -20,7 +21,6 @@ from workers.kernels.dense import (
     transpose,
 )
 from workers.kernels.options import kernel
-from workers.networks.layout import LEAKY_SLOPE
 
 RELU, TANH, RESBLOCK = range(3)
 """Kinds: fully connected with either activation, and the paper's residual blocks."""

@@ -3,13 +3,13 @@
 from itertools import pairwise
 
 from workers.config import Network, ResBlockNetwork
+from workers.kernels.constants import LEAKY_SLOPE as LEAKY_SLOPE
 from workers.manifest import NetworkLayout
 
 ACTION_SIZE = 2
 """Linear velocity in [0, 1] and angular velocity in [-1, 1], as fractions of the robot's limits."""
 
 RESBLOCK_WIDTH = 512
-LEAKY_SLOPE = 0.01
 
 
 def layout(network: Network) -> NetworkLayout:
@@ -20,7 +20,7 @@ def layout(network: Network) -> NetworkLayout:
             layers=("layer1", "layer2", "layer3", "layer4", "head"),
             activation="leaky_relu",
             formula=(
-                "leaky_relu(z) = z where z > 0, else 0.01 z",
+                f"leaky_relu(z) = z where z > 0, else {LEAKY_SLOPE:g} z",
                 "a = leaky_relu(concatenate(layer2(leaky_relu(layer1(x))), x))",
                 "b = leaky_relu(concatenate(leaky_relu(layer4(leaky_relu(layer3(a)))), a))",
                 "y = head(b)",

@@ -1,0 +1,140 @@
+"""The navigation task in episodes of one target each, as tools that expect a standard environment want it.
+
+`Mapless/PointGoal-v0` differs from `Mapless/Navigation-v0` in when an episode ends: an arrival terminates it, as a collision
+does, and Gymnasium's time limit (`max_episode_steps`) truncates it. The task's own `step_limit` makes no difference here.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box, Space
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from sim.envs.single import NavigationEnv
+from sim.kernels.records import ARRIVAL
+from sim.envs.vector import Floats, NavigationVectorEnv, Task, read_task
+
+_UNLIMITED = np.iinfo(np.int32).max
+_LINEAR_FROM_SYMMETRIC = np.array([0.5, 0.0], dtype=np.float32), np.array([0.5, 1.0], dtype=np.float32)
+
+
+def symmetric_space() -> Space[Floats]:
+    """Actions in [-1, 1]: the linear one from standing to the top speed."""
+    return Box(-1.0, 1.0, (2,), np.float32)
+
+
+def from_symmetric(actions: Floats) -> Floats:
+    """Actions (..., 2) in [-1, 1] as the robot takes them: linear in [0, 1], angular in [-1, 1]."""
+    offset, scale = _LINEAR_FROM_SYMMETRIC
+    return np.asarray(offset + scale * np.asarray(actions, dtype=np.float32), dtype=np.float32)
+
+
+class PointGoalEnv(NavigationEnv):
+    """A robot that drives to one target; see `sim.envs.single.NavigationEnv`.
+
+    `is_success` is in the info of every step: True where it arrived. Without `gymnasium.make` there is no time limit.
+
+    Args:
+        task: arena, robot, LiDAR, observation and reward.
+        symmetric_actions: whether both actions are in [-1, 1], as libraries assume that do not scale actions themselves.
+        render_mode: see `NavigationEnv`.
+
+    Raises:
+        pydantic.ValidationError: a value of the task is wrong.
+        ArenaError: the robot does not fit into the arena.
+        DisplayError: "human" where there is no display, or no pygame.
+        ValueError: there is no such render mode.
+    """
+
+    _ARRIVAL_ENDS: ClassVar[bool] = True
+
+    def __init__(self, task: Task = None, *, symmetric_actions: bool = False, render_mode: str | None = None) -> None:
+        super().__init__(read_task(task).model_copy(update={"step_limit": _UNLIMITED}), render_mode=render_mode)
+        self._symmetric = symmetric_actions
+        if symmetric_actions:
+            self.action_space = symmetric_space()
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Drive for one control period.
+
+        Args:
+            action: (2,) as fractions of the robot's limits, see `action_space`; clipped.
+
+        Returns:
+            Observation, reward, terminated (arrival or collision), truncated (never: the time limit is a wrapper's), and an
+            info with `pose`, `target`, `is_success` and, where the attempt ended, its `attempt`.
+
+        Raises:
+            ValueError: the action is not finite.
+        """
+        return super().step(from_symmetric(action) if self._symmetric else action)
+
+    def _info(self) -> dict[str, Any]:
+        return super()._info() | {"is_success": bool(self._world.robots.outcomes[0] == ARRIVAL)}
+
+
+class PointGoalVectorEnv(NavigationVectorEnv):
+    """Robots that drive to one target in every episode; see `sim.envs.vector.NavigationVectorEnv`.
+
+    `infos["is_success"]` (N,) is there in every step, and where episodes ended in `infos["final_info"]` too.
+
+    Args:
+        task: arena, robot, LiDAR, observation and reward.
+        num_envs: robots.
+        max_episode_steps: after which an episode is truncated; None is never.
+        symmetric_actions: whether both actions are in [-1, 1].
+        seed: see `NavigationVectorEnv`, as for all that follow.
+        render_mode: likewise.
+        copy: likewise.
+        autoreset_mode: likewise, but the next step unless asked otherwise, as Gymnasium's own vector environments do it.
+
+    Raises:
+        pydantic.ValidationError: a value of the task is wrong.
+        ArenaError: the robot does not fit into the arena.
+        ValueError: there is no such render mode, not one robot, or it should never reset.
+    """
+
+    _ARRIVAL_ENDS: ClassVar[bool] = True
+
+    def __init__(
+        self,
+        task: Task = None,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        symmetric_actions: bool = False,
+        seed: int | None = None,
+        render_mode: str | None = None,
+        copy: bool = True,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        limited = read_task(task).model_copy(update={"step_limit": max_episode_steps or _UNLIMITED})
+        super().__init__(
+            limited, num_envs, seed=seed, render_mode=render_mode, copy=copy, autoreset_mode=autoreset_mode
+        )  # fmt: skip
+        self._symmetric = symmetric_actions
+        if symmetric_actions:
+            self.single_action_space = symmetric_space()
+            self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Drive every robot for one control period; see `NavigationVectorEnv.step`.
+
+        Args:
+            actions: (N, 2) as fractions of the robot's limits, see `single_action_space`; clipped.
+
+        Raises:
+            ValueError: the actions have the wrong shape or are not finite.
+        """
+        return super().step(from_symmetric(actions) if self._symmetric else actions)
+
+    def _infos(self) -> dict[str, Any]:
+        infos = super()._infos()
+        arrived = self.outcomes == ARRIVAL
+        if "final_info" in infos:
+            # The robots of `infos` itself are in their next episodes.
+            infos["final_info"] |= {"is_success": arrived, "_is_success": infos["_final_info"]}
+            arrived = np.zeros_like(arrived)
+        return infos | {"is_success": arrived, "_is_success": np.ones(self.num_envs, dtype=np.bool_)}
