@@ -128,8 +128,8 @@ class World:
     """Robots in a pool of arenas: LiDAR, physics, outcomes, rewards, observations and resets.
 
     A robot goes on after an arrival, with a new target, unless that ends the episode; after a collision or a time-out it
-    starts anew, in an arena drawn from the pool. Its fate depends on the seed and its own index, never on the number of robots. Robots do not see one
-    another; they see movers, which take no notice of them.
+    starts anew, in an arena drawn from the pool. Its fate depends on the seed and its own index, never on the number of
+    robots. Robots do not see one another; they see movers, which take no notice of them.
 
     Args:
         task: robot, LiDAR, observation, reward and limits.

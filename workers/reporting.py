@@ -48,6 +48,17 @@ class EpisodeResult(Frozen):
     shortest_path: Figure
     min_clearance: Figure
 
+    def path_efficiency(self, arrival_distance: float) -> float:
+        """Shortest path over the driven one, 0 to 1; both end at the arrival circle. Of arrivals, its mean is their SPL.
+
+        SPL is success weighted by path length (Anderson et al. 2018, 'On Evaluation of Embodied Navigation Agents').
+
+        Args:
+            arrival_distance: of the task, metres: nobody drives the last bit to the target's middle.
+        """
+        shortest = max(self.shortest_path - arrival_distance, 0.0)
+        return shortest / max(self.path_length, shortest, 1e-9)
+
 
 class EvaluationResult(Frozen):
     """A policy on a suite: one row per episode, in the suite's order."""

@@ -13,8 +13,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from sim.envs.single import NavigationEnv
-from sim.kernels.records import ARRIVAL
 from sim.envs.vector import Floats, NavigationVectorEnv, Task, read_task
+from sim.kernels.records import ARRIVAL
 
 _UNLIMITED = np.iinfo(np.int32).max
 _LINEAR_FROM_SYMMETRIC = np.array([0.5, 0.0], dtype=np.float32), np.array([0.5, 1.0], dtype=np.float32)

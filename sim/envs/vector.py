@@ -101,7 +101,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         mode = AutoresetMode(autoreset_mode)
         if mode not in _RESTARTS:
             raise ValueError(f"autoreset_mode must be {' or '.join(repr(one.value) for one in _RESTARTS)}")
-        self.metadata = {**self.metadata, "autoreset_mode": mode}
+        self.metadata = {**self.metadata, "autoreset_mode": mode}  # type: ignore[misc]  # as Gymnasium's own do
         self._same_step = mode is AutoresetMode.SAME_STEP
         self.task = read_task(task)
         self.num_envs = num_envs

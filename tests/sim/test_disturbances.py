@@ -279,6 +279,8 @@ def test_what_nobody_asked_for_is_in_no_state() -> None:
 def test_spans_that_make_no_sense_are_refused(randomisation: dict[str, list[float]], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         TaskConfig.model_validate({"randomisation": randomisation})
+
+
 @pytest.mark.parametrize("observation", ["paper", "improved"])
 def test_a_heading_that_has_drifted_far_is_still_a_direction(observation: ObservationName) -> None:
     # On the spot for 400 s: the belief drifts by 0.5 sqrt(400) = 10 rad, and is anywhere then.
@@ -293,5 +295,3 @@ def test_a_heading_that_has_drifted_far_is_still_a_direction(observation: Observ
     # The position has not drifted, so that the target is where its bearing says.
     heading = np.pi * believed * (2.0 if observation == "paper" else 1.0)
     assert np.cos(bearing) == pytest.approx(np.cos(heading), abs=1e-4)
-
-

@@ -1,5 +1,6 @@
 """A Gymnasium citizen: ids, checker, spaces, pictures."""
 
+import subprocess
 import sys
 import time
 import warnings
@@ -203,3 +204,41 @@ def test_a_picture_shows_floor_wall_robot_and_target() -> None:
     metres = 480 / 10.5
     assert (rows.mean(), columns.mean()) == pytest.approx((240.0 - 3 * metres, 240.0 + 3 * metres), abs=2.0)
     assert picture[1, 1].tolist() == [76, 84, 96]
+
+
+def crash(env: gymnasium.Env[np.ndarray, np.ndarray]) -> dict[str, object]:
+    """Drive from 0.4 m before the wall at x = 5 m into it; the info of the step that ends the episode."""
+    env.reset(seed=0, options={"pose": (4.6, 0.0, 0.0), "target": (-3.0, 3.0)})
+    for _ in range(10):
+        _, _, terminated, _, info = env.step(np.array([1.0, 0.0], dtype=np.float32))
+        if terminated:
+            return info
+    raise AssertionError("the wall was not there")
+
+
+def test_a_last_steps_pose_target_and_picture_are_those_of_its_own_episode(screen: None) -> None:
+    env = gymnasium.make(sim.envs.registration.NAVIGATION, render_mode="rgb_array")
+    info = crash(env)
+    assert info["pose"] == pytest.approx([4.85, 0.0, 0.0], abs=1e-5)  # 5 steps of 5 cm: less than 0.2 m from the wall
+    assert info["target"] == pytest.approx([-3.0, 3.0])
+    picture = env.render()
+    assert isinstance(picture, np.ndarray)
+    red, green, blue = (picture[..., k].astype(int) for k in range(3))
+    metres = 480 / 10.5
+    rows, columns = np.nonzero((blue > 180) & (red < 90))
+    assert (rows.mean(), columns.mean()) == pytest.approx((240.0, 240.0 + 4.85 * metres), abs=3.0)
+    rows, columns = np.nonzero((green > 140) & (red < 60))
+    assert (rows.mean(), columns.mean()) == pytest.approx((240.0 - 3 * metres, 240.0 - 3 * metres), abs=2.0)
+
+
+def test_importing_the_simulator_registers_its_environments_and_loads_nothing_heavy() -> None:
+    script = """
+import sys
+import gymnasium, sim
+gymnasium.register_envs(sim)
+heavy = sorted({"numba", "pymunk", "torch", "scipy", "pygame"} & sys.modules.keys())
+print(heavy, *sorted(name for name in gymnasium.registry if name.startswith("Mapless/")))
+print(*(gymnasium.make(name).observation_space.shape for name in ("Mapless/Navigation-v0", "Mapless/PointGoal-v0")))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["[] Mapless/Navigation-v0 Mapless/PointGoal-v0", "(16,) (16,)"]

@@ -241,7 +241,7 @@ def test_a_robot_that_is_drawn_fast_does_not_pass_through_movers() -> None:
         part = -(starts * ways).sum(axis=-1) / np.maximum((ways * ways).sum(axis=-1), 1e-12)
         nearest = np.hypot(*np.moveaxis(starts + np.clip(part, 0.0, 1.0)[..., None] * ways, -1, 0)) - discs[:, :, 2] - 0.105
         through = (nearest < -0.01).any(axis=1) & (np.abs(after) < 7.5).all(axis=1) & (world.robots.outcomes != 1)
-        passed += np.count_nonzero(through)
+        passed += int(np.count_nonzero(through))
         assert (world.robots.outcomes[through] == 2).all()
     assert passed > 20
 

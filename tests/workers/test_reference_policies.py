@@ -19,7 +19,7 @@ from workers.reference.figures import figures
 from workers.reference.library import FOLDER, ReferencePolicy, baselines, reference_policies, reference_policy
 from workers.reference.recipes import RECIPES, Recipe, recipe
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
-from workers.training.evaluation import evaluate
+from workers.training.evaluation import evaluate, evaluation_metrics
 
 POLICIES = [pytest.param(policy, id=policy.card.name) for policy in reference_policies()]
 # Another processor rounds otherwise, and an episode on the edge may end otherwise.
@@ -110,6 +110,9 @@ def test_figures_by_hand() -> None:
     assert (found.success, found.collision, found.timeout, found.steps) == (0.5, 0.25, 0.25, 15.0)
     assert found.success_low < 0.5 < found.success_high
     assert figures([episode("timeout")], 0.2).steps is None
+    # One definition: the curve's path efficiency is the table's SPL among those that arrived.
+    result = EvaluationResult(suite="s", suite_hash="h", episodes=tuple(episodes))
+    assert evaluation_metrics(result, 0.2)["eval/path_efficiency"] * found.success == pytest.approx(found.spl)
 
 
 def test_the_best_checkpoint_arrives_most_often_then_soonest() -> None:

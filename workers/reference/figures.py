@@ -48,13 +48,7 @@ def figures(episodes: Sequence[EpisodeResult], arrival_distance: float) -> Figur
         success_high=high,
         collision=sum(episode.outcome == "collision" for episode in episodes) / count,
         timeout=sum(episode.outcome == "timeout" for episode in episodes) / count,
-        spl=sum(_path_share(episode, arrival_distance) for episode in arrivals) / count,
+        spl=sum(episode.path_efficiency(arrival_distance) for episode in arrivals) / count,
         steps=sum(episode.steps for episode in arrivals) / len(arrivals) if arrivals else None,
         min_clearance=sum(episode.min_clearance for episode in episodes) / count,
     )
-
-
-def _path_share(episode: EpisodeResult, arrival_distance: float) -> float:
-    """Shortest path over the driven one, at most 1; both end at the arrival circle."""
-    shortest = max(episode.shortest_path - arrival_distance, 0.0)
-    return shortest / max(episode.path_length, shortest, 1e-9)

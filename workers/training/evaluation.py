@@ -44,11 +44,15 @@ def to_result(table: EpisodeTable, suite: Suite) -> EvaluationResult:
     return EvaluationResult(suite=suite.name, suite_hash=suite.hash, episodes=episodes)
 
 
-def evaluation_metrics(result: EvaluationResult) -> dict[str, float]:
+def evaluation_metrics(result: EvaluationResult, arrival_distance: float) -> dict[str, float]:
     """An evaluation as the curves show it.
 
-    Steps and path efficiency are means over arrivals, absent where there were none. Path efficiency is SPL of the arrivals
-    (Anderson et al. 2018): shortest path over driven path, at most 1. Reward is per step, return per episode.
+    Steps and path efficiency (`EpisodeResult.path_efficiency`) are means over arrivals, absent where there were none. Reward
+    is per step, return per episode.
+
+    Args:
+        result: of one policy on one suite.
+        arrival_distance: of the task, metres.
     """
     count = len(result.episodes)
     arrivals = [episode for episode in result.episodes if episode.outcome == "arrival"]
@@ -62,7 +66,6 @@ def evaluation_metrics(result: EvaluationResult) -> dict[str, float]:
     }
     if arrivals:
         metrics["eval/steps"] = sum(episode.steps for episode in arrivals) / len(arrivals)
-        metrics["eval/path_efficiency"] = sum(
-            episode.shortest_path / max(episode.path_length, episode.shortest_path, 1e-9) for episode in arrivals
-        ) / len(arrivals)
+        efficiencies = [episode.path_efficiency(arrival_distance) for episode in arrivals]
+        metrics["eval/path_efficiency"] = sum(efficiencies) / len(arrivals)
     return metrics

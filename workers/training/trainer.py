@@ -55,7 +55,7 @@ def train(
 
     Args:
         config: what to train.
-        seed: of weights, exploration and environment.
+        seed: of weights, exploration and environment, each a stream of its own (`sim.streams`).
         reporter: where metrics, events, checkpoints and frames go, and who may ask to stop.
         directory: for checkpoint archives, 'step-<n>.zip'.
         resume: an archive of the same training, to continue bit for bit where it was written.
@@ -211,7 +211,8 @@ class Training:
         """Everything since the last report, and the evaluation of this step if there is one."""
         if self.metrics.empty:
             return
-        measured = {} if result is None else {**evaluation_metrics(result), **self.drive()}
+        arrival_distance = self.config.task.arrival_distance
+        measured = {} if result is None else {**evaluation_metrics(result, arrival_distance), **self.drive()}
         values = self.metrics.flush()
         values.update(measured)
         with self.metrics.phase("reporting"):
