@@ -258,7 +258,7 @@ CONFIGS = [
 @pytest.mark.parametrize("config", CONFIGS, ids=lambda config: config.name)
 def test_the_known_best_action_is_found(config: DdpgConfig | Td3Config | SacConfig) -> None:
     """Observation x in [0, 1]; the best action is (x, 0.8 - 1.6 x), and the reward the squared distance to it."""
-    algorithm = build_algorithm(config, 1, 0, CPU)
+    algorithm = build_algorithm(config, 1, 1, CPU)
     assert isinstance(algorithm, Ddpg | Td3 | Sac)
     rng = np.random.default_rng(0)
     nothing = np.zeros(config.robots, np.bool_)
