@@ -45,7 +45,7 @@ def test_a_collision_terminates_without_success() -> None:
 @pytest.mark.parametrize(
     ("arguments", "limit"), [({}, 500), ({"max_episode_steps": 30}, 30), ({"max_episode_steps": 700}, 700)]
 )
-def test_the_time_limit_is_gymnasiums(arguments: dict[str, int], limit: int) -> None:
+def test_the_time_limit_is_gymnasiums(arguments: dict[str, Any], limit: int) -> None:
     env = gymnasium.make(POINT_GOAL, task={"step_limit": 10}, **arguments)
     env.reset(seed=0, options={"pose": (0.0, 0.0, 0.0), "target": (3.0, 0.0)})
     for _ in range(limit - 1):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sim.arenas import build_task_arenas
 from sim.config import TaskConfig
@@ -85,7 +86,9 @@ def steered(envs: NavigationVectorEnv, action: np.ndarray) -> np.ndarray:
 def steps(envs: NavigationVectorEnv) -> tuple[list[str], set[int]]:
     """A hash for every `PART` steps, and the outcomes that occurred."""
     observations, _ = envs.reset(seed=11)
-    found, outcomes, hashes = [observations], set(), []
+    found: list[NDArray[np.generic]] = [observations]
+    outcomes: set[int] = set()
+    hashes: list[str] = []
     for number, action in enumerate(actions(7), start=1):
         observations, rewards, terminations, truncations, _ = envs.step(steered(envs, action))
         found += [observations, rewards, terminations, truncations]
