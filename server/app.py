@@ -4,13 +4,13 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 
 from fastapi import APIRouter, FastAPI
-from starlette.concurrency import run_in_threadpool
 
 from server import pages
 from server.abandoned import AbandonedRequestsMiddleware
 from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
 from server.checkpoints import endpoints as checkpoints
+from server.checkpoints.archives import keep_swept
 from server.comparison import endpoints as comparison
 from server.database.engine import Database
 from server.database.migrate import upgrade
@@ -64,7 +64,7 @@ ROUTERS: tuple[APIRouter, ...] = (
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = (dispatch,)
+BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept)
 
 
 def create_services(settings: Settings) -> Services:
@@ -99,7 +99,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             stack.callback(services.bus.close)
             stack.push_async_callback(services.live.close)
             stack.push_async_callback(services.drivers.close)
-            await run_in_threadpool(services.files.remove_torn)
             for background in BACKGROUND:
                 await stack.enter_async_context(background(services))
             yield

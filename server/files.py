@@ -108,8 +108,10 @@ class FileStore:
         return _blocks(self.open(identifier))
 
     def delete(self, identifier: str) -> None:
-        """Remove an archive; one that is not there is none to remove."""
-        self._remove(self._path(identifier))
+        """Remove an archive, and what an upload that was cut off left of it; one that is not there is none to remove."""
+        path = self._path(identifier)
+        self._remove(path)
+        self._remove(path + _TORN_SUFFIX)
 
     def ping(self) -> None:
         """Ask the store for an answer.
@@ -124,12 +126,6 @@ class FileStore:
     def ids(self) -> set[str]:
         """The ids of all archives in the store."""
         return {PurePosixPath(path).stem for path in self._list() if path.endswith(_SUFFIX)}
-
-    def remove_torn(self) -> None:
-        """Remove uploads that a crash cut short. Only while none is under way."""
-        for path in self._list():
-            if path.endswith(_SUFFIX + _TORN_SUFFIX):
-                self._remove(path)
 
     def _sync(self, file: IO[bytes]) -> None:
         file.flush()

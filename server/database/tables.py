@@ -3,7 +3,7 @@
 import time
 from typing import Any, Literal
 
-from sqlalchemy import JSON, BigInteger, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
+from sqlalchemy import JSON, BigInteger, Boolean, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 from workers.protocol import Queue
@@ -41,14 +41,13 @@ class Run(Base):
     """
 
     __tablename__ = "runs"
-    __table_args__ = (Index("runs_by_state", "state", "lease_until"),)
+    __table_args__ = (Index("runs_by_state", "state"),)
 
     id: Mapped[str] = mapped_column(String(16), primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), index=True)
     seed: Mapped[int] = mapped_column(BigInteger)
     state: Mapped[RunState] = mapped_column(String(12), default="queued")
     attempt: Mapped[int] = mapped_column(Integer, default=0)
-    lease_until: Mapped[float | None] = mapped_column(Float)
     worker: Mapped[str | None] = mapped_column(String(120))
     # Chosen by the worker that has it: asked again under the same one, its claim is the same.
     claim_id: Mapped[str | None] = mapped_column(String(32))
@@ -128,6 +127,16 @@ class Checkpoint(Base):
     created_at: Mapped[float] = mapped_column(Float, default=time.time)
     # When its archive was found damaged or gone: no run goes on from it any more. Null while it is whole.
     damaged_at: Mapped[float | None] = mapped_column(Float)
+
+
+class LooseArchive(Base):
+    """An archive of this database in the file store that no checkpoint names (any more): on its way in, or out."""
+
+    __tablename__ = "loose_archives"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    since: Mapped[float] = mapped_column(Float)
+    doomed: Mapped[bool] = mapped_column(Boolean)
 
 
 class Evaluation(Base):

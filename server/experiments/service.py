@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from sqlalchemy.orm import Session
 
 from server.arenas.references import without_geometry
+from server.checkpoints.archives import LooseArchives, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.database import tables
@@ -131,13 +132,13 @@ class ExperimentService:
             experiments = find(repository)
             run_ids = [run.id for experiment in experiments for run in experiment.runs]
             checkpoint_ids = CheckpointRepository(session).ids(run_ids)
+            LooseArchives(session).doom(checkpoint_ids)
             for experiment in experiments:
                 repository.delete(experiment)
         # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
-        for checkpoint_id in checkpoint_ids:
-            self._services.files.delete(checkpoint_id)
+        remove_archives(self._services, checkpoint_ids)
         for experiment in experiments:
             self._publish(experiment.id, "deleted")
 

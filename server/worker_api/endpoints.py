@@ -66,8 +66,9 @@ async def put_checkpoint(
     stream = request.stream()
     upload, archive = await _split(stream, services.settings.max_body_bytes)
     lane = services.lanes.workers
-    await lane.run(service.check, run_id, attempt, upload.after_seq)
-    file = await services.files.write(new_id(), archive, upload.sha256)
+    archive_id = new_id()
+    await lane.run(service.announce, run_id, attempt, upload.after_seq, archive_id)
+    file = await services.files.write(archive_id, archive, upload.sha256)
     registered = False
     try:
         registered = await lane.run(service.register, run_id, attempt, step, file, upload)

@@ -4,7 +4,7 @@ from server.errors import ServiceError
 
 
 class TooEarlyError(ServiceError):
-    """A checkpoint came ahead of the metrics that precede it: send it again once they are acknowledged."""
+    """A checkpoint came ahead of the metrics that precede it, or was too long on its way: it is to be sent again."""
 
     status = 425
 

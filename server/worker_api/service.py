@@ -8,6 +8,7 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from server.arenas.references import with_geometry
+from server.checkpoints.archives import LooseArchives
 from server.checkpoints.integrity import is_whole
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
@@ -163,17 +164,18 @@ class WorkerService:
             logger.exception("checkpoint %s cannot be looked at: it counts as whole", run_id)
             return None
 
-    def check(self, run_id: str, attempt: int, after_seq: int) -> None:
-        """Before a checkpoint's bytes are taken in: whether it would be registered.
+    def announce(self, run_id: str, attempt: int, after_seq: int, archive_id: str) -> None:
+        """Before a checkpoint's bytes are taken in: whether it would be registered, and that its archive is on its way.
 
         Raises:
             FencedError: the attempt is over.
             TooEarlyError: the metrics before the checkpoint have not arrived.
         """
-        with self._services.database.read() as session:
+        with self._services.database.write() as session:
             run = attempts.unfenced(RunRepository(session).find(run_id), run_id, attempt)
             if run.last_seq < after_seq:
                 raise TooEarlyError(f"Item {after_seq} must be here before this checkpoint; the last one is {run.last_seq}.")
+            LooseArchives(session).begin(archive_id)
 
     def register(self, run_id: str, attempt: int, step: int, file: StoredFile, upload: CheckpointUpload) -> bool:
         """Register an archive that is complete in the store; one that comes again is registered once.
@@ -183,12 +185,15 @@ class WorkerService:
 
         Raises:
             FencedError: the attempt is over.
+            TooEarlyError: it must be sent again.
         """
         with self._services.database.write() as session:
             run = attempts.unfenced(RunRepository(session).find(run_id, for_update=True), run_id, attempt)
             checkpoints = CheckpointRepository(session)
             if checkpoints.at_step(run_id, step) is not None:
                 return False
+            if not LooseArchives(session).register(file.id):
+                raise TooEarlyError("The archive took too long and was removed: send it again.")
             checkpoints.add(run_id, step, file, upload.evaluation)
             attempts.progressed(run)
         self._publish(run, "checkpoint")

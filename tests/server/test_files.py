@@ -67,15 +67,16 @@ def test_an_archive_that_is_gone(store: FileStore) -> None:
     store.delete("abc")  # nothing to do, and no error
 
 
-def test_an_upload_that_a_crash_cut_short_is_removed_and_nothing_else(tmp_path: Path) -> None:
+def test_what_a_crash_left_of_an_upload_goes_with_its_archive_and_nothing_else_does(tmp_path: Path) -> None:
     store = FileStore(str(tmp_path), max_bytes=1_000)
     write(store, "kept", b"x")
     (tmp_path / "torn.zip.part").write_bytes(b"wei")
+    (tmp_path / "elsewhere.zip.part").write_bytes(b"wei")
     (tmp_path / "somebody-elses.zip").write_bytes(b"x")
 
     assert store.ids() == {"kept", "somebody-elses"}
-    store.remove_torn()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["kept.zip", "somebody-elses.zip"]
+    store.delete("torn")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["elsewhere.zip.part", "kept.zip", "somebody-elses.zip"]
 
 
 @pytest.mark.parametrize("url", ["nothing://bucket/checkpoints", "abfs://bucket/checkpoints"])

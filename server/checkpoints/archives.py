@@ -1,0 +1,102 @@
+"""Removes archives that no checkpoint names: uploads that were cut off, and what a deletion left behind.
+
+An archive's id is written down before its first byte, and crossed out in the transaction that registers its checkpoint; so
+the database knows what it has brought into the store, and nothing else is ever removed. Several installations may share a
+store. What was never registered is doomed an hour after it began, in a transaction of its own: from then on it can't be
+registered any more, whatever the clock says, and its file may go.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import AsyncIterator, Collection
+from contextlib import asynccontextmanager
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
+
+from server.database import tables
+from server.services import Services
+
+logger = logging.getLogger(__name__)
+
+GRACE_SECONDS = 3_600.0
+"""An upload that takes longer is begun anew."""
+_PAUSE_SECONDS = 600.0
+_AT_ONCE = 100
+
+
+class LooseArchives:
+    """The archives of this database that no checkpoint names, within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def begin(self, archive_id: str) -> None:
+        """An archive is about to be brought."""
+        self._session.add(tables.LooseArchive(id=archive_id, since=time.time(), doomed=False))
+
+    def register(self, archive_id: str) -> bool:
+        """A checkpoint names it now; whether it may: one that is doomed, or was not announced, must come again."""
+        row = self._session.get(tables.LooseArchive, archive_id, with_for_update=True)
+        if row is None or row.doomed:
+            return False
+        self._session.delete(row)
+        return True
+
+    def doom(self, archive_ids: Collection[str]) -> None:
+        """Their checkpoints are gone: so shall they be."""
+        now = time.time()
+        self._session.add_all(tables.LooseArchive(id=archive_id, since=now, doomed=True) for archive_id in archive_ids)
+
+    def doom_older(self, moment: float) -> list[str]:
+        """Doom what began before `moment`; the ids of some that are doomed, by now or earlier."""
+        loose = tables.LooseArchive
+        self._session.execute(update(loose).where(loose.since < moment).values(doomed=True))
+        return list(self._session.scalars(select(loose.id).where(loose.doomed).order_by(loose.since).limit(_AT_ONCE)))
+
+    def forget(self, archive_ids: Collection[str]) -> None:
+        """They are gone from the store."""
+        self._session.execute(delete(tables.LooseArchive).where(tables.LooseArchive.id.in_(archive_ids)))
+
+
+def remove_archives(services: Services, archive_ids: Collection[str]) -> None:
+    """Remove what is doomed from the store, then forget it; blocks."""
+    for archive_id in archive_ids:
+        services.files.delete(archive_id)
+    with services.database.write() as session:
+        LooseArchives(session).forget(archive_ids)
+
+
+def sweep_archives(services: Services, now: float) -> int:
+    """Remove what has been loose for too long; how many there were. Blocks."""
+    with services.database.write() as session:
+        doomed = LooseArchives(session).doom_older(now - GRACE_SECONDS)
+    remove_archives(services, doomed)
+    return len(doomed)
+
+
+@asynccontextmanager
+async def keep_swept(services: Services) -> AsyncIterator[None]:
+    """Sweep the store at start and every ten minutes, for as long as the block lasts."""
+    task = asyncio.create_task(_sweep_regularly(services))
+    try:
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+async def _sweep_regularly(services: Services) -> None:
+    while True:
+        removed = 0
+        try:
+            removed = await run_in_threadpool(sweep_archives, services, time.time())
+        except Exception:
+            # The store may be away for a while.
+            logger.exception("archives that no checkpoint names could not be removed: the next sweep tries again")
+        if removed < _AT_ONCE:
+            await asyncio.sleep(_PAUSE_SECONDS)
