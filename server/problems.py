@@ -22,6 +22,7 @@ REPLAY_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
     503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
 }
+TOO_MANY_STREAMS: Responses = {503: {"model": ErrorBody, "description": "Too many streams are open"}}
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 

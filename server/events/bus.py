@@ -1,101 +1,217 @@
-"""What has changed, told to whoever listens in this process: browsers over SSE, and the links to the workers."""
+"""What has changed, told to whoever listens in this process, at a price that does not grow with their number.
+
+Changes of half a second are one event. It is written once for all who show the same; each listener has a short queue of
+such events, and one that reads too slowly, or was away for too long, is told to read everything anew ("resync").
+"""
 
 import asyncio
+import secrets
 import threading
+from collections import OrderedDict, deque
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
-from typing import Literal
 
-from server.schemas import Schema
+from server.errors import BusyError
+from server.events.changes import Change, Shown
 
-ChangeKind = Literal["experiment", "run", "metrics", "checkpoint", "deleted"]
+# Seconds between two events: a page redraws once a second.
+_PAUSE = 0.5
+# Of the newest changes, for whoever comes back: each is three short names.
+_REMEMBERED = 4096
+# Events that wait for a listener; eight seconds' worth.
+_QUEUE = 16
+_MAX_LISTENERS = 1000
+# Proxies close a stream on which nothing comes for a minute; a client that has gone is noticed by sending.
+_SILENCE = 15.0
+
+_PING = b": still here\n\n"
 
 
-class Change(Schema):
-    """Something is not as it was; the REST API says how it is now. `run_id` is null where all of an experiment is meant."""
-
-    experiment_id: str
-    run_id: str | None
-    kind: ChangeKind
+def _event(position: str, name: str, data: str) -> bytes:
+    return f"id: {position}\nevent: {name}\ndata: {data}\n\n".encode()
 
 
 class Subscription:
-    """One listener's pending changes. Equal ones that wait are one: that something changed counts, not how often."""
+    """One listener's pending events. Belongs to the event loop."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._lock = threading.Lock()
-        self._pending: dict[Change, None] = {}
+    def __init__(self, shown: Shown | None) -> None:
+        self.shown = shown
+        self._pending: deque[bytes] = deque()
         self._closed = False
         self._woken = asyncio.Event()
 
-    def put(self, change: Change) -> None:
-        """Add a change, from any thread."""
-        with self._lock:
-            wake = not self._pending
-            self._pending[change] = None
-        if wake:
-            self._wake()
+    def put(self, event: bytes, resync: bytes) -> None:
+        """Add an event; a queue that is full becomes the one event that stands for all."""
+        if len(self._pending) >= _QUEUE:
+            self._pending.clear()
+            event = resync
+        self._pending.append(event)
+        self._woken.set()
 
     def close(self) -> None:
-        """End the iteration once what is pending has been read, from any thread."""
+        """End the stream once what is pending has been read."""
         self._closed = True
-        self._wake()
+        self._woken.set()
 
-    async def batches(self, pause: float) -> AsyncIterator[list[Change]]:
-        """Lists of changes as they come, at most one list every `pause` seconds."""
+    async def events(self, silence: float = _SILENCE) -> AsyncIterator[bytes]:
+        """Server-sent events as they come, as bytes; a comment where none comes for `silence` seconds."""
         while True:
-            await self._woken.wait()
-            self._woken.clear()
-            with self._lock:
-                batch = list(self._pending)
-                self._pending.clear()
-            if batch:
-                yield batch
+            while self._pending:
+                yield self._pending.popleft()
             if self._closed:
                 return
-            await asyncio.sleep(pause)
-
-    def _wake(self) -> None:
-        # The loop may have ended before its listeners did, at shutdown; nobody is left to be woken then.
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._woken.set)
+            self._woken.clear()
+            try:
+                await asyncio.wait_for(self._woken.wait(), silence)
+            except TimeoutError:
+                yield _PING
 
 
 class EventBus:
-    """Fans changes out to subscriptions; `publish` may be called from any thread, after the commit that it tells of."""
+    """Fans changes out to subscriptions; `publish` may be called from any thread, after the commit that it tells of.
 
-    def __init__(self) -> None:
+    Args:
+        pause: seconds between two events of a stream.
+        remembered: that many of the newest changes are told to whoever comes back and says where it was.
+    """
+
+    def __init__(self, pause: float = _PAUSE, remembered: int = _REMEMBERED) -> None:
+        self._pause = pause
+        self._remembered = remembered
         self._lock = threading.Lock()
+        # Each change with the number under which it happened last, the newest at the end.
+        self._recent: OrderedDict[Change, int] = OrderedDict()
+        self._newest = 0
+        self._forgotten = 0
+        self._told = 0
+        # Numbers of another process of ours mean nothing here.
+        self._epoch = secrets.token_hex(4)
         self._subscriptions: set[Subscription] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._woken = asyncio.Event()
+        self._asleep = True
+        self._teller: asyncio.Task[None] | None = None
         self._closed = False
 
+    @property
+    def listeners(self) -> int:
+        """How many streams are open."""
+        return len(self._subscriptions)
+
     def publish(self, change: Change) -> None:
-        """Tell everybody who listens now."""
+        """Tell everybody whom it concerns; equal changes that wait are one."""
         with self._lock:
-            subscriptions = tuple(self._subscriptions)
-        for subscription in subscriptions:
-            subscription.put(change)
+            self._newest += 1
+            self._recent[change] = self._newest
+            self._recent.move_to_end(change)
+            if len(self._recent) > self._remembered:
+                _, self._forgotten = self._recent.popitem(last=False)
+            wake, self._asleep = self._asleep and self._loop is not None, False
+        if wake:
+            self._wake()
 
     @contextmanager
-    def subscribe(self) -> Iterator[Subscription]:
-        """Listen from now to the end of the block; call it on the event loop that will read."""
-        subscription = Subscription(asyncio.get_running_loop())
+    def subscribe(self, shown: Shown | None = None, since: str | None = None) -> Iterator[Subscription]:
+        """Listen to the end of the block; on the event loop.
+
+        Args:
+            shown: what the listener shows; None for everything.
+            since: the position from which it goes on; None from now on.
+
+        Raises:
+            BusyError: so many listen that another one would harm them all.
+        """
+        if len(self._subscriptions) >= _MAX_LISTENERS:
+            raise BusyError(f"{_MAX_LISTENERS} pages are open already: close some.", retry_after=_SILENCE)
+        subscription = Subscription(shown)
         with self._lock:
-            self._subscriptions.add(subscription)
-            closed = self._closed
-        if closed:
+            missed = self._since(since)
+            position = self._position()
+        subscription.put(_event(position, "opened", "{}"), b"")
+        if missed is None:
+            subscription.put(self._resync(), b"")
+        elif told := _told(missed, shown):
+            subscription.put(_event(position, "changes", _json(told)), b"")
+        self._subscriptions.add(subscription)
+        if self._closed:
             subscription.close()
+        elif self._teller is None:
+            with self._lock:
+                # What was published before anybody listened is nobody's news.
+                self._told, self._asleep = self._newest, True
+                self._loop = asyncio.get_running_loop()
+            self._teller = self._loop.create_task(self._tell())
         try:
             yield subscription
         finally:
-            with self._lock:
-                self._subscriptions.discard(subscription)
+            self._subscriptions.discard(subscription)
 
     def close(self) -> None:
-        """End every subscription, those to come included; called when the server begins to shut down."""
-        with self._lock:
-            self._closed = True
-            subscriptions = tuple(self._subscriptions)
-        for subscription in subscriptions:
+        """End every subscription, those to come included; called when the server begins to shut down, on its loop."""
+        self._closed = True
+        self._wake()
+        for subscription in tuple(self._subscriptions):
             subscription.close()
+
+    async def _tell(self) -> None:
+        """Write an event for each group of listeners whenever something has changed."""
+        while not self._closed:
+            await self._woken.wait()
+            self._woken.clear()
+            self._tell_now()
+            await asyncio.sleep(self._pause)
+
+    def _tell_now(self) -> None:
+        with self._lock:
+            self._asleep = True
+            # More than can be remembered happened at once: nobody knows what.
+            lost = self._forgotten > self._told
+            batch = self._after(self._told)
+            self._told = self._newest
+            position = self._position()
+        resync = self._resync()
+        texts: dict[Shown | None, bytes] = {}
+        for subscription in tuple(self._subscriptions):
+            shown = subscription.shown
+            if shown not in texts:
+                told = _told(batch, shown)
+                texts[shown] = resync if lost else _event(position, "changes", _json(told)) if told else b""
+            if event := texts[shown]:
+                subscription.put(event, resync)
+
+    def _since(self, position: str | None) -> list[Change] | None:
+        """What was told after a position; None where that is not known."""
+        if position is None:
+            return []
+        epoch, _, number = position.partition("-")
+        if epoch != self._epoch or not number.isdecimal() or not self._forgotten <= int(number) <= self._newest:
+            return None
+        return self._after(int(number))
+
+    def _after(self, number: int) -> list[Change]:
+        """The remembered changes after a number, oldest first; costs as many steps as there are."""
+        found = []
+        for change in reversed(self._recent):
+            if self._recent[change] <= number:
+                break
+            found.append(change)
+        return found[::-1]
+
+    def _position(self) -> str:
+        return f"{self._epoch}-{self._newest}"
+
+    def _resync(self) -> bytes:
+        return _event(self._position(), "resync", "{}")
+
+    def _wake(self) -> None:
+        # The loop may have ended before its listeners did, at shutdown; nobody is left to be woken then.
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._woken.set)
+
+
+def _told(changes: list[Change], shown: Shown | None) -> list[Change]:
+    return changes if shown is None else shown.of(changes)
+
+
+def _json(changes: list[Change]) -> str:
+    return f"[{','.join(change.model_dump_json() for change in changes)}]"

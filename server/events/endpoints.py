@@ -1,27 +1,57 @@
 """The route by which a page hears of changes, as server-sent events."""
 
-from collections.abc import AsyncIterator
+from typing import Annotated, Literal
 
-from fastapi import APIRouter
-from fastapi.sse import EventSourceResponse, ServerSentEvent
+from fastapi import APIRouter, Header, Query
+from fastapi.responses import StreamingResponse
+from starlette.types import Receive, Scope, Send
 
+from server.events.bus import EventBus
+from server.events.changes import Shown
+from server.problems import TOO_MANY_STREAMS, Responses
 from server.services import ServicesDep
 
 router = APIRouter(tags=["events"])
 
-# A page redraws at most five times a second, whatever the workers report.
-_PAUSE_SECONDS = 0.2
+_STREAM: Responses = {200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}}
+# A page shows this many experiments or runs at most.
+_MAX_SHOWN = 100
+
+Ids = Annotated[list[str], Query(max_length=_MAX_SHOWN)]
 
 
-@router.get("/api/events", response_class=EventSourceResponse)
-async def stream_changes(services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
-    """Events `change`, each a `Change` as JSON; the REST API says what is true now.
+class _EventStream(StreamingResponse):
+    """A subscription that lasts as long as its connection."""
 
-    Changes that a page missed are not repeated: it reads anew whatever it shows when the stream opens.
+    def __init__(self, bus: EventBus, shown: Shown | None, since: str | None) -> None:
+        # A proxy that waits for more before it passes something on would defeat the purpose.
+        headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+        super().__init__(iter(()), media_type="text/event-stream", headers=headers)
+        self._subscribed = bus.subscribe(shown, since)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send events until one side ends."""
+        with self._subscribed as subscription:
+            self.body_iterator = subscription.events()
+            await super().__call__(scope, receive, send)
+
+
+@router.get("/api/events", response_class=StreamingResponse, responses=TOO_MANY_STREAMS | _STREAM)
+async def stream_changes(
+    services: ServicesDep,
+    experiment: Ids = [],  # noqa: B006 (FastAPI copies it)
+    run: Ids = [],  # noqa: B006
+    follow: Literal["everything", "shown"] = "everything",
+    reports: bool = False,
+    since: str | None = None,
+    last_event_id: Annotated[str | None, Header()] = None,
+) -> StreamingResponse:
+    """Events `changes`, each a list of `Change` as JSON; the REST API says what is true now.
+
+    With `follow=shown` only changes of the given experiments and runs are told in full, of everything else which kinds there
+    were (and of metrics even that with `reports` only). `since`, or the header `Last-Event-ID`, is the id of the last event
+    that was read: what has changed since then is told first. An event `resync` says that something was missed: whatever the
+    page shows is to be read anew.
     """
-    with services.bus.subscribe() as subscription:
-        # The first bytes tell the browser that the stream is open.
-        yield ServerSentEvent(comment="open")
-        async for batch in subscription.batches(_PAUSE_SECONDS):
-            for change in batch:
-                yield ServerSentEvent(event="change", data=change.model_dump())
+    shown = Shown(frozenset(experiment), frozenset(run), reports) if follow == "shown" else None
+    return _EventStream(services.bus, shown, last_event_id or since)

@@ -10,7 +10,7 @@ from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.database import tables
 from server.errors import ConflictError
-from server.events.bus import Change
+from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.experiments.schemas import Experiment, ExperimentCreate, ExperimentPage, ExperimentPatch, ExperimentState
 from server.experiments.stored import read_training

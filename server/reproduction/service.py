@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.errors import ConflictError
-from server.events.bus import Change
+from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
 from server.experiments.service import ExperimentService
 from server.ids import new_id

@@ -5,7 +5,7 @@ import time
 from sqlalchemy.orm import Session
 
 from server.database import tables
-from server.events.bus import Change
+from server.events.changes import Change
 from server.experiments.stored import training_of
 from server.runs import states, views
 from server.runs.repository import RunRepository

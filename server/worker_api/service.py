@@ -13,7 +13,7 @@ from server.checkpoints.integrity import is_whole
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.errors import ConflictError, NotFoundError
-from server.events.bus import Change, ChangeKind
+from server.events.changes import Change, ChangeKind
 from server.experiments.stored import read_training, training_of
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow

@@ -14,7 +14,8 @@ from server.database import tables
 from server.database.engine import Database
 from server.database.migrate import upgrade
 from server.database.tables import RunState
-from server.events.bus import Change, EventBus
+from server.events.bus import EventBus
+from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.services import Services
 from tests.server.harness import Reports

@@ -51,15 +51,18 @@ def test_a_page_hears_of_changes_until_the_server_ends(tmp_path: Path) -> None:
         with browser.stream("GET", "/api/events") as events:
             lines = events.iter_lines()
             assert events.headers["content-type"].startswith("text/event-stream")
-            assert list(islice(lines, 2)) == [": open", ""]
+            position, event, *_ = islice(lines, 4)
+            assert event == "event: opened"
             experiment = browser.post("/api/experiments", json={}).json()
-            event, data, end = islice(lines, 3)
-            assert (event, end) == ("event: change", "")
-            assert json.loads(data.removeprefix("data: ")) == {
-                "experiment_id": experiment["id"],
-                "run_id": None,
-                "kind": "experiment",
-            }
+            _, event, data, end = islice(lines, 4)
+            assert (event, end) == ("event: changes", "")
+            changes = [{"experiment_id": experiment["id"], "run_id": None, "kind": "experiment"}]
+            assert json.loads(data.removeprefix("data: ")) == changes
+            # Who comes back with the last event that was read hears what came after it.
+            since = {"Last-Event-ID": position.removeprefix("id: ")}
+            with browser.stream("GET", "/api/events?follow=shown", headers=since) as again:
+                told = [line for line in islice(again.iter_lines(), 8) if line.startswith("data: [")]
+                assert [json.loads(line.removeprefix("data: ")) for line in told] == [changes]
             process.send_signal(signal.SIGINT)
             # The stream ends by itself, else the server would wait for it.
             assert list(lines) == []

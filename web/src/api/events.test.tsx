@@ -3,13 +3,22 @@ import { act, renderHook } from '@testing-library/react'
 import type { ReactNode } from 'react'
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest'
 import { FakeEventSource } from '../testing/server'
-import { type Change, concerns, createInvalidator, ROUND_MS, SLOW_ROUND_MS, useServerEvents } from './events'
+import {
+  type Change,
+  concerns,
+  createInvalidator,
+  ROUND_MS,
+  SETTLE_MS,
+  SLOW_ROUND_MS,
+  useServerEvents,
+} from './events'
 
 const change = (kind: Change['kind'], run_id: string | null = 'run1'): Change => ({
   experiment_id: 'exp1',
   run_id,
   kind,
 })
+const elsewhere = (kind: Change['kind']): Change => ({ experiment_id: null, run_id: null, kind })
 const key = (path: string, params: object = {}) => ['get', path, { params }]
 
 describe('which questions a change makes old', () => {
@@ -36,6 +45,11 @@ describe('which questions a change makes old', () => {
     [change('metrics'), key('/api/status'), false],
     [change('run'), key('/api/status'), true],
     [change('run'), key('/api/training/form'), false],
+    [elsewhere('metrics'), key('/api/experiments'), true],
+    [elsewhere('run'), key('/api/status'), true],
+    [elsewhere('run'), key('/api/runs/{run_id}', ofRun), false],
+    [elsewhere('run'), key('/api/experiments/{experiment_id}', { path: { experiment_id: 'exp1' } }), false],
+    [elsewhere('checkpoint'), key('/api/compare', compared), false],
   ])('%j: %j %s', (one, queryKey, old) => expect(concerns(one, queryKey)).toBe(old))
 })
 
@@ -148,12 +162,32 @@ describe('the stream', () => {
     expect(FakeEventSource.open).toHaveLength(0)
   })
 
-  test('after a reconnection everything is asked again: what was missed is not repeated', () => {
+  test('only what was missed for good makes everything old', () => {
     renderHook(() => useServerEvents(true), { wrapper })
-    FakeEventSource.open[0]?.onopen?.()
+    FakeEventSource.open[0]?.tell('opened', 'e-1')
     expect(asked).not.toHaveBeenCalled()
-    FakeEventSource.open[0]?.onopen?.()
+    // The browser connects again by itself, and says where it was.
+    FakeEventSource.open[0]?.tell('opened', 'e-5')
+    expect(asked).not.toHaveBeenCalled()
+    FakeEventSource.open[0]?.tell('resync', 'e-9')
     expect(asked).toHaveBeenCalledWith()
+  })
+
+  test('the stream follows what the page shows, and goes on where it was', async () => {
+    renderHook(() => useServerEvents(true), { wrapper })
+    expect(FakeEventSource.open.map(({ url }) => url)).toEqual(['/api/events?follow=shown'])
+    FakeEventSource.open[0]?.tell('opened', 'e-7')
+    await show(key('/api/experiments'))
+    await show(key('/api/runs/{run_id}/metrics', { path: { run_id: 'r1' } }))
+    await show(key('/api/compare', { query: { experiment: ['b', 'a'] } }))
+    await vi.advanceTimersByTimeAsync(SETTLE_MS)
+    expect(FakeEventSource.open.map(({ url }) => url)).toEqual([
+      '/api/events?follow=shown&experiment=a&experiment=b&reports=true&run=r1&since=e-7',
+    ])
+    FakeEventSource.open[0]?.send(change('run', 'r1'))
+    act(() => setHidden(true))
+    act(() => setHidden(false))
+    expect(FakeEventSource.open[0]?.url).toMatch(/&since=e-2$/)
   })
 
   test('a stream that was refused is asked for again, each time later', () => {
@@ -167,7 +201,7 @@ describe('the stream', () => {
       vi.advanceTimersByTime(1)
       expect(FakeEventSource.open).toHaveLength(before + 1)
     }
-    FakeEventSource.open.at(-1)?.onopen?.()
+    FakeEventSource.open.at(-1)?.tell('opened', 'e-1')
     expect(asked).not.toHaveBeenCalled()
   })
 

@@ -4,7 +4,8 @@ import { useQueryClient } from '@tanstack/react-query'
 import { useEffect } from 'react'
 
 export interface Change {
-  experiment_id: string
+  /** Null for one that this page does not show. */
+  experiment_id: string | null
   run_id: string | null
   kind: 'run' | 'metrics' | 'checkpoint' | 'experiment' | 'deleted'
 }
@@ -17,6 +18,8 @@ const SLOW_PATHS: readonly unknown[] = ['/api/experiments', '/api/compare/curves
 /** What takes the server long to answer is left alone for so many times as long. */
 const REST = 3
 const TICK_MS = 250
+/** A page whose queries have not changed for so long is the one that the stream follows. */
+export const SETTLE_MS = 200
 const FIRST_RETRY_MS = 1_000
 const LAST_RETRY_MS = 30_000
 /** EventSource.CLOSED, which a browser never opens again by itself. */
@@ -31,17 +34,20 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   const [, path, init] = queryKey
   if (typeof path !== 'string') return false
   const { params } = (init ?? {}) as Parameters
-  const ofRun = change.run_id === null || params?.path?.run_id === change.run_id
+  const ofRun =
+    (change.run_id === null && change.experiment_id !== null) || params?.path?.run_id === change.run_id
   const ofExperiment = params?.path?.experiment_id === change.experiment_id
+  const ofCompared =
+    change.experiment_id !== null && (params?.query?.experiment ?? []).includes(change.experiment_id)
   if (path === '/api/experiments') return true
   // Thirty runs report several times a second: while they go on, their page asks at its own pace.
   if (path === '/api/reproduction') return change.kind !== 'metrics'
   if (path === '/api/status') return change.kind !== 'metrics'
   if (path.startsWith('/api/experiments/{experiment_id}')) return ofExperiment
   if (path === '/api/compare') {
-    return change.kind !== 'metrics' && (params?.query?.experiment ?? []).includes(change.experiment_id)
+    return change.kind !== 'metrics' && ofCompared
   }
-  if (path === '/api/compare/curves') return (params?.query?.experiment ?? []).includes(change.experiment_id)
+  if (path === '/api/compare/curves') return ofCompared
   if (path === '/api/runs/{run_id}') return ofRun
   if (path === '/api/runs/{run_id}/metrics') return ofRun && change.kind !== 'checkpoint'
   if (path === '/api/runs/{run_id}/events') return ofRun && change.kind !== 'metrics'
@@ -117,8 +123,29 @@ export function createInvalidator(client: QueryClient): { push: (change: Change)
 }
 
 /**
+ * Where the stream of the queries that are shown now is: what they are about is told in full, of everything else only which
+ * kinds of change there were.
+ */
+export function streamPath(client: QueryClient, since: string | undefined): string {
+  const shown = new Set<string>()
+  for (const query of client.getQueryCache().findAll({ type: 'active' })) {
+    const [, path, init] = query.queryKey
+    const { params } = (init ?? {}) as Parameters
+    if (path === '/api/experiments') shown.add('reports=true')
+    const { experiment_id, run_id } = params?.path ?? {}
+    if (run_id) shown.add(`run=${encodeURIComponent(run_id)}`)
+    for (const id of [experiment_id, ...(params?.query?.experiment ?? [])]) {
+      if (id) shown.add(`experiment=${encodeURIComponent(id)}`)
+    }
+  }
+  const what = ['follow=shown', ...[...shown].sort()].join('&')
+  return `/api/events?${what}${since === undefined ? '' : `&since=${encodeURIComponent(since)}`}`
+}
+
+/**
  * Keeps one stream open while the tab is visible: browsers allow six connections to an HTTP/1.1 server, so a hidden tab
- * lets go of its own. What was missed meanwhile, or while the server was away, is asked for again on every (re)connection.
+ * lets go of its own. It follows what the page shows; where it is opened anew, what was missed meanwhile is told first, or
+ * that too much was missed to tell, and then everything is asked for again.
  */
 export function useServerEvents(enabled: boolean): void {
   const client = useQueryClient()
@@ -127,16 +154,26 @@ export function useServerEvents(enabled: boolean): void {
     const invalidator = createInvalidator(client)
     let source: EventSource | undefined
     let retry: ReturnType<typeof setTimeout> | undefined
+    let settling: ReturnType<typeof setTimeout> | undefined
     let failures = 0
-    let openedBefore = false
+    let position: string | undefined
+    let followed = ''
     const open = () => {
-      const opened = new EventSource('/api/events')
+      followed = streamPath(client, undefined)
+      const opened = new EventSource(streamPath(client, position))
       source = opened
-      opened.onopen = () => {
+      const hear = (name: string, act: (data: string) => void) =>
+        opened.addEventListener(name, (event: MessageEvent<string>) => {
+          position = event.lastEventId
+          act(event.data)
+        })
+      hear('opened', () => {
         failures = 0
-        if (openedBefore) void client.invalidateQueries()
-        openedBefore = true
-      }
+      })
+      hear('resync', () => void client.invalidateQueries())
+      hear('changes', (data) => {
+        for (const change of JSON.parse(data) as Change[]) invalidator.push(change)
+      })
       // A connection that drops the browser takes up again; after a refusal, say of a proxy whose server restarts, it does not.
       opened.onerror = () => {
         if (opened !== source || opened.readyState !== CLOSED) return
@@ -144,7 +181,6 @@ export function useServerEvents(enabled: boolean): void {
         retry = setTimeout(open, Math.min(FIRST_RETRY_MS * 2 ** failures, LAST_RETRY_MS))
         failures += 1
       }
-      opened.addEventListener('change', (event) => invalidator.push(JSON.parse(event.data) as Change))
     }
     const close = () => {
       clearTimeout(retry)
@@ -155,10 +191,20 @@ export function useServerEvents(enabled: boolean): void {
       close()
       if (!document.hidden) open()
     }
+    // A page that opens shows its queries one after another.
+    const unsubscribe = client.getQueryCache().subscribe(({ type }) => {
+      if (type !== 'observerAdded' && type !== 'observerRemoved') return
+      clearTimeout(settling)
+      settling = setTimeout(() => {
+        if (source !== undefined && streamPath(client, undefined) !== followed) follow()
+      }, SETTLE_MS)
+    })
     follow()
     document.addEventListener('visibilitychange', follow)
     return () => {
       document.removeEventListener('visibilitychange', follow)
+      unsubscribe()
+      clearTimeout(settling)
       close()
       invalidator.stop()
     }

@@ -237,9 +237,12 @@ export interface paths {
         };
         /**
          * Stream Changes
-         * @description Events `change`, each a `Change` as JSON; the REST API says what is true now.
+         * @description Events `changes`, each a list of `Change` as JSON; the REST API says what is true now.
          *
-         *     Changes that a page missed are not repeated: it reads anew whatever it shows when the stream opens.
+         *     With `follow=shown` only changes of the given experiments and runs are told in full, of everything else which kinds there
+         *     were (and of metrics even that with `reports` only). `since`, or the header `Last-Event-ID`, is the id of the last event
+         *     that was read: what has changed since then is told first. An event `resync` says that something was missed: whatever the
+         *     page shows is to be read anew.
          */
         get: operations["stream_changes_api_events_get"];
         put?: never;
@@ -5179,8 +5182,16 @@ export interface operations {
     };
     stream_changes_api_events_get: {
         parameters: {
-            query?: never;
-            header?: never;
+            query?: {
+                experiment?: string[];
+                follow?: "everything" | "shown";
+                reports?: boolean;
+                run?: string[];
+                since?: string | null;
+            };
+            header?: {
+                "last-event-id"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -5192,7 +5203,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/event-stream": unknown;
+                    "text/event-stream": string;
                 };
             };
             /** @description No valid login */
@@ -5201,7 +5212,25 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/event-stream": components["schemas"]["ErrorBody"];
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many streams are open */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };

@@ -46,7 +46,6 @@ export function refusal(code: number, detail: unknown): Response {
 /** The browser's end of an event stream, driven by the test. */
 export class FakeEventSource extends EventTarget {
   static open: FakeEventSource[] = []
-  onopen: (() => void) | null = null
   onerror: (() => void) | null = null
   readyState = 1
   readonly url: string
@@ -68,6 +67,11 @@ export class FakeEventSource extends EventTarget {
   }
 
   send(change: Change) {
-    this.dispatchEvent(new MessageEvent('change', { data: JSON.stringify(change) }))
+    this.tell('changes', 'e-2', [change])
+  }
+
+  /** An event as the server writes it: its name, its id, its data. */
+  tell(name: 'opened' | 'changes' | 'resync', lastEventId: string, data: unknown = {}) {
+    this.dispatchEvent(new MessageEvent(name, { lastEventId, data: JSON.stringify(data) }))
   }
 }
