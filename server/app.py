@@ -72,12 +72,12 @@ def create_services(settings: Settings) -> Services:
 
     Raises:
         OSError: the data directory can't be written.
-        sqlalchemy.exc.SQLAlchemyError: the database can't be reached.
+        ServiceError: the database can't be reached or used.
     """
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     secrets = load_secrets(settings)
     database = Database(settings.resolved_database_url)
-    upgrade(database)
+    upgrade(database, settings.database_wait_seconds)
     files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
     arenas = ArenaStore(settings.arenas_dir)
     recordings = RecordingStore(settings.replays_dir, settings.max_replay_bytes)

@@ -41,6 +41,9 @@ class Settings(BaseSettings):
         Path("data"), description="Everything that the service keeps, where the URLs below don't say otherwise."
     )
     database_url: str | None = Field(None, description="SQLAlchemy URL; SQLite in the data directory if not given.")
+    database_wait_seconds: float = Field(
+        30.0, ge=0.0, le=3_600.0, description="How long a database server that is not up yet is waited for at start."
+    )
     broker_url: str | None = Field(None, description="Celery broker URL; a SQLite file in the data directory if not given.")
     queue_prefix: str = Field(
         "mapless.", description="Of the queues' names: installations that share a broker need different ones."

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection, create_engine, event, make_url, text
 from sqlalchemy.engine import Engine
@@ -18,6 +18,10 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from server.database.fair_lock import FairLock
+from server.errors import ServiceError
+
+if TYPE_CHECKING:
+    from psycopg import Connection as PsycopgConnection
 
 # How long a writer waits for another one; a transaction of ours takes milliseconds.
 _BUSY_TIMEOUT_MS = 10_000
@@ -28,6 +32,10 @@ _POOL_SIZE = 10
 _POOL_OVERFLOW = 40
 
 _READ_ONLY = "mapless_read_only"
+
+
+class UnusableDatabaseError(ServiceError):
+    """The database answers, but can't hold what the service keeps."""
 
 
 class Database:
@@ -73,10 +81,22 @@ class Database:
         self.engine.dispose()
 
 
+def _check_encoding(connection: "PsycopgConnection[Any]", _record: ConnectionPoolEntry) -> None:
+    encoding = connection.info.parameter_status("server_encoding")
+    if encoding != "UTF8":
+        raise UnusableDatabaseError(
+            f"The database {connection.info.dbname} keeps text as {encoding}, which does not hold every character: "
+            f"create one with `createdb --encoding UTF8 --template template0 ...`, and name it in MAPLESS_DATABASE_URL."
+        )
+
+
 def _create_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        return create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True)
+        engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True)
+        # Ahead of SQLAlchemy's own first look, which does not understand what such a database answers.
+        event.listen(engine, "connect", _check_encoding, insert=True)
+        return engine
     if parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW)

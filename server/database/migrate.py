@@ -1,5 +1,7 @@
 """Brings the database to the tables of this version."""
 
+import logging
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +14,9 @@ from server.errors import ServiceError
 if TYPE_CHECKING:
     from alembic.config import Config
 
+logger = logging.getLogger(__name__)
+
+_RETRY_SECONDS = 0.5
 _SCRIPTS = Path(__file__).resolve().parents[1] / "migrations"
 
 
@@ -28,21 +33,37 @@ def head() -> str:
     return max(path.name.partition("_")[0] for path in (_SCRIPTS / "versions").glob("[0-9]*.py"))
 
 
-def upgrade(database: Database) -> None:
+def upgrade(database: Database, wait_seconds: float = 0.0) -> None:
     """Run the migrations that the database has not seen, all in one transaction.
+
+    Args:
+        database: to be brought up to date.
+        wait_seconds: how long a database server may take to come up: whatever starts both at once does not wait for it.
 
     Raises:
         IncompatibleDatabaseError: the database is from a newer version.
         UnreachableDatabaseError: it can't be reached.
+        UnusableDatabaseError: it can't hold what the service keeps.
     """
-    try:
-        if _revision(database) != head():
-            _run_migrations(database)
-    except OperationalError as error:
-        # What follows the first line are guesses at the cause.
-        reason, *_ = str(error.orig).splitlines()
-        url = database.engine.url.render_as_string(hide_password=True)
-        raise UnreachableDatabaseError(f"The database {url} can't be used: {reason}") from error
+    patience = 0.0 if database.engine.dialect.name == "sqlite" else wait_seconds
+    deadline = time.monotonic() + patience
+    told = ""
+    while True:
+        try:
+            if _revision(database) != head():
+                _run_migrations(database)
+        except OperationalError as error:
+            # What follows the first line are guesses at the cause.
+            reason, *_ = str(error.orig).splitlines()
+            url = database.engine.url.render_as_string(hide_password=True)
+            if time.monotonic() >= deadline:
+                raise UnreachableDatabaseError(f"The database {url} can't be used: {reason}") from error
+            if reason != told:
+                logger.warning("The database %s can't be used yet: %s. Trying for %g s.", url, reason, patience)
+                told = reason
+            time.sleep(_RETRY_SECONDS)
+        else:
+            return
 
 
 def migration_config(database: Database) -> "Config":

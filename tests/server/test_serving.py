@@ -129,9 +129,8 @@ def test_a_wrong_setting_is_one_clear_line_with_its_name(tmp_path: Path) -> None
 def test_a_database_that_does_not_answer_is_one_clear_line(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as nobody:
         port = nobody.getsockname()[1]
-    line = start_and_fail(
-        tmp_path, "--port", "0", MAPLESS_DATABASE_URL=f"postgresql+psycopg://mapless:secret@127.0.0.1:{port}/mapless"
-    )
+    url = f"postgresql+psycopg://mapless:secret@127.0.0.1:{port}/mapless"
+    line = start_and_fail(tmp_path, "--port", "0", MAPLESS_DATABASE_URL=url, MAPLESS_DATABASE_WAIT_SECONDS="0")
 
     assert line.startswith("mapless: The database postgresql+psycopg://mapless:***@127.0.0.1")
 
