@@ -92,7 +92,9 @@ def launch(client: httpx.Client, directory: Path) -> dict[str, Any]:
         watcher.join()
     good_at = None
     rates = []
-    for checkpoint in sorted(get(client, f"/api/runs/{run}/checkpoints"), key=lambda row: int(row["step"])):
+    for checkpoint in sorted(
+        get(client, f"/api/runs/{run}/checkpoints?limit=200")["items"], key=lambda row: int(row["step"])
+    ):
         archive = directory / f"{checkpoint['id']}.zip"
         archive.write_bytes(client.get(f"/api/checkpoints/{checkpoint['id']}/download").content)
         rates.append(success_rate(archive))

@@ -1,11 +1,14 @@
 """What several domains say in JSON: the base of every message, and a number with its uncertainty."""
 
-from typing import Annotated
+from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 """Text of one line that a person types and the database keeps: PostgreSQL holds no NUL."""
+
+
+Item = TypeVar("Item")
 
 
 class Schema(BaseModel):
@@ -14,6 +17,13 @@ class Schema(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, json_schema_serialization_defaults_required=True
     )
+
+
+class Page(Schema, Generic[Item]):
+    """Some of a list's items, in its order; `server.paging` says which."""
+
+    items: list[Item]
+    total: int = Field(description="How many there are on all pages.")
 
 
 UNREADABLE = "Settings that another version stored and this one can't read, dotted: the defaults are shown in their place."

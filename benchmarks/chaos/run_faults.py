@@ -152,7 +152,7 @@ def _damage_checkpoint(scene: Scene) -> None:
         raise MissedError
     suspend([trainer])
     time.sleep(0.5)  # what is on its way arrives
-    checkpoints = scene.stack.api.get(f"/api/runs/{scene.run_id}/checkpoints").json()
+    checkpoints = scene.stack.api.get(f"/api/runs/{scene.run_id}/checkpoints").json()["items"]
     newest = max(checkpoints, key=lambda checkpoint: checkpoint["step"], default=None)
     archive = scene.stack.data / "checkpoints" / f"{newest['id']}.zip" if newest else None
     if newest is None or archive is None or not archive.exists() or len(checkpoints) < 2:

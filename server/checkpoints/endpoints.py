@@ -2,11 +2,12 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 from fastapi.responses import StreamingResponse
 
-from server.checkpoints.schemas import Checkpoint, Episodes
+from server.checkpoints.schemas import CheckpointPage, Episodes
 from server.checkpoints.service import CheckpointService
+from server.paging import WindowDep
 from server.problems import NOT_FOUND, Responses
 from server.services import ServicesDep
 
@@ -23,9 +24,14 @@ CheckpointServiceDep = Annotated[CheckpointService, Depends(_service)]
 
 
 @router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND)
-def list_checkpoints(run_id: str, service: CheckpointServiceDep) -> list[Checkpoint]:
-    """The run's checkpoints by step."""
-    return service.of_run(run_id)
+def list_checkpoints(
+    run_id: str,
+    service: CheckpointServiceDep,
+    window: WindowDep,
+    step: Annotated[int | None, Query(ge=0, le=2**62, description="Only that of this step.")] = None,
+) -> CheckpointPage:
+    """The run's checkpoints, the newest first."""
+    return service.of_run(run_id, window, step)
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/download", response_class=StreamingResponse, responses=NOT_FOUND | _ZIP)

@@ -5,13 +5,14 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from pydantic import TypeAdapter
-from sqlalchemy import Select, func, select
+from sqlalchemy import Float, Select, cast, func, select
 from sqlalchemy.orm import Session, defer
 
 from server.database import tables
 from server.errors import NotFoundError
 from server.files import StoredFile
 from server.ids import new_id
+from server.paging import Window
 from workers.reporting import EpisodeResult, EvaluationResult
 
 _EPISODES = TypeAdapter(tuple[EpisodeResult, ...])
@@ -67,16 +68,47 @@ class CheckpointRepository:
             _whole(run_id).order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
         ).first()
 
-    def of_run(self, run_id: str) -> Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]:
-        """The run's checkpoints by step, each with its evaluation (its episodes are left in the database)."""
+    def page(
+        self, run_id: str, window: Window, step: int | None = None
+    ) -> tuple[Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]], int]:
+        """The run's checkpoints, all or that of one step, the newest first, each with its evaluation; how many in all.
+
+        The episodes of the evaluations are left in the database.
+        """
+        wanted = [tables.Checkpoint.run_id == run_id]
+        if step is not None:
+            wanted.append(tables.Checkpoint.step == step)
+        total = self._session.scalar(select(func.count()).select_from(tables.Checkpoint).where(*wanted)) or 0
         query = (
             select(tables.Checkpoint, tables.Evaluation)
             .outerjoin(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
-            .where(tables.Checkpoint.run_id == run_id)
+            .where(*wanted)
             .options(defer(tables.Evaluation.episodes))
-            .order_by(tables.Checkpoint.step, tables.Checkpoint.created_at)
+            .order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
+            .limit(window.limit)
+            .offset(window.offset)
         )
-        return [(checkpoint, evaluation) for checkpoint, evaluation in self._session.execute(query)]
+        return [(checkpoint, evaluation) for checkpoint, evaluation in self._session.execute(query)], total
+
+    def best(self, run_id: str) -> tuple[tables.Checkpoint, tables.Evaluation] | None:
+        """The run's whole checkpoint with the highest success rate; of equal ones the quickest, then the newest."""
+        rate = cast(tables.Evaluation.arrivals, Float) / tables.Evaluation.episode_count
+        query = (
+            select(tables.Checkpoint, tables.Evaluation)
+            .join(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
+            .where(tables.Checkpoint.run_id == run_id, tables.Checkpoint.damaged_at.is_(None))
+            .options(defer(tables.Evaluation.episodes))
+            # Where nobody arrived there are no steps to the target: behind all others.
+            .order_by(
+                rate.desc(),
+                tables.Evaluation.steps_mean.is_(None),
+                tables.Evaluation.steps_mean,
+                tables.Checkpoint.step.desc(),
+            )
+            .limit(1)
+        )
+        row = self._session.execute(query).first()
+        return (row[0], row[1]) if row else None
 
     def evaluation(self, checkpoint_id: str) -> tables.Evaluation:
         """The checkpoint's evaluation.

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from server.schemas import Estimate, Schema
+from server.schemas import Estimate, Page, Schema
 from workers.reporting import EpisodeResult
 
 
@@ -29,6 +29,12 @@ class Checkpoint(Schema):
     damaged: bool = Field(description="Its archive was found damaged or gone: the run went on from an older one.")
     best: bool = Field(description="Highest success rate of the run; of equal ones, fewest steps to the target.")
     evaluation: Evaluation | None
+
+
+class CheckpointPage(Page[Checkpoint]):
+    """Some of a run's checkpoints, the newest first."""
+
+    best: Checkpoint | None = Field(description="The best of all of them; null before the first evaluation.")
 
 
 class Episodes(Schema):

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from server.checkpoints import views
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
-from server.checkpoints.schemas import Checkpoint, Episodes
+from server.checkpoints.schemas import CheckpointPage, Episodes
+from server.paging import Window
 from server.runs.repository import RunRepository
 from server.services import Services
 
@@ -36,15 +37,23 @@ class CheckpointService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def of_run(self, run_id: str) -> list[Checkpoint]:
-        """The run's checkpoints by step.
+    def of_run(self, run_id: str, window: Window, step: int | None = None) -> CheckpointPage:
+        """The run's checkpoints, all or that of one step, the newest first.
 
         Raises:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
             RunRepository(session).get(run_id)
-            return views.checkpoint_views(CheckpointRepository(session).of_run(run_id))
+            repository = CheckpointRepository(session)
+            rows, total = repository.page(run_id, window, step)
+            best = repository.best(run_id)
+            best_id = best[0].id if best else None
+            return CheckpointPage(
+                items=[views.checkpoint_view(*row, best=row[0].id == best_id) for row in rows],
+                total=total,
+                best=views.checkpoint_view(*best, best=True) if best else None,
+            )
 
     def episodes(self, checkpoint_id: str) -> Episodes:
         """Every episode behind the checkpoint's figures.

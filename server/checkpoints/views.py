@@ -39,41 +39,15 @@ def evaluation_view(evaluation: tables.Evaluation) -> Evaluation:
     )
 
 
-def checkpoint_views(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> list[Checkpoint]:
-    """A run's checkpoints in JSON, the best marked."""
-    best = _best_evaluated(rows)
-    return [
-        Checkpoint(
-            id=checkpoint.id,
-            step=checkpoint.step,
-            size=checkpoint.size,
-            sha256=checkpoint.sha256,
-            created_at=checkpoint.created_at,
-            damaged=checkpoint.damaged_at is not None,
-            best=checkpoint.id == best,
-            evaluation=evaluation_view(evaluation) if evaluation else None,
-        )
-        for checkpoint, evaluation in rows
-    ]
-
-
-def best_checkpoint(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
-    """The id of a run's best whole checkpoint; of its last where none was evaluated, None where there is none."""
-    whole = [checkpoint.id for checkpoint, _ in rows if checkpoint.damaged_at is None]
-    return _best_evaluated(rows) or (whole[-1] if whole else None)
-
-
-def _best_evaluated(rows: Sequence[tuple[tables.Checkpoint, tables.Evaluation | None]]) -> str | None:
-    """The id with the highest success rate; of equal ones that with the fewest steps to the target, then the newest."""
-
-    def merit(row: tuple[tables.Checkpoint, tables.Evaluation]) -> tuple[float, float, int]:
-        checkpoint, evaluation = row
-        steps = evaluation.steps_mean if evaluation.steps_mean is not None else float("inf")
-        return evaluation.arrivals / evaluation.episode_count, -steps, checkpoint.step
-
-    evaluated = [
-        (checkpoint, evaluation)
-        for checkpoint, evaluation in rows
-        if evaluation is not None and checkpoint.damaged_at is None
-    ]
-    return max(evaluated, key=merit)[0].id if evaluated else None
+def checkpoint_view(checkpoint: tables.Checkpoint, evaluation: tables.Evaluation | None, *, best: bool) -> Checkpoint:
+    """A checkpoint in JSON."""
+    return Checkpoint(
+        id=checkpoint.id,
+        step=checkpoint.step,
+        size=checkpoint.size,
+        sha256=checkpoint.sha256,
+        created_at=checkpoint.created_at,
+        damaged=checkpoint.damaged_at is not None,
+        best=best,
+        evaluation=evaluation_view(evaluation) if evaluation else None,
+    )

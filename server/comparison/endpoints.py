@@ -12,7 +12,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/compare", tags=["comparison"])
 
 ExperimentIds = Annotated[
-    list[str], Query(alias="experiment", min_length=1, max_length=20, description="Ids of the experiments, in order.")
+    list[str], Query(alias="experiment", min_length=1, max_length=50, description="Ids of the experiments, in order.")
 ]
 
 

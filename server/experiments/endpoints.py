@@ -8,19 +8,19 @@ from server.experiments.form import form_schema
 from server.experiments.schemas import (
     Experiment,
     ExperimentCreate,
-    ExperimentPage,
     ExperimentPatch,
     ExperimentState,
+    ListedExperiment,
     TrainingForm,
 )
 from server.experiments.service import ExperimentService
+from server.paging import WindowDep
 from server.problems import CONFLICT, NOT_FOUND
+from server.schemas import Page
 from server.services import ServicesDep
 from workers.presets import PRESETS
 
 router = APIRouter(tags=["experiments"])
-
-_MAX_PAGE = 200
 
 
 def _service(services: ServicesDep) -> ExperimentService:
@@ -45,13 +45,12 @@ def create_experiment(request: ExperimentCreate, service: ExperimentServiceDep) 
 @router.get("/api/experiments")
 def list_experiments(
     service: ExperimentServiceDep,
+    window: WindowDep,
     query: Annotated[str, Query(max_length=120, description="Part of the name, in any case.")] = "",
     state: ExperimentState | None = None,
-    limit: Annotated[int, Query(ge=1, le=_MAX_PAGE)] = 50,
-    offset: Annotated[int, Query(ge=0, le=2**31)] = 0,
-) -> ExperimentPage:
-    """Experiments, the newest first."""
-    return service.page(query=query, state=state, limit=limit, offset=offset)
+) -> Page[ListedExperiment]:
+    """Experiments, the newest first, in short."""
+    return service.page(query=query, state=state, window=window)
 
 
 @router.get("/api/experiments/{experiment_id}", responses=NOT_FOUND)

@@ -9,6 +9,7 @@ from server.database import tables
 from server.database.tables import RunState
 from server.errors import NotFoundError
 from server.experiments.schemas import ExperimentState
+from server.paging import Window
 
 # While any run is in one of these, that is what the experiment is; the first that applies.
 UNFINISHED: tuple[RunState, ...] = ("running", "stopping", "queued")
@@ -84,9 +85,7 @@ class ExperimentRepository:
             raise NotFoundError.of("experiment", experiment_id)
         return runs
 
-    def page(
-        self, *, query: str, state: ExperimentState | None, limit: int, offset: int
-    ) -> tuple[Sequence[tables.Experiment], int]:
+    def page(self, *, query: str, state: ExperimentState | None, window: Window) -> tuple[Sequence[tables.Experiment], int]:
         """Experiments whose name contains `query` (in any case) and that are in `state`, newest first; how many in all."""
         wanted = select(tables.Experiment.id)
         if query:
@@ -102,8 +101,8 @@ class ExperimentRepository:
             .where(tables.Experiment.id.in_(wanted))
             .options(selectinload(tables.Experiment.runs))
             .order_by(tables.Experiment.created_at.desc(), tables.Experiment.id)
-            .limit(limit)
-            .offset(offset)
+            .limit(window.limit)
+            .offset(window.offset)
         )
         return self._session.scalars(rows).all(), total
 

@@ -63,11 +63,28 @@ class Experiment(Schema):
     )
 
 
-class ExperimentPage(Schema):
-    """Some of the experiments, the newest first."""
+class ListedExperiment(Schema):
+    """An experiment as a list shows it: without its whole configuration and its runs."""
 
-    items: list[Experiment]
-    total: int = Field(description="How many there are on all pages.")
+    id: str
+    name: str
+    created_at: float
+    arena: str
+    movers: int = Field(description="Moving obstacles.")
+    robot: str
+    algorithm: str
+    network: str
+    reward: str
+    unreadable: list[str] = Field(description=UNREADABLE)
+    state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
+    states: list[RunState] = Field(description="That its runs are in, each once.")
+    runs: int
+    progress: float = Field(description="Steps done by all runs over the steps that they were given, 0 to 1.")
+    seconds_left: float | None = Field(description="Until its slowest running run is through; null where that is not known.")
+    campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
+    success: Estimate | None = Field(
+        description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."
+    )
 
 
 class TrainingForm(Schema):

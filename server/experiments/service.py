@@ -12,13 +12,21 @@ from server.database import tables
 from server.errors import ConflictError
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
-from server.experiments.schemas import Experiment, ExperimentCreate, ExperimentPage, ExperimentPatch, ExperimentState
+from server.experiments.schemas import (
+    Experiment,
+    ExperimentCreate,
+    ExperimentPatch,
+    ExperimentState,
+    ListedExperiment,
+)
 from server.experiments.stored import read_training
 from server.ids import new_id
+from server.paging import Window
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
+from server.schemas import Page
 from server.services import Services
 from workers.protocol import queue_of
 
@@ -55,11 +63,11 @@ class ExperimentService:
         with self._services.database.read() as session:
             return _views(session, [ExperimentRepository(session).get(experiment_id)])[0]
 
-    def page(self, *, query: str, state: ExperimentState | None, limit: int, offset: int) -> ExperimentPage:
+    def page(self, *, query: str, state: ExperimentState | None, window: Window) -> Page[ListedExperiment]:
         """Experiments whose name contains `query` and that are in `state`, the newest first."""
         with self._services.database.read() as session:
-            found, total = ExperimentRepository(session).page(query=query.strip(), state=state, limit=limit, offset=offset)
-            return ExperimentPage(items=_views(session, found), total=total)
+            found, total = ExperimentRepository(session).page(query=query.strip(), state=state, window=window)
+            return Page(items=[_listed(experiment) for experiment in _views(session, found)], total=total)
 
     def rename(self, experiment_id: str, patch: ExperimentPatch) -> Experiment:
         """Give the experiment another name.
@@ -144,6 +152,30 @@ class ExperimentService:
 
     def _publish(self, experiment_id: str, kind: str) -> None:
         self._services.bus.publish(Change.model_validate({"experiment_id": experiment_id, "run_id": None, "kind": kind}))
+
+
+def _listed(experiment: Experiment) -> ListedExperiment:
+    task, algorithm, runs = experiment.training.task, experiment.training.algorithm, experiment.runs
+    left = [run.seconds_left for run in runs if run.seconds_left is not None]
+    return ListedExperiment(
+        id=experiment.id,
+        name=experiment.name,
+        created_at=experiment.created_at,
+        arena=task.arena.name,
+        movers=task.arena.movers.count,
+        robot=task.robot.name,
+        algorithm=algorithm.name,
+        network=algorithm.network.name,
+        reward=task.reward.name,
+        unreadable=experiment.unreadable,
+        state=experiment.state,
+        states=sorted({run.state for run in runs}),
+        runs=len(runs),
+        progress=min(1.0, sum(run.step for run in runs) / max(1, sum(run.total_steps for run in runs))),
+        seconds_left=max(left, default=None),
+        campaign=experiment.campaign,
+        success=experiment.success,
+    )
 
 
 def _views(session: Session, experiments: Sequence[tables.Experiment]) -> list[Experiment]:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy.orm import Session
+
 from server.arenas.references import with_geometry
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.service import CheckpointService
-from server.checkpoints.views import best_checkpoint
 from server.experiments.stored import training_of
 from server.policies.service import find
 from server.runs.repository import RunRepository
@@ -51,12 +52,19 @@ def watched(services: Services, identifier: str) -> Watched:
     with services.database.read() as session:
         run = RunRepository(session).get(identifier)
         training = training_of(run.experiment)
-        kept = CheckpointRepository(session).of_run(identifier) if run.state in FINISHED else []
-        best = best_checkpoint(kept)
+        best = _best(session, identifier) if run.state in FINISHED else None
     task = with_geometry(training, services.arenas).task
     if best is None:
         return Watched(identifier, task, None)
     return Watched(identifier, task, lambda path: CheckpointService(services).download(best).save(path))
+
+
+def _best(session: Session, run_id: str) -> str | None:
+    """The id of a run's best checkpoint; of its last where none was evaluated, None where there is none."""
+    repository = CheckpointRepository(session)
+    best = repository.best(run_id)
+    last = best[0] if best else repository.last(run_id)
+    return last.id if last else None
 
 
 def _copy(source: Path, target: Path) -> None:

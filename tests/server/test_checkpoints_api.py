@@ -1,6 +1,7 @@
 """Checkpoints over HTTP: listed with what they achieve, the best marked, downloaded, and gone with their experiment."""
 
 import hashlib
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -15,7 +16,7 @@ def test_checkpoints_are_listed_with_what_they_achieve(client: TestClient, repor
     reports.checkpoint(run, 2_000, None)
     reports.checkpoint(run, 1_000, reports.evaluation(arrivals=4, steps=120))
 
-    first, second = client.get(f"/api/runs/{run['id']}/checkpoints").json()
+    second, first = client.get(f"/api/runs/{run['id']}/checkpoints").json()["items"]
 
     assert (first["step"], second["step"]) == (1_000, 2_000)
     assert second["evaluation"] is None
@@ -42,10 +43,40 @@ def test_the_best_arrives_most_often_and_of_equal_ones_soonest(client: TestClien
     reports.checkpoint(run, 4_000, reports.evaluation(arrivals=0))
     reports.checkpoint(run, 5_000, None)
 
-    checkpoints = client.get(f"/api/runs/{run['id']}/checkpoints").json()
+    page = client.get(f"/api/runs/{run['id']}/checkpoints").json()
 
-    assert [checkpoint["step"] for checkpoint in checkpoints if checkpoint["best"]] == [3_000]
-    assert checkpoints[3]["evaluation"]["steps_mean"] is None
+    assert [checkpoint["step"] for checkpoint in page["items"] if checkpoint["best"]] == [3_000]
+    assert (page["best"]["step"], page["best"]["best"]) == (3_000, True)
+    assert page["items"][1]["evaluation"]["steps_mean"] is None
+
+
+def test_of_policies_that_never_arrive_the_newest_is_best(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment()["runs"][0]
+    for step in (1_000, 2_000):
+        reports.checkpoint(run, step, reports.evaluation(arrivals=0))
+    assert client.get(f"/api/runs/{run['id']}/checkpoints").json()["best"]["step"] == 2_000
+
+
+def test_many_checkpoints_come_in_pages_and_the_best_with_each(client: TestClient, reports: Reports) -> None:
+    run = reports.experiment()["runs"][0]
+    for step in range(1, 61):
+        reports.checkpoint(run, step, reports.evaluation(arrivals=10 if step == 7 else 5))
+
+    def page(**parameters: int) -> dict[str, Any]:
+        response = client.get(f"/api/runs/{run['id']}/checkpoints", params=parameters)
+        assert response.status_code == 200, response.text
+        answer: dict[str, Any] = response.json()
+        assert answer["best"]["step"] == 7
+        return answer
+
+    assert [one["step"] for one in page()["items"]] == list(range(60, 10, -1))
+    assert [one["step"] for one in page(limit=4, offset=52)["items"]] == [8, 7, 6, 5]
+    assert page(limit=4, offset=100)["items"] == []
+    assert page(limit=1)["total"] == 60
+    # The one in a page's address may lie on any page.
+    assert [(one["step"], one["best"]) for one in page(step=7)["items"]] == [(7, True)]
+    assert (page(step=99)["items"], page(step=99)["total"]) == ([], 0)
+    assert client.get(f"/api/runs/{run['id']}/checkpoints", params={"limit": 201}).status_code == 422
 
 
 def test_the_success_of_an_experiment_is_that_of_its_last_checkpoints(client: TestClient, reports: Reports) -> None:

@@ -17,6 +17,7 @@ from server.database.tables import RunState
 from server.events.bus import EventBus
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
+from server.paging import Window
 from server.services import Services
 from tests.server.harness import Reports
 from workers.config import TrainingConfig
@@ -150,6 +151,23 @@ def test_the_list_is_searched_filtered_and_paged(client: TestClient, reports: Re
     assert client.get("/api/experiments", params={"state": "queued", "limit": 1}).json()["total"] == 3
 
 
+def test_the_list_says_in_short_what_is_trained_and_how_far_it_is(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("Two", seeds=(0, 1, 2), steps=10_000)
+    first, second, _ = experiment["runs"]
+    reports.state(first, "completed", step=10_240)
+    reports.state(second, "running", step=4_760)
+    reports.metrics(second, "time/steps_per_second", {4_760: 524.0})
+
+    (listed,) = client.get("/api/experiments").json()["items"]
+
+    assert (listed["arena"], listed["movers"], listed["robot"]) == ("simple", 0, "burger")
+    assert (listed["algorithm"], listed["network"], listed["reward"]) == ("ppo", "mlp", "basic")
+    assert (listed["state"], listed["states"], listed["runs"]) == ("running", ["completed", "queued", "running"], 3)
+    assert (listed["progress"], listed["seconds_left"]) == (0.5, 10.0)
+    # A thousand configurations would be megabytes.
+    assert len(json.dumps(listed)) < 600
+
+
 @pytest.mark.parametrize("parameters", [{"limit": 0}, {"limit": 201}, {"offset": -1}, {"state": "happy"}])
 def test_a_page_that_cannot_be_is_refused(client: TestClient, parameters: dict[str, Any]) -> None:
     assert client.get("/api/experiments", params=parameters).status_code == 422
@@ -188,7 +206,7 @@ def test_the_filter_in_sql_agrees_with_the_state_that_is_shown(module_database: 
         session.flush()
         shown = aggregate_state(states)
         for state in ("queued", "running", "stopping", "stopped", "completed", "failed", "mixed"):
-            _, total = ExperimentRepository(session).page(query="", state=state, limit=1, offset=0)
+            _, total = ExperimentRepository(session).page(query="", state=state, window=Window(1, 0))
             assert total == (state == shown)
         session.rollback()
 

@@ -246,7 +246,7 @@ def test_without_a_checkpoint_everything_is_dropped(worker: TestClient, run_id: 
 def test_a_checkpoint_never_comes_ahead_of_its_metrics(client: TestClient, worker: TestClient, run_id: str) -> None:
     claim(worker, run_id)
     assert upload(worker, run_id, 200, attempt=1, after_seq=2) == 425
-    assert client.get(f"/api/runs/{run_id}/checkpoints").json() == []
+    assert client.get(f"/api/runs/{run_id}/checkpoints").json()["items"] == []
 
 
 def test_a_checkpoint_that_comes_twice_is_registered_once(
@@ -254,7 +254,7 @@ def test_a_checkpoint_that_comes_twice_is_registered_once(
 ) -> None:
     claim(worker, run_id)
     assert [upload(worker, run_id, 200, attempt=1) for _ in range(2)] == [204, 204]
-    (checkpoint,) = client.get(f"/api/runs/{run_id}/checkpoints").json()
+    (checkpoint,) = client.get(f"/api/runs/{run_id}/checkpoints").json()["items"]
     assert checkpoint["step"] == 200
     assert (checkpoint["evaluation"]["episodes"], checkpoint["evaluation"]["arrivals"]) == (4, 2)
     assert services.files.ids() == {checkpoint["id"]}

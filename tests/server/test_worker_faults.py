@@ -178,7 +178,7 @@ def test_a_damaged_newest_checkpoint_is_marked_and_the_run_goes_on_from_the_one_
     run = state(client, run_id)
     assert (run["state"], run["error"], run["step"]) == ("queued", None, 200)
     assert steps_of(services, run_id) == [100, 200]  # at once, not at the next claim: nobody sees a curve without its policy
-    listed = {entry["step"]: entry["damaged"] for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()}
+    listed = {entry["step"]: entry["damaged"] for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()["items"]}
     assert listed == {200: False, 400: True}
     assert "The checkpoint of step 400 is damaged (its SHA-256 is another): the run goes on from step 200." in events(
         client, run_id
@@ -190,8 +190,8 @@ def test_a_damaged_newest_checkpoint_is_marked_and_the_run_goes_on_from_the_one_
     assert again.checkpoint.id == two_checkpoints[0]
     # What is trained once more is stored once more, beside the damaged one.
     assert upload(worker, run_id, 400, attempt=3) == 204
-    both = [(entry["step"], entry["damaged"]) for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()]
-    assert both == [(200, False), (400, True), (400, False)]
+    both = [(entry["step"], entry["damaged"]) for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()["items"]]
+    assert both == [(400, False), (400, True), (200, False)]
 
 
 def test_where_every_checkpoint_is_damaged_or_gone_the_run_begins_anew(
@@ -213,7 +213,7 @@ def test_an_archive_that_was_damaged_before_it_was_brought_here_is_found_out(
     assert upload(worker, run_id, 200, attempt=1) == 204  # its SHA-256 agrees, and it is no archive
     end(worker, run_id, 1, "released")
     report_damage(worker, run_id, 2)
-    assert [entry["damaged"] for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()] == [True]
+    assert [entry["damaged"] for entry in client.get(f"/api/runs/{run_id}/checkpoints").json()["items"]] == [True]
 
 
 def test_a_worker_that_cannot_read_a_whole_checkpoint_loses_the_attempt_and_the_checkpoint_stays(

@@ -130,7 +130,9 @@ class Service:
         return series["series"][0]["steps"] if series["series"] else []
 
     def checkpoints(self, run_id: str) -> list[int]:
-        return [checkpoint["step"] for checkpoint in self.api.get(f"/api/runs/{run_id}/checkpoints").json()]
+        return [
+            checkpoint["step"] for checkpoint in reversed(self.api.get(f"/api/runs/{run_id}/checkpoints").json()["items"])
+        ]
 
     def events(self, run_id: str) -> list[str]:
         return [event["message"] for event in self.api.get(f"/api/runs/{run_id}/events").json()]

@@ -15,7 +15,7 @@ STEPS, SAVE_EVERY = 24 * ROLLOUT, 4 * ROLLOUT
 
 def final_state(service: Service, run_id: str, directory: Path) -> dict[str, bytes]:
     """Weights, optimiser, random states and environment of the run's last checkpoint."""
-    last = service.api.get(f"/api/runs/{run_id}/checkpoints").json()[-1]
+    last = service.api.get(f"/api/runs/{run_id}/checkpoints").json()["items"][0]
     assert last["step"] == STEPS
     path = directory / f"{run_id}.zip"
     response: httpx.Response = service.api.get(f"/api/checkpoints/{last['id']}/download")

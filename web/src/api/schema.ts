@@ -262,7 +262,7 @@ export interface paths {
         };
         /**
          * List Experiments
-         * @description Experiments, the newest first.
+         * @description Experiments, the newest first, in short.
          */
         get: operations["list_experiments_api_experiments_get"];
         put?: never;
@@ -622,7 +622,7 @@ export interface paths {
         };
         /**
          * List Checkpoints
-         * @description The run's checkpoints by step.
+         * @description The run's checkpoints, the newest first.
          */
         get: operations["list_checkpoints_api_runs__run_id__checkpoints_get"];
         put?: never;
@@ -1311,6 +1311,21 @@ export interface components {
             step: number;
         };
         /**
+         * CheckpointPage
+         * @description Some of a run's checkpoints, the newest first.
+         */
+        CheckpointPage: {
+            /** @description The best of all of them; null before the first evaluation. */
+            best: components["schemas"]["Checkpoint"] | null;
+            /** Items */
+            items: components["schemas"]["Checkpoint"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
          * Circle
          * @description A round obstacle.
          */
@@ -1928,19 +1943,6 @@ export interface components {
             seeds: components["schemas"]["SeedCurve"][];
         };
         /**
-         * ExperimentPage
-         * @description Some of the experiments, the newest first.
-         */
-        ExperimentPage: {
-            /** Items */
-            items: components["schemas"]["Experiment"][];
-            /**
-             * Total
-             * @description How many there are on all pages.
-             */
-            total: number;
-        };
-        /**
          * ExperimentPatch
          * @description What may be changed after launch.
          */
@@ -2258,6 +2260,67 @@ export interface components {
             rays: number;
         };
         /**
+         * ListedExperiment
+         * @description An experiment as a list shows it: without its whole configuration and its runs.
+         */
+        ListedExperiment: {
+            /** Algorithm */
+            algorithm: string;
+            /** Arena */
+            arena: string;
+            /**
+             * Campaign
+             * @description Of the paper's reproduction that it was launched by; null for all others.
+             */
+            campaign: string | null;
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /**
+             * Movers
+             * @description Moving obstacles.
+             */
+            movers: number;
+            /** Name */
+            name: string;
+            /** Network */
+            network: string;
+            /**
+             * Progress
+             * @description Steps done by all runs over the steps that they were given, 0 to 1.
+             */
+            progress: number;
+            /** Reward */
+            reward: string;
+            /** Robot */
+            robot: string;
+            /** Runs */
+            runs: number;
+            /**
+             * Seconds Left
+             * @description Until its slowest running run is through; null where that is not known.
+             */
+            seconds_left: number | null;
+            /**
+             * State
+             * @description Of its runs together; mixed where they ended differently.
+             */
+            state: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed";
+            /**
+             * States
+             * @description That its runs are in, each once.
+             */
+            states: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed")[];
+            /** @description Success rate of its runs' last evaluated checkpoints; null before the first evaluation. */
+            success: components["schemas"]["Estimate"] | null;
+            /**
+             * Unreadable
+             * @description Settings that another version stored and this one can't read, dotted: the defaults are shown in their place.
+             */
+            unreadable: string[];
+        };
+        /**
          * LiveSettings
          * @description What the live view of a run shows; one setting per run, shared by everyone who watches it.
          */
@@ -2516,6 +2579,16 @@ export interface components {
              * @default 0
              */
             heading_noise: number;
+        };
+        /** Page[ListedExperiment] */
+        Page_ListedExperiment_: {
+            /** Items */
+            items: components["schemas"]["ListedExperiment"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
         };
         /**
          * PaperFigure
@@ -5238,7 +5311,9 @@ export interface operations {
     list_experiments_api_experiments_get: {
         parameters: {
             query?: {
+                /** @description Items at most. */
                 limit?: number;
+                /** @description Items to leave out before them. */
                 offset?: number;
                 /** @description Part of the name, in any case. */
                 query?: string;
@@ -5256,7 +5331,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ExperimentPage"];
+                    "application/json": components["schemas"]["Page_ListedExperiment_"];
                 };
             };
             /** @description No valid login */
@@ -6365,7 +6440,14 @@ export interface operations {
     };
     list_checkpoints_api_runs__run_id__checkpoints_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+                /** @description Only that of this step. */
+                step?: number | null;
+            };
             header?: never;
             path: {
                 run_id: string;
@@ -6380,7 +6462,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Checkpoint"][];
+                    "application/json": components["schemas"]["CheckpointPage"];
                 };
             };
             /** @description No valid login */

@@ -45,12 +45,12 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {[...checkpoints].reverse().map((checkpoint) => (
+          {checkpoints.map((checkpoint) => (
             <Table.Tr
               key={checkpoint.id}
               data-testid="checkpoint"
               data-best={checkpoint.best || undefined}
-              data-ticked={checkpoint === chosen || undefined}
+              data-ticked={checkpoint.id === chosen?.id || undefined}
             >
               <Table.Td ta="right" fw={550} className={ui.number}>
                 {count(checkpoint.step)}
@@ -104,7 +104,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                       size="compact-sm"
                       variant="default"
                       aria-label={`Episodes of step ${checkpoint.step}`}
-                      aria-pressed={checkpoint === chosen}
+                      aria-pressed={checkpoint.id === chosen?.id}
                       onClick={() => onChoose(checkpoint)}
                     >
                       Episodes

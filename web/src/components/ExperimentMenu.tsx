@@ -4,28 +4,44 @@ import { useDisclosure } from '@mantine/hooks'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useActions } from '../api/actions'
-import type { Experiment } from '../api/types'
+import type { ListedExperiment } from '../api/types'
 import { plural } from '../lib/format'
 import { DeleteDialog } from './DeleteDialog'
 import { IconCopy, IconDots, IconPencil, IconPlayerPlay, IconPlayerStop, IconTrash } from './icons'
 import { canResume, canStop } from './states'
 
 interface ExperimentMenuProps {
-  experiment: Experiment
+  experiment: Pick<ListedExperiment, 'id' | 'name' | 'states' | 'runs'>
   /** Called once the experiment is gone. */
   onDeleted?: () => void
 }
 
-export function ExperimentMenu({ experiment, onDeleted }: ExperimentMenuProps) {
-  const { id, name } = experiment
+/** A button until it is pressed for the first time: a list has many, and hardly any is ever opened. */
+export function ExperimentMenu(props: ExperimentMenuProps) {
+  const [used, setUsed] = useState(false)
+  if (used) return <OpenedMenu {...props} />
+  return (
+    <ActionIcon
+      variant="subtle"
+      color="gray"
+      aria-haspopup="menu"
+      aria-label={`Actions for ${props.experiment.name}`}
+      onClick={() => setUsed(true)}
+    >
+      <IconDots size={18} stroke={1.6} />
+    </ActionIcon>
+  )
+}
+
+function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
+  const { id, name, states } = experiment
   const actions = useActions()
   const [renaming, rename] = useDisclosure()
   const [deleting, remove] = useDisclosure()
-  const states = experiment.runs.map((run) => run.state)
   const of = { params: { path: { experiment_id: id } } }
   return (
     <>
-      <Menu>
+      <Menu defaultOpened>
         <Menu.Target>
           <ActionIcon variant="subtle" color="gray" aria-label={`Actions for ${name}`}>
             <IconDots size={18} stroke={1.6} />
@@ -82,8 +98,8 @@ export function ExperimentMenu({ experiment, onDeleted }: ExperimentMenuProps) {
           })
         }
       >
-        Its {plural(experiment.runs.length, 'run')}, curves and checkpoints are removed for good. Runs that
-        are going on are ended.
+        Its {plural(experiment.runs, 'run')}, curves and checkpoints are removed for good. Runs that are going
+        on are ended.
       </DeleteDialog>
     </>
   )

@@ -1,8 +1,8 @@
 /** Experiments as rows; ticking some chooses them for comparison. */
 import { Anchor, Checkbox, Table, Text } from '@mantine/core'
 import { Link } from 'react-router'
-import type { Experiment } from '../api/types'
-import { algorithmOf, progressOf, secondsLeftOf, summaryOf } from '../lib/experiments'
+import type { ListedExperiment } from '../api/types'
+import { algorithmOf, summaryOf } from '../lib/experiments'
 import { age, dateTime, duration, percent, words } from '../lib/format'
 import { useNow } from '../lib/hooks'
 import { ExperimentMenu } from './ExperimentMenu'
@@ -13,7 +13,7 @@ import ui from './ui.module.css'
 
 interface ExperimentTableProps {
   /** Undefined while they are being loaded. */
-  experiments: readonly Experiment[] | undefined
+  experiments: readonly ListedExperiment[] | undefined
   ticked: readonly string[]
   onTick: (ids: readonly string[]) => void
   /** Without the menu: a picker. */
@@ -36,7 +36,13 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
                 disabled={ids.length === 0}
                 checked={ids.length > 0 && tickedHere.length === ids.length}
                 indeterminate={tickedHere.length > 0 && tickedHere.length < ids.length}
-                onChange={(event) => onTick(event.currentTarget.checked ? ids : [])}
+                onChange={(event) =>
+                  onTick(
+                    event.currentTarget.checked
+                      ? [...new Set([...ticked, ...ids])]
+                      : ticked.filter((id) => !ids.includes(id)),
+                  )
+                }
               />
             </Table.Th>
             <Table.Th>Name</Table.Th>
@@ -89,7 +95,7 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
                   {experiment.name}
                 </Anchor>
                 <Text hiddenFrom="md" size="xs" component="div" c="dimmed" fw={400} mt={2}>
-                  {summaryOf(experiment.training)}
+                  {summaryOf(experiment)}
                   {experiment.success && (
                     <div>
                       <SuccessEstimate estimate={experiment.success} />
@@ -101,11 +107,11 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
                 <Progress experiment={experiment} />
               </Table.Td>
               <Table.Td visibleFrom="md" ta="right" className={ui.number}>
-                {experiment.runs.length}
+                {experiment.runs}
               </Table.Td>
-              <Table.Td visibleFrom="md">{words(experiment.training.task.arena.name)}</Table.Td>
-              <Table.Td visibleFrom="md">{algorithmOf(experiment.training)}</Table.Td>
-              <Table.Td visibleFrom="md">{words(experiment.training.task.reward.name)}</Table.Td>
+              <Table.Td visibleFrom="md">{words(experiment.arena)}</Table.Td>
+              <Table.Td visibleFrom="md">{algorithmOf(experiment)}</Table.Td>
+              <Table.Td visibleFrom="md">{words(experiment.reward)}</Table.Td>
               <Table.Td visibleFrom="md">
                 <SuccessEstimate estimate={experiment.success} />
               </Table.Td>
@@ -133,10 +139,8 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
   )
 }
 
-function Progress({ experiment }: { experiment: Experiment }) {
-  const { state } = experiment
-  const progress = progressOf(experiment)
-  const left = secondsLeftOf(experiment)
+function Progress({ experiment }: { experiment: ListedExperiment }) {
+  const { state, progress, seconds_left: left } = experiment
   return (
     <div className={classes.progress}>
       <div>

@@ -1,6 +1,6 @@
 import { screen, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { comparison, curves, experiment, form } from '../testing/examples'
+import { comparison, curves, form, listed } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, startServer } from '../testing/server'
 
@@ -10,7 +10,7 @@ const routes = {
   'GET /api/compare': comparison,
   'GET /api/compare/curves': curves,
   'GET /api/training/form': form,
-  'GET /api/experiments': { items: [experiment], total: 1 },
+  'GET /api/experiments': { items: [listed], total: 1 },
 }
 
 test('figures with intervals and N, warnings, curves, and what differs', async () => {

@@ -8,12 +8,13 @@ import type { Comparison, Estimate } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
 import { settingText } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
-import { ExperimentTable } from '../components/ExperimentTable'
+import { ExperimentList } from '../components/ExperimentList'
 import table from '../components/ExperimentTable.module.css'
 import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
+import { MAX_COMPARED } from '../lib/comparison'
 import { count, percent, percentRange, plural, significant } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -22,7 +23,16 @@ export function ComparePage() {
   const [search, setSearch] = useSearchParams()
   const chosen = search.getAll('experiment')
   const [picking, setPicking] = useState(false)
-  const choose = (ids: readonly string[]) => setSearch({ experiment: [...ids] }, { replace: true })
+  const choose = (ids: readonly string[]) =>
+    setSearch(
+      (before) => {
+        const after = new URLSearchParams(before)
+        after.delete('experiment')
+        for (const id of ids) after.append('experiment', id)
+        return after
+      },
+      { replace: true },
+    )
   if (chosen.length === 0 || picking) {
     return (
       <Picker
@@ -44,9 +54,7 @@ interface PickerProps {
 }
 
 function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
-  const { data, error, refetch } = $api.useQuery('get', '/api/experiments', {
-    params: { query: { limit: 200 } },
-  })
+  const tooMany = chosen.length > MAX_COMPARED
   return (
     <Page
       title="Compare"
@@ -56,15 +64,23 @@ function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
         </Text>
       }
       actions={
-        <Button disabled={chosen.length === 0} onClick={onDone}>
+        <Button
+          disabled={chosen.length === 0 || tooMany}
+          title={tooMany ? `At most ${MAX_COMPARED} can be laid side by side` : undefined}
+          onClick={onDone}
+        >
           {chosen.length === 0 ? 'Compare' : `Compare ${chosen.length}`}
         </Button>
       }
     >
-      <Panel flush>
-        {error && !data ? (
-          <QueryError error={error} what="list of trainings" retry={refetch} />
-        ) : data?.items.length === 0 ? (
+      <ExperimentList
+        ticked={chosen}
+        menu={false}
+        onTick={(ids) => {
+          onStart()
+          onChoose(ids)
+        }}
+        empty={
           <Message
             title="Nothing to compare yet"
             actions={
@@ -75,18 +91,8 @@ function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
           >
             Launch two trainings that differ in one setting, each with five seeds.
           </Message>
-        ) : (
-          <ExperimentTable
-            experiments={data?.items}
-            ticked={chosen}
-            menu={false}
-            onTick={(ids) => {
-              onStart()
-              onChoose(ids)
-            }}
-          />
-        )}
-      </Panel>
+        }
+      />
     </Page>
   )
 }

@@ -14,7 +14,7 @@ import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Page, Panel, QueryError, StateLabel, SuccessEstimate } from '../components/ui'
-import { summaryOf } from '../lib/experiments'
+import { inShort, summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -70,7 +70,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
             <StateLabel state={experiment.state} />
           </Text>
           <Text size="sm" c="dimmed">
-            {summaryOf(experiment.training)}
+            {summaryOf(inShort(experiment.training))}
           </Text>
           <Text size="sm" c="dimmed">
             launched {dateTime(experiment.created_at)}
@@ -120,7 +120,10 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
           >
             Compare
           </Button>
-          <ExperimentMenu experiment={experiment} onDeleted={() => navigate('/')} />
+          <ExperimentMenu
+            experiment={{ ...experiment, states, runs: experiment.runs.length }}
+            onDeleted={() => navigate('/')}
+          />
         </Group>
       }
     >

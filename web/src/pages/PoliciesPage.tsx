@@ -8,7 +8,7 @@ import { IconPlayerPlay } from '../components/icons'
 import { PolicyActions } from '../components/PolicyActions'
 import { Page, Panel, QueryError, SuccessEstimate } from '../components/ui'
 import ui from '../components/ui.module.css'
-import { summaryOf } from '../lib/experiments'
+import { inShort, summaryOf } from '../lib/experiments'
 import { percent } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import classes from './PoliciesPage.module.css'
@@ -54,7 +54,7 @@ function PolicyCard({ policy }: { policy: ReferencePolicy }) {
           <Link to={page}>{policy.title}</Link>
         </h2>
         <Text size="xs" c="dimmed">
-          {summaryOf(policy.training)}
+          {summaryOf(inShort(policy.training))}
         </Text>
         <Text size="sm">{policy.description}</Text>
       </div>

@@ -9,7 +9,7 @@ import { PolicyActions } from '../components/PolicyActions'
 import { PolicyEpisodes } from '../components/PolicyEpisodes'
 import { PolicyResults } from '../components/PolicyResults'
 import { Page, Panel, QueryError } from '../components/ui'
-import { summaryOf } from '../lib/experiments'
+import { inShort, summaryOf } from '../lib/experiments'
 import { count } from '../lib/format'
 import { useNumberInAddress, useTitle } from '../lib/hooks'
 import classes from './PolicyPage.module.css'
@@ -67,7 +67,7 @@ function LoadedPolicy({ policy }: { policy: ReferencePolicy }) {
               <div>
                 <dt>Training</dt>
                 <dd>
-                  {summaryOf(policy.training)}, seed {policy.seed}
+                  {summaryOf(inShort(policy.training))}, seed {policy.seed}
                 </dd>
               </div>
               <div>

@@ -1,6 +1,16 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { checkpoints, episodes, experiment, live, NOW, replay, runDetail, status } from '../testing/examples'
+import {
+  checkpoints,
+  episodes,
+  experiment,
+  live,
+  NOW,
+  noCheckpoints,
+  replay,
+  runDetail,
+  status,
+} from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -59,6 +69,37 @@ test('its policies, the newest first, the best marked, each to take away', async
   expect(rows[0]).toHaveTextContent('Best')
   expect(rows[0]).toHaveTextContent(/88\.5\s%\s*83\.3–92\.2\s%\s*N = 200/)
   expect(rows[1]).not.toHaveTextContent('Best')
+})
+
+test('two thousand policies come a page at a time, and the one in the address from whichever page', async () => {
+  const pageAt = (offset: number) => ({
+    items: Array.from({ length: 25 }, (_, index) => ({
+      ...checkpoints.items[0],
+      id: `cp${offset + index}`,
+      step: 2_000_000 - 1_000 * (offset + index),
+      best: false,
+    })),
+    total: 2_000,
+    best: checkpoints.best,
+  })
+  const server = startServer({
+    ...routes,
+    'GET /api/runs/run1/checkpoints': (request: Request) => {
+      const query = new URL(request.url).searchParams
+      return query.has('step')
+        ? { ...pageAt(1_500), items: pageAt(1_500).items.slice(0, 1), total: 1 }
+        : pageAt(Number(query.get('offset')))
+    },
+    'GET /api/checkpoints/cp1500/episodes': episodes,
+  })
+  const { user } = open('/runs/run1?step=500000')
+  expect(await screen.findAllByTestId('checkpoint')).toHaveLength(25)
+  expect(await screen.findByText(/Episodes of step 500\s000/)).toBeInTheDocument()
+  expect(screen.getByText(/1–25 of 2\s000/)).toBeInTheDocument()
+  await user.click(screen.getByRole('button', { name: 'Next page' }))
+  expect(await screen.findByText(/26–50 of 2\s000/)).toBeInTheDocument()
+  await waitFor(() => expect(server.asked.some((path) => path.includes('offset=25'))).toBe(true))
+  await waitFor(() => expect(screen.getAllByTestId('checkpoint')[0]).toHaveTextContent(/1\s975\s000/))
 })
 
 test('the episodes behind its best policy, failures first, by outcome', async () => {
@@ -204,14 +245,14 @@ test('a choice about the view shows at once and is sent with the others', async 
 
 test.each([
   ['queued', checkpoints, 'Waiting for a free worker'],
-  ['completed', [], 'ended before it kept a policy'],
-  ['stopped', [], 'ended before it kept a policy'],
-  ['failed', [], 'failed before it kept a policy'],
+  ['completed', noCheckpoints, 'ended before it kept a policy'],
+  ['stopped', noCheckpoints, 'ended before it kept a policy'],
+  ['failed', noCheckpoints, 'failed before it kept a policy'],
 ] as const)('a %s run has no robots to show, and says so', async (state, kept, text) => {
   startServer({
     ...routes,
     'GET /api/runs/run1': { ...runDetail, state },
-    'GET /api/runs/run1/checkpoints': [...kept],
+    'GET /api/runs/run1/checkpoints': kept,
   })
   open('/runs/run1')
   expect(await screen.findByTestId('live-overlay')).toHaveTextContent(text)

@@ -1,12 +1,12 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
 import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useMemo, useRef } from 'react'
+import { useMemo, useRef, useState } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
 import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
-import type { Checkpoint, RunDetail, Series } from '../api/types'
+import type { Checkpoint, CheckpointPage, RunDetail, Series } from '../api/types'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
@@ -18,15 +18,17 @@ import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunLiveView } from '../components/LiveView'
+import { Pager } from '../components/Pager'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
-import { summaryOf } from '../lib/experiments'
+import { inShort, summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
 import { useNumberInAddress, useTitle } from '../lib/hooks'
 import classes from './RunPage.module.css'
 
 const POINTS = 600
+const CHECKPOINTS_A_PAGE = 25
 
 export function RunPage() {
   const { runId = '' } = useParams()
@@ -63,12 +65,23 @@ function LoadedRun({ run }: { run: RunDetail }) {
     { params: { ...init.params, query: { points: POINTS } } },
     { placeholderData: keepPreviousData },
   )
-  const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', init)
+  const [page, setPage] = useState(1)
+  const checkpoints = $api.useQuery(
+    'get',
+    '/api/runs/{run_id}/checkpoints',
+    {
+      params: {
+        ...init.params,
+        query: { limit: CHECKPOINTS_A_PAGE, offset: (page - 1) * CHECKPOINTS_A_PAGE },
+      },
+    },
+    { placeholderData: keepPreviousData },
+  )
   const events = $api.useQuery('get', '/api/runs/{run_id}/events', init)
   const [step, setStep] = useNumberInAddress('step')
   const [episode] = useNumberInAddress('episode')
   const episodes = useRef<HTMLDivElement>(null)
-  const chosen = chosenOf(checkpoints.data ?? [], step)
+  const chosen = useChosen(run.id, checkpoints.data, step)
   const choose = (checkpoint: Checkpoint) => {
     setStep(checkpoint.step)
     episodes.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
@@ -93,7 +106,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       below={
         <Text size="sm" c="dimmed" mt={4}>
-          {summaryOf(run.training)}
+          {summaryOf(inShort(run.training))}
         </Text>
       }
       actions={<RunActions run={run} />}
@@ -114,7 +127,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             <RunLiveView
               runId={run.id}
               state={run.state}
-              kept={checkpoints.data && checkpoints.data.length > 0}
+              kept={checkpoints.data && checkpoints.data.total > 0}
               covered={episode !== null && chosen?.evaluation != null}
             />
           </Panel>
@@ -128,7 +141,16 @@ function LoadedRun({ run }: { run: RunDetail }) {
         </div>
         <Panel title="Checkpoints" flush>
           {checkpoints.data ? (
-            <CheckpointTable checkpoints={checkpoints.data} chosen={chosen} onChoose={choose} />
+            <>
+              <CheckpointTable checkpoints={checkpoints.data.items} chosen={chosen} onChoose={choose} />
+              <Pager
+                page={page}
+                size={CHECKPOINTS_A_PAGE}
+                total={checkpoints.data.total}
+                label="Pages of checkpoints"
+                onChange={setPage}
+              />
+            </>
           ) : checkpoints.error ? (
             <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
           ) : (
@@ -176,12 +198,21 @@ function LoadedRun({ run }: { run: RunDetail }) {
   )
 }
 
-/** The checkpoint in the address, else the best one. */
-function chosenOf(checkpoints: readonly Checkpoint[], step: number | null): Checkpoint | undefined {
-  return (
-    checkpoints.find((checkpoint) => checkpoint.step === step && checkpoint.evaluation) ??
-    checkpoints.find((checkpoint) => checkpoint.best)
+/** The checkpoint in the address, on whichever page of the list it stands, else the best one. */
+function useChosen(
+  runId: string,
+  shown: CheckpointPage | undefined,
+  step: number | null,
+): Checkpoint | undefined {
+  const here = shown?.items.find((checkpoint) => checkpoint.step === step)
+  const elsewhere = $api.useQuery(
+    'get',
+    '/api/runs/{run_id}/checkpoints',
+    { params: { path: { run_id: runId }, query: { step: step ?? 0, limit: 1 } } },
+    { enabled: shown !== undefined && step !== null && here === undefined },
   )
+  const wanted = step === null ? undefined : (here ?? elsewhere.data?.items[0])
+  return wanted?.evaluation ? wanted : (shown?.best ?? undefined)
 }
 
 interface SpecChartProps {
@@ -234,7 +265,16 @@ function RunActions({ run }: { run: RunDetail }) {
       >
         Duplicate
       </Button>
-      {experiment.data && <ExperimentMenu experiment={experiment.data} onDeleted={() => navigate('/')} />}
+      {experiment.data && (
+        <ExperimentMenu
+          experiment={{
+            ...experiment.data,
+            states: experiment.data.runs.map(({ state }) => state),
+            runs: experiment.data.runs.length,
+          }}
+          onDeleted={() => navigate('/')}
+        />
+      )}
     </Group>
   )
 }

@@ -1,22 +1,21 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { experiment, status } from '../testing/examples'
+import { experiment, listed, status } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
 vi.stubGlobal('EventSource', FakeEventSource)
 
-const movers = { count: 4, kind: 'pedestrian' as const, speed: 1, radius: 0.25 }
-const task = { ...experiment.training.task, arena: { name: 'complex' as const, movers } }
 const other = {
-  ...experiment,
+  ...listed,
   id: 'exp2',
   name: 'Maze',
   state: 'failed' as const,
   success: null,
-  training: { ...experiment.training, task },
+  arena: 'complex',
+  movers: 4,
 }
-const two = { items: [experiment, other], total: 2 }
+const two = { items: [listed, other], total: 2 }
 
 test('each training with its state, what it trains, and its success with interval and N', async () => {
   startServer({ 'GET /api/experiments': two })
@@ -50,6 +49,39 @@ test('ticked trainings are compared', async () => {
   await user.click(screen.getByRole('button', { name: 'Compare 2' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/compare'))
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
+})
+
+test('a thousand trainings come in pages, and what was ticked on one stays ticked on the next', async () => {
+  const named = (index: number) => ({ ...listed, id: `exp${index}`, name: `Training ${index}` })
+  startServer({
+    'GET /api/experiments': (request: Request) => {
+      const offset = Number(new URL(request.url).searchParams.get('offset'))
+      return { items: Array.from({ length: 50 }, (_, index) => named(offset + index)), total: 1_030 }
+    },
+  })
+  const { router, user } = open('/')
+  await user.click(await screen.findByRole('checkbox', { name: 'Tick Training 0' }))
+  await user.click(screen.getByRole('button', { name: 'Next page' }))
+  await user.click(await screen.findByRole('checkbox', { name: 'Tick Training 50' }))
+  expect(router.state.location.search).toBe('?page=2')
+  expect(screen.getByText(/51–100 of 1\s030/)).toBeInTheDocument()
+  await user.click(screen.getByRole('button', { name: 'Compare 2' }))
+  await waitFor(() => expect(router.state.location.search).toBe('?experiment=exp0&experiment=exp50'))
+})
+
+test('more than fifty are not compared, and the button says why', async () => {
+  const items = Array.from({ length: 51 }, (_, index) => ({
+    ...listed,
+    id: `exp${index}`,
+    name: `T${index}`,
+  }))
+  startServer({ 'GET /api/experiments': { items, total: 51 } })
+  const { user } = open('/')
+  await screen.findAllByTestId('experiment')
+  await user.click(screen.getByRole('checkbox', { name: 'Tick all' }))
+  const button = screen.getByRole('button', { name: 'Compare 51' })
+  expect(button).toBeDisabled()
+  expect(button).toHaveAttribute('title', 'At most 50 can be laid side by side')
 })
 
 test('the search is the server’s', async () => {

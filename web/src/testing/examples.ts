@@ -2,10 +2,12 @@
 import type { components } from '../api/schema'
 import type {
   Checkpoint,
+  CheckpointPage,
   Comparison,
   Curves,
   Episodes,
   Experiment,
+  ListedExperiment,
   LiveState,
   ReferencePolicy,
   Replay,
@@ -84,6 +86,27 @@ export const experiment: Experiment = {
   success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
 }
 
+/** The same in short. */
+export const listed: ListedExperiment = {
+  id: experiment.id,
+  name: experiment.name,
+  created_at: experiment.created_at,
+  arena: 'simple',
+  movers: 0,
+  robot: 'burger',
+  algorithm: 'ppo',
+  network: 'mlp',
+  reward: 'basic',
+  unreadable: [],
+  state: 'running',
+  states: ['completed', 'running'],
+  runs: 2,
+  progress: 0.7,
+  seconds_left: 12.9,
+  campaign: null,
+  success: experiment.success,
+}
+
 export const runDetail: RunDetail = { ...run, experiment_name: 'Corridor', training, unreadable: [] }
 
 export const live: LiveState = {
@@ -95,36 +118,45 @@ export const live: LiveState = {
   status: { connected: true, receiving: true, watchers: 1 },
 }
 
-export const checkpoints: Checkpoint[] = [
-  {
-    id: 'cp1',
-    step: 50_000,
-    size: 436_112,
-    sha256: 'ab'.repeat(32),
-    created_at: NOW - 40,
-    damaged: false,
-    best: false,
-    evaluation: null,
+const best: Checkpoint = {
+  id: 'cp2',
+  step: 100_000,
+  size: 436_112,
+  sha256: 'cd'.repeat(32),
+  created_at: NOW - 20,
+  damaged: false,
+  best: true,
+  evaluation: {
+    suite: 'simple-200',
+    suite_hash: 'c0ffee',
+    episodes: 200,
+    arrivals: 177,
+    success: { value: 0.885, low: 0.833, high: 0.922, seeds: 1, episodes: 200 },
+    steps_mean: 104.2,
+    reward_mean: 1790,
   },
-  {
-    id: 'cp2',
-    step: 100_000,
-    size: 436_112,
-    sha256: 'cd'.repeat(32),
-    created_at: NOW - 20,
-    damaged: false,
-    best: true,
-    evaluation: {
-      suite: 'simple-200',
-      suite_hash: 'c0ffee',
-      episodes: 200,
-      arrivals: 177,
-      success: { value: 0.885, low: 0.833, high: 0.922, seeds: 1, episodes: 200 },
-      steps_mean: 104.2,
-      reward_mean: 1790,
+}
+
+/** The newest first. */
+export const checkpoints: CheckpointPage = {
+  items: [
+    best,
+    {
+      id: 'cp1',
+      step: 50_000,
+      size: 436_112,
+      sha256: 'ab'.repeat(32),
+      created_at: NOW - 40,
+      damaged: false,
+      best: false,
+      evaluation: null,
     },
-  },
-]
+  ],
+  total: 2,
+  best,
+}
+
+export const noCheckpoints: CheckpointPage = { items: [], total: 0, best: null }
 
 export const episodes: Episodes = {
   checkpoint_id: 'cp2',
