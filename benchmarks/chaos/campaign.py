@@ -201,7 +201,8 @@ class Campaign:
             time.sleep(_POLL_SECONDS)
             rows = self._rows.read(watched)
         before = {key: row for key, row in rows.items() if row.state not in ("completed", "failed")}
-        recoveries = {key: Recovery(row, kind.new_attempt, now) for key, row in before.items()}
+        # Only the run that was hit needs another attempt; the others wait for the service.
+        recoveries = {key: Recovery(row, kind.new_attempt and key == run_id, now) for key, row in before.items()}
         return _Hit(kind, run_id, node, heal, recoveries)
 
     def _settle(self, hits: Sequence["_Hit"]) -> None:

@@ -4,6 +4,7 @@ import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import psycopg
 from benchmarks.backing import Backing
 from benchmarks.chaos.kinds import Kind, Scene
 from benchmarks.chaos.proxy import Proxy
+from benchmarks.chaos.stack import Stack
 from benchmarks.processes import kill, resume, suspend
 
 _AWAY_SECONDS = 2.0
@@ -88,79 +90,83 @@ def _need_broker(scene: Scene) -> None:
 # -- PostgreSQL and Redis ---------------------------------------------------------------------------------------------------
 
 
-def _database(scene: Scene) -> Backing:
-    assert scene.stack.postgres is not None
-    return scene.stack.postgres
+@dataclass(frozen=True)
+class _Part:
+    """The database or the broker: its process, the proxy before it, and what makes somebody need it while it is away."""
+
+    process: Callable[[Stack], Backing | None]
+    proxy: Callable[[Stack], Proxy | None]
+    need: Callable[[Scene], None]
+
+    def _process(self, scene: Scene) -> Backing:
+        process = self.process(scene.stack)
+        assert process is not None
+        return process
+
+    def _proxy(self, scene: Scene) -> Proxy:
+        proxy = self.proxy(scene.stack)
+        assert proxy is not None
+        return proxy
+
+    def kill(self, scene: Scene) -> None:
+        process = self._process(scene)
+        process.kill()
+        self.need(scene)
+        time.sleep(scene.dice.uniform(0.0, _AWAY_SECONDS))
+        process.start()
+
+    def restart(self, scene: Scene) -> None:
+        process = self._process(scene)
+        process.stop()
+        self.need(scene)
+        process.start()
+
+    def stop(self, scene: Scene) -> None:
+        frozen = self._process(scene).members()
+        suspend(frozen)
+        self.need(scene)
+        time.sleep(_AWAY_SECONDS)
+        resume(frozen)
+
+    def cut(self, scene: Scene) -> None:
+        self._proxy(scene).cut()
+        self.need(scene)
+
+    def refuse(self, scene: Scene) -> None:
+        proxy = self._proxy(scene)
+        proxy.refuse()
+        self.need(scene)
+        time.sleep(_AWAY_SECONDS)
+        proxy.open()
+
+    def silence(self, scene: Scene) -> None:
+        proxy = self._proxy(scene)
+        proxy.silence()
+        self.need(scene)
+        time.sleep(1.5 * scene.stack.lease_seconds)
+        proxy.open()
+
+    def kinds(self, name: str, *, new_attempt: bool) -> tuple[Kind, ...]:
+        ways = (
+            ("killed", f"SIGKILL, started again within {_AWAY_SECONDS:g} s", self.kill),
+            ("restarted", "ended in order, started again", self.restart),
+            ("stopped", f"SIGSTOP, SIGCONT {_AWAY_SECONDS:g} s later", self.stop),
+            ("cut", "every connection to it closed", self.cut),
+            ("refused", f"not reached for {_AWAY_SECONDS:g} s", self.refuse),
+            ("silent", "nothing carried for one and a half leases", self.silence),
+        )
+        return tuple(
+            Kind(f"{name} {did}", what, inject, "service", "closed", new_attempt, ("production",))
+            for did, what, inject in ways
+        )
 
 
-def _broker(scene: Scene) -> Backing:
-    assert scene.stack.redis is not None
-    _need_broker(scene)
-    return scene.stack.redis
+def _nothing(_scene: Scene) -> None:
+    """Everything needs the database anyway."""
 
 
-def _database_proxy(scene: Scene) -> Proxy:
-    assert scene.stack.database_proxy is not None
-    return scene.stack.database_proxy
-
-
-def _broker_proxy(scene: Scene) -> Proxy:
-    assert scene.stack.broker_proxy is not None
-    _need_broker(scene)
-    return scene.stack.broker_proxy
-
-
-def _kill_backing(of: Callable[[Scene], Backing], scene: Scene) -> None:
-    backing = of(scene)
-    backing.kill()
-    time.sleep(scene.dice.uniform(0.0, _AWAY_SECONDS))
-    backing.start()
-
-
-def _restart_backing(of: Callable[[Scene], Backing], scene: Scene) -> None:
-    backing = of(scene)
-    backing.stop()
-    backing.start()
-
-
-def _stop_backing(of: Callable[[Scene], Backing], scene: Scene) -> None:
-    frozen = of(scene).members()
-    suspend(frozen)
-    time.sleep(_AWAY_SECONDS)
-    resume(frozen)
-
-
-def _cut_proxy(of: Callable[[Scene], Proxy], scene: Scene) -> None:
-    of(scene).cut()
-
-
-def _refuse_proxy(of: Callable[[Scene], Proxy], scene: Scene) -> None:
-    proxy = of(scene)
-    proxy.refuse()
-    time.sleep(_AWAY_SECONDS)
-    proxy.open()
-
-
-def _silence_proxy(of: Callable[[Scene], Proxy], scene: Scene) -> None:
-    proxy = of(scene)
-    proxy.silence()
-    time.sleep(1.5 * scene.stack.lease_seconds)
-    proxy.open()
-
-
-def _backing_kinds(name: str, process: Callable[[Scene], Backing], proxy: Callable[[Scene], Proxy]) -> tuple[Kind, ...]:
-    kinds = (
-        ("killed", f"SIGKILL, started again within {_AWAY_SECONDS:g} s", partial(_kill_backing, process)),
-        ("restarted", "ended in order, started again", partial(_restart_backing, process)),
-        ("stopped", f"SIGSTOP, SIGCONT {_AWAY_SECONDS:g} s later", partial(_stop_backing, process)),
-        ("cut", "every connection to it closed", partial(_cut_proxy, proxy)),
-        ("refused", f"not reached for {_AWAY_SECONDS:g} s", partial(_refuse_proxy, proxy)),
-        ("silent", "nothing carried for one and a half leases", partial(_silence_proxy, proxy)),
-    )
-    return tuple(
-        Kind(f"{name} {did}", what, inject, "service", "closed", modes=("production",)) for did, what, inject in kinds
-    )
-
+_DATABASE = _Part(lambda stack: stack.postgres, lambda stack: stack.database_proxy, _nothing)
+_BROKER = _Part(lambda stack: stack.redis, lambda stack: stack.broker_proxy, _need_broker)
 
 SERVICE_FAULTS = (
     Kind("server killed", f"SIGKILL, started within {_AWAY_SECONDS:g} s", _kill_server, "service", "closed"),
@@ -190,9 +196,10 @@ SERVICE_FAULTS = (
         _lock_broker,
         "service",
         "closed",
+        new_attempt=True,
         modes=("embedded",),
     ),
-    *_backing_kinds("database", _database, _database_proxy),
-    *_backing_kinds("broker", _broker, _broker_proxy),
+    *_DATABASE.kinds("database", new_attempt=False),
+    *_BROKER.kinds("broker", new_attempt=True),
 )
 """Every kind that hits the whole service."""
