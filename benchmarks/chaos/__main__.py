@@ -10,6 +10,7 @@ final state of every run is compared with that of a run that nobody disturbed.
     python -m benchmarks.chaos --faults 500 --mode production --check
 """
 
+import signal
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -83,6 +84,8 @@ def main() -> None:
     if unknown := set(arguments.only) - names:
         options.error(f"no such kind: {', '.join(sorted(unknown))}; there are: {', '.join(sorted(names))}")
 
+    # What was started is ended, and what was mounted unmounted, however this ends.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     outcome, verdict = campaign(
         kinds=tuple(kind for kind in KINDS if not arguments.only or kind.name in arguments.only),
         faults=arguments.faults,

@@ -101,6 +101,8 @@ class Campaign:
             self.outcome.references[seed] = self._stack.launch(self._training, seed)
         self._say(f"{self._side_by_side} undisturbed runs")
         self._await_completion(list(self.outcome.references.values()))
+        if self.outcome.stuck or self.outcome.failed:
+            raise RuntimeError(f"runs that nobody disturbed did not complete: {self.outcome}")
 
     def _top_up(self) -> None:
         """Launch as many runs as have ended."""

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import threading
+import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -83,11 +84,8 @@ class Recorder:
 
 
 def _items(path: Path) -> Iterator[dict[str, Any]]:
-    """The whole lines; a damaged one stands whole in what was kept before the damage."""
-    for line in path.read_bytes().splitlines(keepends=True):
-        if not line.endswith(b"\n"):
-            continue
-        with contextlib.suppress(ValueError):
-            item = json.loads(line)
-            if isinstance(item, dict) and "seq" in item:
-                yield item
+    """The lines that are as they were written; a damaged one stands whole in what was kept before the damage."""
+    for line in path.read_bytes().splitlines():
+        checksum, _, document = line.partition(b" ")
+        if checksum == b"%08x" % zlib.crc32(document):
+            yield json.loads(document)

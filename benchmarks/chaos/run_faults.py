@@ -1,6 +1,8 @@
 """Faults of one run: its trainer, its worker, the way to the server, the spool, the disk, the checkpoint it resumes from."""
 
+import re
 import time
+from collections.abc import Callable
 from functools import partial
 
 from benchmarks.chaos.kinds import Heal, Kind, MissedError, Scene
@@ -104,15 +106,25 @@ def _lose_claim_answer(scene: Scene) -> None:
             proxy.set_trap(None)
 
 
-def _overwrite_spool(scene: Scene) -> None:
-    _damage_spool(scene, truncate=False)
+def _zero(line: bytes) -> bytes:
+    third = len(line) // 3
+    return line[:third] + bytes(third) + line[2 * third :]
 
 
-def _truncate_spool(scene: Scene) -> None:
-    _damage_spool(scene, truncate=True)
+def _alter(line: bytes) -> bytes:
+    """Another digit at the end of the last number: it still parses."""
+    digit = re.search(rb"\d(?=\D*$)", line)
+    assert digit is not None
+    at = digit.start()
+    return line[:at] + (b"1" if line[at : at + 1] != b"1" else b"2") + line[at + 1 :]
 
 
-def _damage_spool(scene: Scene, *, truncate: bool) -> None:
+def _tear(line: bytes) -> bytes:
+    """The next line is written where this one ends."""
+    return line[: len(line) // 2]
+
+
+def _damage_spool(scene: Scene, damage: Callable[[bytes], bytes]) -> None:
     """While the server is not reached, so that what is damaged has not been read yet."""
     spool = scene.node.spool(scene.run_id)
     if spool is None:
@@ -123,15 +135,13 @@ def _damage_spool(scene: Scene, *, truncate: bool) -> None:
         size = spool.stat().st_size
         wait_for(lambda: spool.read_bytes().count(b"\n", size) >= 2, seconds=_MOMENT_SECONDS)
         scene.stack.recorder.keep(spool)
-        lines = spool.read_bytes()[size:].splitlines(keepends=True)
-        if truncate:
-            # The next line is written where this one ends.
-            with spool.open("r+b") as file:
-                file.truncate(size + len(lines[0]) // 2)
-        else:
-            with spool.open("r+b") as file:
-                file.seek(size + len(lines[0]) // 3)
-                file.write(b"\0" * (len(lines[0]) // 3))
+        line = spool.read_bytes()[size:].splitlines(keepends=True)[0]
+        damaged = damage(line)
+        with spool.open("r+b") as file:
+            file.seek(size)
+            file.write(damaged)
+            if len(damaged) < len(line):
+                file.truncate()
     except (OSError, TimeoutError) as error:
         raise MissedError from error
     finally:
@@ -184,14 +194,14 @@ def _set_clock_forward(scene: Scene) -> None:
 
 
 RUN_FAULTS = (
-    Kind("trainer killed", "SIGKILL to the process that trains", _kill_trainer, "run", "closed", new_attempt=True),
+    Kind("trainer killed", "SIGKILL to the process that trains", _kill_trainer, "run", "closed", True),
     Kind("trainer stopped", f"SIGSTOP, SIGCONT {_STILL_SECONDS:g} s later", _stop_trainer, "run", "closed"),
     Kind("worker killed", "SIGKILL to a worker and all its processes", _kill_worker, "run", "silent", new_attempt=True),
     Kind(
         "slot killed", "SIGKILL to the process that looks after an attempt", _kill_child, "run", "silent", new_attempt=True
     ),
     Kind("worker stopped", "SIGSTOP to all its processes until another has its run", _stop_worker, "run", "silent", True),
-    Kind("worker restarted", "SIGTERM, and started anew", _restart_worker, "run", "closed", new_attempt=True),
+    Kind("worker restarted", "SIGTERM, and started anew", _restart_worker, "run", "closed", True),
     Kind("link cut", "every connection of a worker to the server closed", _cut_link, "run", "closed"),
     Kind("link refused", f"the server not reached for {_AWAY_SECONDS:g} s", _refuse_link, "run", "closed"),
     Kind("link silent", "nothing carried until another worker has its run", _silence_link, "run", "silent", True),
@@ -199,9 +209,22 @@ RUN_FAULTS = (
     Kind("upload's answer lost", "a checkpoint is taken and its worker not told", _lose_upload_answer, "run", "closed"),
     Kind("claim's answer lost", "a run is given away and its worker not told", _lose_claim_answer, "run", "silent", True),
     Kind(
-        "spool overwritten", "a line that waits becomes zeros in part", _overwrite_spool, "run", "closed", new_attempt=True
+        "spool overwritten",
+        "a line that waits becomes zeros in part",
+        partial(_damage_spool, damage=_zero),
+        "run",
+        "closed",
+        new_attempt=True,
     ),
-    Kind("spool truncated", "cut in the middle of a line that waits", _truncate_spool, "run", "closed", new_attempt=True),
+    Kind("spool altered", "one digit of a line that waits", partial(_damage_spool, damage=_alter), "run", "closed", True),
+    Kind(
+        "spool truncated",
+        "cut in the middle of a line that waits",
+        partial(_damage_spool, damage=_tear),
+        "run",
+        "closed",
+        new_attempt=True,
+    ),
     Kind("worker's disk full", "no byte left until another worker has its run", _fill_worker_disk, "run", "closed"),
     Kind("checkpoint damaged", "the newest archive, then its trainer killed", _damage_checkpoint, "run", "closed", True),
     Kind("clock set back", "the server's, by an hour, and a worker killed", _set_clock_back, "run", "silent", True),

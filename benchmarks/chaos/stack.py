@@ -51,6 +51,8 @@ class Node:
             **environment,
             "MAPLESS_SERVER_URL": f"http://127.0.0.1:{self.proxy.port}",
             "MAPLESS_WORK_DIR": str(directory / "work"),
+            # Of a disk that small.
+            "MAPLESS_MIN_FREE_BYTES": str(2**20),
         }
 
     def start(self) -> None:

@@ -1,7 +1,6 @@
 """The proof of the chaos benchmark, against databases in which something is wrong on purpose: it must see all of it."""
 
 import hashlib
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -187,8 +186,12 @@ def test_a_recorder_keeps_what_a_worker_removes_and_what_is_damaged(tmp_path: Pa
 def test_a_spool_that_was_not_recorded_whole_proves_nothing(tmp_path: Path) -> None:
     recorder = Recorder([tmp_path])
     recorder.close()
-    lines = [json.dumps(item(seq, 10 * seq)) for seq in (1, 3)]
-    (tmp_path / "recorded" / "77-abc-1.jsonl").write_text("".join(f"{line}\n" for line in lines))
+    spool = Spool(tmp_path / "recorded" / "77-abc-1.jsonl", 0)
+    for step in (10, 20, 30):
+        spool.metrics(step, 1.0, {"a": 0.5})
+    spool.close()
+    first, second, third = (tmp_path / "recorded" / "77-abc-1.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "recorded" / "77-abc-1.jsonl").write_bytes(first + second.replace(b"0.5", b"0.6") + third)
     with pytest.raises(RuntimeError, match="attempt 1 of run abc"):
         recorder.attempts()
 
