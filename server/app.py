@@ -21,6 +21,9 @@ from server.exports import endpoints as exports
 from server.files import FileStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
+from server.monitoring import endpoints as monitoring
+from server.monitoring.state import StateCollector
+from server.monitoring.timing import RequestTimesMiddleware
 from server.policies import endpoints as policies
 from server.problems import UNAUTHORIZED, install_error_handlers
 from server.replays import endpoints as replays
@@ -59,6 +62,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     events.router,
     live.router,
     worker_api.router,
+    monitoring.router,
 )
 
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
@@ -106,6 +110,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app = describe(lifespan, max_body_size=services.settings.max_body_bytes)
     app.state.services = services
     app.state.readiness = ReadinessProbe(services)
+    services.instruments.registry.register(StateCollector(services))
     pages.mount_pages(app, services.settings.web_dist)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
@@ -113,6 +118,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )
     app.add_middleware(SecurityHeadersMiddleware)
+    app.add_middleware(RequestTimesMiddleware, instruments=services.instruments)
     app.add_middleware(SlowClientMiddleware, seconds=services.settings.request_seconds)
     app.add_middleware(ClientAddressMiddleware, trusted_proxies=services.settings.trusted_proxies)
     return app

@@ -86,8 +86,9 @@ class Lanes:
     replays: Lane = field(default_factory=lambda: Lane("replays", threads=4, queue=12))
     downloads: Lane = field(default_factory=lambda: Lane("downloads", threads=4))
     workers: Lane = field(default_factory=lambda: Lane("workers", threads=4))
+    metrics: Lane = field(default_factory=lambda: Lane("scrapes", threads=1, queue=4))
     sweeper: Lane = field(default_factory=lambda: Lane("sweeps", threads=1))
 
     def all(self) -> tuple[Lane, ...]:
         """Every lane, for whoever counts."""
-        return (self.exports, self.replays, self.downloads, self.workers, self.sweeper)
+        return (self.exports, self.replays, self.downloads, self.workers, self.metrics, self.sweeper)

@@ -15,6 +15,7 @@ from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
+from server.monitoring.instruments import Instruments
 from server.replays.recordings import RecordingStore
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
@@ -39,11 +40,13 @@ class Services:
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
     leases: Leases = field(init=False)
+    instruments: Instruments = field(default_factory=Instruments)
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)
-    login_limiter: GuessLimiter = field(default_factory=GuessLimiter)
+    login_limiter: GuessLimiter = field(init=False)
 
     def __post_init__(self) -> None:
+        self.login_limiter = GuessLimiter(on_guess=self.instruments.wrong_secrets.inc)
         self.drivers = PolicyDrivers(self.live)
         self.leases = Leases(self.settings.lease_seconds)
 

@@ -66,6 +66,9 @@ class Settings(BaseSettings):
 
     token: SecretStr | None = Field(None, description="Login token; generated and kept in the data directory if not given.")
     worker_token: SecretStr | None = Field(None, description="The workers' token; generated likewise.")
+    metrics_token: SecretStr | None = Field(
+        None, min_length=16, description="Opens /metrics and nothing else, for Prometheus; without it the login token does."
+    )
 
     workers: int | None = Field(
         None, ge=0, le=256, description="Local worker processes of `mapless up`; one a core if not given."

@@ -1,6 +1,7 @@
 """Fixtures that tests of several packages share."""
 
 import os
+import shutil
 import socket
 import uuid
 from collections.abc import Callable, Iterator
@@ -34,6 +35,14 @@ def require_service(name: str, host: str, port: int) -> None:
         if os.environ.get("REQUIRE_SERVICES") == "1":
             pytest.fail(message)
         pytest.skip(message)
+
+
+def require_program(name: str) -> None:
+    """Skip the test where a program is not installed; with REQUIRE_SERVICES=1 that is an error: CI must have run it."""
+    if shutil.which(name) is None:
+        if os.environ.get("REQUIRE_SERVICES") == "1":
+            pytest.fail(f"{name} is not installed")
+        pytest.skip(f"{name} is not installed")
 
 
 @pytest.fixture

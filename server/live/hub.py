@@ -220,6 +220,18 @@ class LiveHub:
             if not screen.watchers:
                 asyncio.get_running_loop().call_later(self._linger, self._close_if_unwatched, screen)
 
+    @property
+    def open_scenes(self) -> int:
+        """How many scenes there are, those that nobody watches for the moment included."""
+        return self._open_scenes
+
+    @property
+    def watchers(self) -> int:
+        """How many browsers watch any run; from any thread."""
+        return sum(
+            screen.watchers for channel in tuple(self._channels.values()) for screen in tuple(channel.screens.values())
+        )
+
     def score(self, run_id: str, theme: Theme) -> Score:
         """What the head-up display of a scene shows."""
         channel = self._channels.get(run_id, _NOBODY)

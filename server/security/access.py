@@ -2,7 +2,8 @@
 
 - *Host* must be one of ours: a foreign name that resolves to this machine (DNS rebinding) is refused.
 - *Origin*, where a browser sends one with a request that changes something or opens a WebSocket, must be the page's own.
-- Everything under /api, /live and /replays needs the login token, as a cookie or as `Authorization: Bearer`; /api/worker
+- Everything under /api, /live and /replays, and /metrics, need the login token, as a cookie or as `Authorization: Bearer`
+  (/metrics takes a token of its own as well); /api/worker
   needs the workers' token instead, which opens nothing else. The pages themselves, /healthz, /readyz and the
   login are open.
 """
@@ -27,6 +28,7 @@ _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _LOCAL_NAMES = frozenset({"localhost"})
 _WORKER_PREFIX = "/api/worker/"
 _PROTECTED_PREFIXES = ("/api/", "/live/", "/replays/")
+_METRICS_PATH = "/metrics"
 _OPEN_PATHS = frozenset({"/api/login"})
 # RFC 6455: the request violates the server's policy; browsers see the handshake refused with 403.
 _POLICY_VIOLATION = 1008
@@ -40,6 +42,7 @@ class AccessMiddleware:
         self._settings = settings
         self._secrets = secrets
         self._limiter = limiter
+        self._metrics_token = settings.metrics_token.get_secret_value() if settings.metrics_token else None
         names = {settings.host, *settings.allowed_hosts, *_LOCAL_NAMES}
         if settings.server_url:
             names.add(urlsplit(settings.server_url).hostname or "")
@@ -98,6 +101,8 @@ class AccessMiddleware:
                 self._count(connection, bearer)
                 raise UnauthorizedError("This needs the workers' token: set MAPLESS_WORKER_TOKEN to the server's.")
             return
+        if path == _METRICS_PATH and self._metrics_token is not None and _equal(bearer, self._metrics_token):
+            return
         cookie = connection.cookies.get(cookie_name(self._settings))
         if _equal(cookie, self._secrets.cookie):
             return
@@ -139,7 +144,7 @@ def _check_address(scope: Scope) -> None:
 
 
 def _is_protected(path: str) -> bool:
-    return path.startswith(_PROTECTED_PREFIXES)
+    return path.startswith(_PROTECTED_PREFIXES) or path == _METRICS_PATH
 
 
 def _is_address(name: str) -> bool:

@@ -42,10 +42,17 @@ class GuessLimiter:
     Args:
         clock: seconds that only grow.
         pause: seconds between two turns.
+        on_guess: called for every wrong secret that counts.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, pause: float = _PAUSE_SECONDS) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        pause: float = _PAUSE_SECONDS,
+        on_guess: Callable[[], None] = lambda: None,
+    ) -> None:
         self._clock = clock
+        self._on_guess = on_guess
         self._pause = pause
         self._guessers: OrderedDict[str, _Guesser] = OrderedDict()
 
@@ -87,6 +94,7 @@ class GuessLimiter:
         over = self._over(guesser)
         if once and any(digest == known for _, known in guesser.failures):
             return
+        self._on_guess()
         guesser.failures.append((self._clock(), digest))
         if len(guesser.failures) > _MAX_FAILURES:
             guesser.failures.popleft()

@@ -127,7 +127,9 @@ async def _receive(
                 if batch.final is not None and batch.final.outcome == "damaged":
                     # Here and not with the other reports: reading an archive takes longer than storing them.
                     damaged = await services.lanes.workers.run(WorkerService(services).damaged, run_id)
-                opened.tell(await ingest.receive(Report(run_id, attempt, batch, refused, damaged)))
+                with services.instruments.ingest.time():
+                    orders = await ingest.receive(Report(run_id, attempt, batch, refused, damaged))
+                opened.tell(orders)
     except FencedError:
         opened.fence()
         # The worker answers the close; waiting for that lets it arrive.

@@ -89,6 +89,7 @@ class WorkerService:
                 else None,
                 lease_seconds=self._services.settings.lease_seconds,
             )
+        self._services.instruments.claims.labels(queue_of(training)).inc()
         self._services.leases.renew(run_id, claim.attempt)
         self._publish(run, "run")
         if problem is not None:
@@ -117,6 +118,7 @@ class WorkerService:
         outcomes: list[Outcome] = []
         changes: dict[Change, None] = {}
         ended: list[tables.Run] = []
+        lost = 0
         # A sign of life alone changes nothing in the database.
         is_read = not any(report.batch.items or report.batch.final for report in reports)
         with self._services.database.read() if is_read else self._services.database.write() as session:
@@ -137,6 +139,7 @@ class WorkerService:
                     damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
                     attempts.end(session, run, batch.final, _takers(session, training_of(run.experiment)), damaged)
                     ended.append(run)
+                    lost += batch.final.outcome == "lost"
                 outcomes.append(
                     Orders(
                         ack=run.last_seq,
@@ -148,6 +151,7 @@ class WorkerService:
                 for item in batch.items:
                     kind: ChangeKind = "metrics" if isinstance(item, MetricItem) else "run"
                     changes[Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind)] = None
+        self._services.instruments.losses.inc(lost)
         for change in changes:
             self._services.bus.publish(change)
         for run in ended:
@@ -217,6 +221,7 @@ class WorkerService:
             for run in runs:
                 reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
                 attempts.lose(session, run, reason, _takers(session, training_of(run.experiment)))
+        self._services.instruments.losses.inc(len(runs))
         for run in runs:
             self._services.links.cut(run.id)
             self._announce(run)
