@@ -76,7 +76,7 @@ def test_claims_losses_and_reports_are_counted(client: TestClient, services: Ser
     claim = {"worker": "w", "published_attempt": 0, "claim_id": "0123456789abcdef" * 2}
     response = client.post(f"/api/worker/runs/{run['id']}/claim", json=claim, headers=bearer(WORKER_TOKEN))
     assert response.status_code == 200, response.text
-    link = f"/api/worker/runs/{run['id']}/link?attempt=1"
+    link = f"ws://127.0.0.1:8400/api/worker/runs/{run['id']}/link?attempt=1"
     with client.websocket_connect(link, headers=bearer(WORKER_TOKEN)) as worker:
         worker.receive_json()
         worker.send_json({"items": [], "final": {"outcome": "lost", "error": "killed"}})
