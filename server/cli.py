@@ -95,6 +95,21 @@ def up(
         _refuse(str(error))
 
 
+@app.command()
+def doctor(
+    data_dir: DataDir = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs: one JSON object.")] = False,
+) -> None:
+    """Look at database, broker, store, clock, versions and disk, and say what to do."""
+    settings = _settings(data_dir=data_dir)
+    from server.doctor.report import report
+
+    text, well = report(settings, as_json=as_json)
+    typer.echo(text)
+    if not well:
+        raise typer.Exit(1)
+
+
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
 def train(context: typer.Context) -> None:
     """Train without the service, with a progress bar."""

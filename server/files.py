@@ -123,6 +123,21 @@ class FileStore:
         if not self._filesystem.exists(self._root):
             raise FileNotFoundError(f"There is no store at {self._root}.")
 
+    def probe(self) -> None:
+        """Write, read and remove a small file.
+
+        Raises:
+            OSError: the store does not keep what it is given.
+        """
+        # By the name of a torn upload, which would be removed at the next start.
+        path = f"{self._path('probe')}{_TORN_SUFFIX}"
+        try:
+            self._filesystem.pipe_file(path, b"probe")
+            if self._filesystem.cat_file(path) != b"probe":
+                raise OSError(f"{self._root} does not give back what was written.")
+        finally:
+            self._remove(path)
+
     def ids(self) -> set[str]:
         """The ids of all archives in the store."""
         return {PurePosixPath(path).stem for path in self._list() if path.endswith(_SUFFIX)}

@@ -50,7 +50,7 @@ def upgrade(database: Database, wait_seconds: float = 0.0) -> None:
     told = ""
     while True:
         try:
-            if _revision(database) != head():
+            if revision(database) != head():
                 _run_migrations(database)
         except OperationalError as error:
             # What follows the first line are guesses at the cause.
@@ -76,7 +76,8 @@ def migration_config(database: Database) -> "Config":
     return config
 
 
-def _revision(database: Database) -> str | None:
+def revision(database: Database) -> str | None:
+    """The last migration that the database has seen; None where it has no tables yet."""
     with database.read() as session:
         if not inspect(session.connection()).has_table("alembic_version"):
             return None
