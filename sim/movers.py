@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arenas import Arena
-from sim.config import MoverKind
+from sim.arenas.mover import Kind
 from sim.kernels.bundles import Crowd
 from sim.kernels.movers import DECISION, move_movers, place_movers
 from sim.kernels.random import seed_streams
-from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, WALKER
+from sim.kernels.records import DISC_COLUMNS, MOVER, PATROL, PEDESTRIAN, TIMED, WALKER
 from sim.shapes import Shapes, hulls
 from sim.streams import MOVERS, Stream
 
-_KINDS: dict[MoverKind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN}
+_KINDS: dict[Kind, int] = {"patrol": PATROL, "walker": WALKER, "pedestrian": PEDESTRIAN, "timed": TIMED}
 
 
 class Movers:
@@ -38,10 +38,11 @@ class Movers:
     ) -> None:
         tiles, slots = len(origins), max(len(arena.movers) for arena in arenas)
         self.discs: NDArray[np.float32] = np.full((tiles, slots, DISC_COLUMNS), -1.0, dtype=np.float32)
-        self.fastest = max((mover.speed for arena in arenas for mover in arena.movers), default=0.0)
+        self.fastest = max((mover.fastest for arena in arenas for mover in arena.movers), default=0.0)
         table = np.zeros((tiles, slots), dtype=MOVER)
         table["radius"] = -1.0
         waypoints: list[tuple[float, float]] = []
+        times: list[float] = []
         for index, arena in enumerate(arenas):
             for slot, mover in enumerate(arena.movers):
                 records = table[index :: len(arenas), slot]
@@ -50,13 +51,16 @@ class Movers:
                 records["speed"] = mover.speed
                 records["first_waypoint"] = len(waypoints)
                 records["waypoints"] = len(mover.waypoints)
+                records["way"] = mover.loops
                 waypoints += mover.waypoints
+                times += mover.times or (0.0,) * len(mover.waypoints)
         self._records = table.reshape(-1)
         bounds, circles, boxes = shapes
         self._crowd = Crowd(
             records=self._records,
             discs=self.discs,
             waypoints=np.array(waypoints, dtype=np.float64).reshape(-1, 2),
+            times=np.array(times, dtype=np.float64),
             maps=(np.arange(tiles) % len(arenas)).astype(np.int32),
             bounds=bounds,
             circles=circles,

@@ -23,14 +23,20 @@ def import_arenas(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Our own YAML, Gazebo worlds (.world, .sdf), or the YAML of ROS maps, each with its image beside it.",
+            help="Our own YAML, Gazebo worlds (.world, .sdf) with their keyframes (NAME.keyframes.yaml) or plugins' sources "
+            "beside them, or the YAML of ROS maps, each with its image beside it.",
             show_default=False,
         ),
     ],
     data_dir: DataDir = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Import without asking.")] = False,
 ) -> None:
-    """Import arenas; they are in the gallery at once, also of a server that is running."""
+    """Draw what was understood of arenas' files, ask, and import them; they are in the gallery at once.
+
+    Where nobody can answer, it draws and imports.
+    """
     from server.errors import ServiceError
+    from sim.arenas.drawing import draw
     from sim.arenas.files import load_arena
     from sim.errors import ArenaFileError
 
@@ -39,6 +45,9 @@ def import_arenas(
     for file in files:
         try:
             document = load_arena(file)
+            typer.echo(draw(document))
+            if not yes and sys.stdin.isatty() and not typer.confirm(f"Import {_line(document)}?", default=True):
+                continue
             store.add(document)
         except (ArenaFileError, ServiceError, OSError) as error:
             sys.stderr.write(f"mapless: {error}\n")
@@ -74,7 +83,9 @@ def show(
 
 def _line(document: "ArenaFile") -> str:
     count = len(document.circles) + len(document.boxes)
-    return f"{document.sha256[:_SHORT]}  {document.name}  {document.width:g} x {document.height:g} m, {count} obstacles"
+    moving = f", {len(document.movers)} moving" if document.movers else ""
+    size = f"{document.width:g} x {document.height:g} m"
+    return f"{document.sha256[:_SHORT]}  {document.name}  {size}, {count} obstacles{moving}"
 
 
 def _store(data_dir: Path | None) -> "ArenaStore":

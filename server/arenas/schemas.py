@@ -7,8 +7,8 @@ from pydantic import Field
 from server.schemas import Schema
 from sim.config import AnyArenaConfig, ArenaFile
 
-MAX_FILES = 2
-"""Of an upload: a ROS map has a YAML file and an image."""
+MAX_FILES = 18
+"""Of an upload: a world, its keyframes, and the sources of the plugins that move what is in it."""
 
 MAX_UPLOAD_BYTES = 24 * 2**20
 """Of an upload's JSON: the largest image in base64, and its YAML."""
@@ -22,7 +22,7 @@ class ArenaUploadFile(Schema):
 
 
 class ArenaUpload(Schema):
-    """The file of an arena, or the two of a ROS map."""
+    """The file of an arena, the two of a ROS map, or a world and what says how things move in it."""
 
     files: list[ArenaUploadFile] = Field(min_length=1, max_length=MAX_FILES)
     keep: bool = Field(False, description="Import it; else it is only looked at.")

@@ -1,6 +1,7 @@
 """Between our own format and the geometry that the simulator drives in; and whether a robot can drive there at all."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from sim.arenas.cells import CELL, components, free_mask
 from sim.arenas.geometry import Arena, free_distance
 from sim.arenas.mover import Mover
-from sim.config import AnyMover, ArenaFile, Box, Circle, Patrol, Pedestrian, Walker, Waypoint
+from sim.config import AnyMover, ArenaFile, Box, Circle, Keyframe, Patrol, Pedestrian, Timed, Walker, Waypoint
 from sim.errors import ArenaFormatError, NoFreeSpaceError
 
 MIN_FREE_AREA = 1.0
@@ -34,10 +35,7 @@ def to_arena(document: ArenaFile) -> Arena:
         boxes=np.array(
             [(b.x, b.y, 0.5 * b.length, 0.5 * b.width, math.radians(b.angle)) for b in document.boxes], dtype=np.float64
         ).reshape(-1, 5),
-        movers=tuple(
-            Mover(m.kind, m.radius, m.speed, tuple((w.x, w.y) for w in m.waypoints) if isinstance(m, Patrol) else ())
-            for m in document.movers
-        ),
+        movers=tuple(_to_mover(entry) for entry in document.movers),
     )
 
 
@@ -64,7 +62,21 @@ def to_document(arena: Arena) -> ArenaFile:
     )
 
 
+def _to_mover(entry: AnyMover) -> Mover:
+    if isinstance(entry, Timed):
+        places = tuple((frame.x, frame.y) for frame in entry.keyframes)
+        times = tuple(frame.t for frame in entry.keyframes)
+        mover = Mover("timed", entry.radius, 0.0, places, times, entry.loops)
+        return replace(mover, speed=mover.fastest)
+    ways = tuple((corner.x, corner.y) for corner in entry.waypoints) if isinstance(entry, Patrol) else ()
+    return Mover(entry.kind, entry.radius, entry.speed, ways)
+
+
 def _to_entry(mover: Mover) -> AnyMover:
+    if mover.kind == "timed":
+        frames = zip(mover.times, mover.waypoints, strict=True)
+        keyframes = tuple(Keyframe(t=round(t, 4), x=round(x, 4), y=round(y, 4)) for t, (x, y) in frames)
+        return Timed(kind="timed", radius=mover.radius, keyframes=keyframes, loops=mover.loops)
     if mover.kind == "patrol":
         waypoints = tuple(Waypoint(x=round(x, 4), y=round(y, 4)) for x, y in mover.waypoints)
         return Patrol(kind="patrol", radius=mover.radius, speed=mover.speed, waypoints=waypoints)
@@ -103,6 +115,8 @@ def check_patrols(document: ArenaFile) -> None:
     """
     arena = to_arena(document)
     for number, mover in enumerate(arena.movers):
+        if mover.kind != "patrol":
+            continue  # a timed one goes as it is said to, and others find their own way
         corners = np.array([*mover.waypoints, *mover.waypoints[:1]]).reshape(-1, 2)
         for start, end in pairwise(corners):
             points = np.linspace(start, end, 2 + int(np.hypot(*(end - start)) / _PATROL_STEP))

@@ -4,6 +4,8 @@ The JSON schema of `ArenaFile` is `docs/arena.schema.json`; `docs/arenas.md` exp
 """
 
 import hashlib
+import math
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -16,6 +18,15 @@ MAX_OBSTACLES = 2000
 
 MAX_SIDE = 100.0
 """Longest side of an imported arena, metres."""
+
+MAX_KEYFRAMES = 512
+"""Keyframes of one timed mover."""
+
+MAX_TIME = 3600.0
+"""Seconds that a timed mover's way may take."""
+
+MAX_TIMED_SPEED = 5.0
+"""Metres per second of a timed mover: a fast runner."""
 
 MAX_WAYPOINTS = 32
 """Waypoints of one patrol."""
@@ -108,7 +119,38 @@ class Pedestrian(_MoverPart):
     kind: Literal["pedestrian"]
 
 
-AnyMover = Annotated[Patrol | Walker | Pedestrian, Field(discriminator="kind")]
+class Keyframe(_Part):
+    """Where a timed mover is at a time."""
+
+    t: float = Field(ge=0.0, le=MAX_TIME, allow_inf_nan=False, description="Seconds after the start.")
+    x: Coordinate
+    y: Coordinate
+
+
+class Timed(_Part):
+    """Goes as its keyframes say, straight and evenly from each to the next, whatever is in its way."""
+
+    kind: Literal["timed"]
+    radius: MoverRadius = Field(0.25, description="Metres.")
+    keyframes: tuple[Keyframe, ...] = Field(
+        min_length=2, max_length=MAX_KEYFRAMES, strict=False, description="In order of time; the first at 0 s."
+    )
+    loops: bool = Field(True, description="Whether it begins anew after the last one; it stays there otherwise.")
+
+    @model_validator(mode="after")
+    def _goes_through_time(self) -> Self:
+        if self.keyframes[0].t != 0.0:
+            raise ValueError(f"the first keyframe is at {self.keyframes[0].t:g} s: it must be at 0")
+        for one, other in pairwise(self.keyframes):
+            if other.t <= one.t:
+                raise ValueError(f"the keyframe at {other.t:g} s follows the one at {one.t:g} s: put them in order of time")
+            speed = math.hypot(other.x - one.x, other.y - one.y) / (other.t - one.t)
+            if speed > MAX_TIMED_SPEED:
+                raise ValueError(f"{speed:.1f} m/s after {one.t:g} s: at most {MAX_TIMED_SPEED:g} are simulated")
+        return self
+
+
+AnyMover = Annotated[Patrol | Walker | Pedestrian | Timed, Field(discriminator="kind")]
 
 
 class ArenaFile(_Part):

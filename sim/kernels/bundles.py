@@ -49,7 +49,8 @@ class Crowd(NamedTuple):
     Attributes:
         records: (tiles * K,) of `sim.kernels.records.MOVER`, K for each tile; a radius below zero is an empty slot.
         discs: (tiles, K, 5) what the robots meet, see `DISC_COLUMNS`.
-        waypoints: (W, 2) float64 of all patrols, metres.
+        waypoints: (W, 2) float64 of all patrols and timed ways, metres.
+        times: (W,) float64 when a timed way is there, seconds.
         maps: (tiles,) the arena of each tile.
         bounds, circles, boxes, origins: see `Geometry`.
         hulls: (M, 3, C + B) float64 x, y, radius of a disc round every circle and box; far away for an empty slot.
@@ -61,6 +62,7 @@ class Crowd(NamedTuple):
     records: NDArray[np.void]
     discs: Floats
     waypoints: Doubles
+    times: Doubles
     maps: Integers
     bounds: Floats
     circles: Floats

@@ -11,6 +11,8 @@ for all kinds, and so no two of them ever overlap and none enters an obstacle, t
 Patrols and walkers keep their direction within that and slow down. Pedestrians give way early: they take the velocity
 closest to their wish that also keeps them apart for `HORIZON` seconds (ORCA, `sim.kernels.avoidance`).
 
+Timed movers are where their keyframes say, whatever is in the way, on the straight line between two of them.
+
 Positions are kept in the arena's own frame, so that a mover's way does not depend on the tile that its arena is in. Robots
 make no difference to movers.
 """
@@ -20,7 +22,7 @@ import math
 from sim.kernels.avoidance import choose_velocity, free_part, orca_line
 from sim.kernels.options import kernel
 from sim.kernels.random import uniform
-from sim.kernels.records import PATROL, PEDESTRIAN, WALKER
+from sim.kernels.records import PATROL, PEDESTRIAN, TIMED, WALKER
 from sim.kernels.surroundings import EXACT, SKIN, free_length, gap, obstacle_lines
 
 DECISION = 0.6
@@ -111,6 +113,37 @@ def _draw_place(m, index, crowd):
 
 
 @kernel(fastmath=EXACT)
+def _follow(record, crowd, time, period):
+    """Put a timed mover where it is `time` seconds after all were placed; it has come there at an even speed.
+
+    Where its way begins anew elsewhere than it ended, it jumps, and has not moved.
+    """
+    first = record.first_waypoint
+    last = first + record.waypoints - 1
+    waypoints = crowd.waypoints
+    jumps = False
+    if record.way:
+        end = crowd.times[last]
+        rounds = math.floor(time / end)
+        apart = math.hypot(waypoints[last, 0] - waypoints[first, 0], waypoints[last, 1] - waypoints[first, 1])
+        jumps = apart > _ARRIVED and rounds > math.floor((time - period) / end)
+        time -= rounds * end
+    k = first + record.waypoint
+    if time < crowd.times[k]:
+        k = first
+    while k < last - 1 and crowd.times[k + 1] <= time:
+        k += 1
+    record.waypoint = k - first
+    part = min(max((time - crowd.times[k]) / (crowd.times[k + 1] - crowd.times[k]), 0.0), 1.0)
+    x = waypoints[k, 0] + part * (waypoints[k + 1, 0] - waypoints[k, 0])
+    y = waypoints[k, 1] + part * (waypoints[k + 1, 1] - waypoints[k, 1])
+    record.vx = 0.0 if jumps else (x - record.x) / period
+    record.vy = 0.0 if jumps else (y - record.y) / period
+    record.x = x
+    record.y = y
+
+
+@kernel(fastmath=EXACT)
 def place_movers(crowd):
     """Put every mover of every tile, at rest, somewhere clear of obstacles and of the movers before it.
 
@@ -127,7 +160,12 @@ def place_movers(crowd):
         record.present = 0
         record.vx = 0.0
         record.vy = 0.0
-        for _ in range(_TRIES if record.radius > 0.0 else 0):
+        if record.kind == TIMED and record.radius > 0.0:
+            record.present = 1
+            record.waypoint = 0
+            record.x = crowd.waypoints[record.first_waypoint, 0]
+            record.y = crowd.waypoints[record.first_waypoint, 1]
+        for _ in range(_TRIES if record.radius > 0.0 and record.kind != TIMED else 0):
             _draw_place(m, index, crowd)
             keep = record.radius + SKIN
             free = gap(record.x, record.y, index, crowd.bounds, crowd.circles, crowd.boxes) >= keep
@@ -137,7 +175,7 @@ def place_movers(crowd):
             if free:
                 record.present = 1
                 break
-        if record.present:
+        if record.present and record.kind != TIMED:
             record.way = 1
             record.patience = _PATIENCE
             if record.kind == WALKER:
@@ -151,7 +189,7 @@ def place_movers(crowd):
                 _draw_goal(m, index, crowd, record.kind == PATROL)
                 if record.kind == PATROL:
                     record.patience = _PATIENCE
-        else:
+        elif not record.present:
             record.x = 0.0
             record.y = 0.0
         k = m % slots
@@ -217,6 +255,10 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
         m = first + k
         record = records[m]
         if not record.present:
+            continue
+        if record.kind == TIMED:
+            chosen[k, 0] = record.vx
+            chosen[k, 1] = record.vy
             continue
         hard = obstacle_lines(
             record.x, record.y, record.radius, record.speed * interval, interval, index,
@@ -295,10 +337,17 @@ def move_movers(crowd, period, between, command, robots):
         for k in range(slots):
             m = tile * slots + k
             record = records[m]
-            command[robots + m, 0] = record.vx
-            command[robots + m, 1] = record.vy
-            record.x += period * record.vx
-            record.y += period * record.vy
+            x = record.x
+            y = record.y
+            if record.kind == TIMED and record.present:
+                _follow(record, crowd, crowd.steps[0] * period, period)
+                command[robots + m, 0] = (record.x - x) / period
+                command[robots + m, 1] = (record.y - y) / period
+            else:
+                command[robots + m, 0] = record.vx
+                command[robots + m, 1] = record.vy
+                record.x = x + period * record.vx
+                record.y = y + period * record.vy
             discs[tile, k, 0] = record.x
             discs[tile, k, 1] = record.y
             discs[tile, k, 3] = period * record.vx

@@ -90,8 +90,8 @@ ROBOT = np.dtype(
 )
 """What the simulator remembers of a robot besides pose and target."""
 
-PATROL, WALKER, PEDESTRIAN = 0, 1, 2
-"""Kinds of movers, see `sim.config.MoverKind`."""
+PATROL, WALKER, PEDESTRIAN, TIMED = 0, 1, 2, 3
+"""Kinds of movers, see `sim.arenas.mover.Kind`."""
 
 MOVER = np.dtype(
     [
@@ -108,10 +108,10 @@ MOVER = np.dtype(
         ("radius", "f8"),  # m
         ("speed", "f8"),  # m/s, top
         ("kind", "i4"),
-        ("first_waypoint", "i4"),  # of a patrol's round, and how many it has
+        ("first_waypoint", "i4"),  # of a patrol's round or a timed way, and how many it has
         ("waypoints", "i4"),
-        ("waypoint", "i4"),  # the next one, counted from the first
-        ("way", "i4"),  # 1, or -1 where it goes round backwards
+        ("waypoint", "i4"),  # the next one, counted from the first; of a timed way the last one
+        ("way", "i4"),  # 1, or -1 where it goes round backwards; 0 where a timed way ends at its end
         ("present", "i4"),  # 0 where the arena had no room for it
     ],
     align=True,

@@ -11,6 +11,7 @@ from sim.arenas import Arena, build_arenas
 from sim.arenas.build import with_movers
 from sim.arenas.document import to_arena
 from sim.arenas.families import CLEARANCE, SUITE_SEEDS, generate_arena
+from sim.arenas.mover import Mover
 from sim.config import ArenaConfig, ArenaFile, FamilyName, Frozen, MoversConfig
 
 _DECIMALS = 6  # of the geometry that is hashed: micrometres, coarser than any rounding of a platform
@@ -52,6 +53,12 @@ def build_places(places: Iterable[Place], *, clearance: float = CLEARANCE) -> tu
     return tuple(arenas)
 
 
+def _content(mover: Mover) -> list[object]:
+    """What is hashed of a mover; of those that keep no times as before any did."""
+    timed: list[object] = [mover.times, mover.loops] if mover.times else []
+    return [mover.kind, mover.radius, mover.speed, mover.waypoints, *timed]
+
+
 def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str:
     """SHA-256 of what a policy meets."""
     geometry = [
@@ -60,7 +67,7 @@ def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str
             np.round(arena.circles, _DECIMALS).tolist(),
             np.round(arena.boxes, _DECIMALS).tolist(),
             # Arenas in which nothing moves keep the hash that they had before anything could.
-            *([[mover.kind, mover.radius, mover.speed, mover.waypoints] for mover in arena.movers]),
+            *([_content(mover) for mover in arena.movers]),
         ]
         for arena in arenas
     ]

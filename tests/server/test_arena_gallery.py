@@ -2,6 +2,10 @@
 
 import base64
 import json
+import os
+import pty
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -188,3 +192,38 @@ def test_the_command_imports_lists_and_shows(tmp_path: Path) -> None:
     (tmp_path / "again.yaml").write_text(shown)
     assert run.invoke(command, ["arena", "import", str(tmp_path / "again.yaml"), *data]).exit_code == 0
     assert len(json.loads((next((tmp_path / "data" / "arenas").glob("*.json"))).read_text())["circles"]) == 1
+
+
+def test_a_world_is_uploaded_together_with_what_moves_in_it(client: TestClient) -> None:
+    world = """<sdf><world name='w'><model name='post'><pose frame=>3 3 0 0 0 0</pose><link name='l'><collision name='c'>
+      <geometry><cylinder><radius>0.3</radius><length>1</length></cylinder></geometry></collision></link></model>
+      <model name='car'><link name='l'><collision name='c'><geometry><sphere><radius>0.2</radius></sphere></geometry>
+      </collision></link><plugin name='driver' filename='driver.so'/></model></world></sdf>"""
+    frames = "format: mapless-keyframes/1\nmodels: {driver: {keyframes: [{t: 0, x: 0, y: 0}, {t: 4, x: 3, y: 0}]}}"
+    response = upload(client, world, "w.world")
+    assert response.status_code == 422
+    assert "driver.so" in response.json()["detail"]
+    files = [
+        {"name": name, "content": base64.b64encode(text.encode()).decode()}
+        for name, text in (("w.world", world), ("w.keyframes.yaml", frames))
+    ]
+    preview = client.post("/api/arenas/imported", json={"files": files}).json()
+    (mover,) = preview["geometry"]["movers"]
+    assert (mover["kind"], mover["radius"], len(mover["keyframes"])) == ("timed", 0.2, 2)
+
+
+def test_the_command_draws_what_it_understood_and_asks_who_sits_at_a_terminal(tmp_path: Path) -> None:
+    file, data = tmp_path / "lab.yaml", tmp_path / "data"
+    file.write_text(LAB)
+    kept = []
+    for answer in (b"n\n", b"y\n"):
+        terminal, stdin = pty.openpty()
+        os.write(terminal, answer)
+        arguments = [sys.executable, "-m", "server", "arena", "import", str(file), "--data-dir", str(data)]
+        done = subprocess.run(arguments, stdin=stdin, capture_output=True, text=True, check=True, timeout=60)
+        os.close(terminal)
+        os.close(stdin)
+        assert "+--" in done.stdout
+        assert "# obstacle" in done.stdout
+        kept.append(len(list((data / "arenas").glob("*.json"))))
+    assert kept == [0, 1]

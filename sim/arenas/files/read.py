@@ -1,36 +1,46 @@
 """Any arena file that we know, recognised by its content."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 
 from sim.arenas.document import check_free_space, check_patrols
 from sim.arenas.files.limits import MAX_IMAGE_BYTES, MAX_SDF_BYTES, MAX_TEXT_BYTES
+from sim.arenas.files.moving import read_motions
 from sim.arenas.files.own_yaml import load_yaml, read_own
 from sim.arenas.files.ros_map import parse_info, read_map
 from sim.arenas.files.sdf import read_sdf
-from sim.config import ArenaFile
+from sim.config import MAX_MOVERS, ArenaFile
 from sim.errors import ArenaFileError, ArenaFormatError, ArenaLimitError
 
 _IMAGES = (".pgm", ".png")
 _WORLDS = (".world", ".sdf", ".xml")
 _TEXTS = (".yaml", ".yml", ".json")
+_SOURCES = (".cc",)  # of plugins that move what is in a world
 _LIMITS = (
-    dict.fromkeys(_IMAGES, MAX_IMAGE_BYTES) | dict.fromkeys(_WORLDS, MAX_SDF_BYTES) | dict.fromkeys(_TEXTS, MAX_TEXT_BYTES)
+    dict.fromkeys(_IMAGES, MAX_IMAGE_BYTES)
+    | dict.fromkeys(_WORLDS, MAX_SDF_BYTES)
+    | dict.fromkeys(_TEXTS + _SOURCES, MAX_TEXT_BYTES)
 )
+# The name of a plugin's library, without a folder: only what lies beside the world is looked at.
+_PLUGIN = re.compile(r"filename\s*=\s*['\"](?:lib)?([\w.-]+)\.so['\"]")
 _KNOWN = "an arena in our own YAML, a Gazebo .world or .sdf, or a ROS map (.yaml with its .pgm or .png)"
 
 
 def read_arena(files: Mapping[str, bytes]) -> ArenaFile:
-    """The arena in a file, or in a map's YAML and image.
+    """The arena in a file, in a map's YAML and image, or in a world and what says how things move in it.
 
     Args:
-        files: content by file name: one, or for a ROS map two.
+        files: content by file name: one, for a ROS map two, for a world also files of keyframes and sources of plugins.
 
     Raises:
         ArenaFileError: they are refused; the message says why and what to do.
     """
     images = {name: content for name, content in files.items() if _suffix(name) in _IMAGES}
     others = [name for name in files if name not in images]
+    worlds = [name for name in others if _suffix(name) in _WORLDS]
+    beside = [name for name in others if len(worlds) == 1 and name not in worlds and _suffix(name) in _TEXTS + _SOURCES]
+    others = [name for name in others if name not in beside]
     if len(others) != 1:
         raise ArenaFormatError(f"give {_KNOWN}; here are {len(others)} files besides images")
     name = others[0]
@@ -40,7 +50,7 @@ def read_arena(files: Mapping[str, bytes]) -> ArenaFile:
     if content.startswith((b"PK\x03\x04", b"\x1f\x8b")):
         raise ArenaFormatError(f"{name}: a compressed archive; unpack it and give the files in it")
     if _suffix(name) in _WORLDS:
-        document = read_sdf(name, content)
+        document = read_sdf(name, content, read_motions({name: files[name] for name in beside}))
     elif "image" in (mapping := load_yaml(name, content)):
         document = _read_map(name, mapping, images)
     else:
@@ -58,7 +68,9 @@ def _read_map(name: str, mapping: dict[str, object], images: Mapping[str, bytes]
 
 
 def load_arena(*paths: Path) -> ArenaFile:
-    """The arena in a file on disk; a map's image is looked for beside its YAML if it is not given.
+    """The arena in a file on disk; what belongs to it is looked for beside it if it is not given.
+
+    That is a map's image, and for a world NAME.world its NAME.keyframes.yaml and the sources of the plugins that it names.
 
     Raises:
         ArenaFileError: the files are refused; nothing larger than its limit is read.
@@ -69,6 +81,11 @@ def load_arena(*paths: Path) -> ArenaFile:
         if "image" in mapping:
             image = parse_info(paths[0].name, mapping).image
             files[image] = _content(paths[0].parent / image)
+    if len(files) == 1 and len(paths) == 1 and _suffix(paths[0].name) in _WORLDS:
+        plugins = sorted(set(_PLUGIN.findall(files[paths[0].name].decode("utf-8", "replace"))))[:MAX_MOVERS]
+        for name in (f"{paths[0].stem}.keyframes.yaml", *(f"{plugin}.cc" for plugin in plugins)):
+            if (paths[0].parent / name).is_file():
+                files[name] = _content(paths[0].parent / name)
     return read_arena(files)
 
 

@@ -879,7 +879,7 @@ export interface components {
              * @description What moves in it.
              * @default []
              */
-            movers: (components["schemas"]["Patrol-Input"] | components["schemas"]["Walker-Input"] | components["schemas"]["Pedestrian-Input"])[];
+            movers: (components["schemas"]["Patrol-Input"] | components["schemas"]["Walker-Input"] | components["schemas"]["Pedestrian-Input"] | components["schemas"]["Timed-Input"])[];
             /**
              * Name
              * @description What people call it.
@@ -927,7 +927,7 @@ export interface components {
              * @description What moves in it.
              * @default []
              */
-            movers: (components["schemas"]["Patrol-Output"] | components["schemas"]["Walker-Output"] | components["schemas"]["Pedestrian-Output"])[];
+            movers: (components["schemas"]["Patrol-Output"] | components["schemas"]["Walker-Output"] | components["schemas"]["Pedestrian-Output"] | components["schemas"]["Timed-Output"])[];
             /**
              * Name
              * @description What people call it.
@@ -973,7 +973,7 @@ export interface components {
         };
         /**
          * ArenaUpload
-         * @description The file of an arena, or the two of a ROS map.
+         * @description The file of an arena, the two of a ROS map, or a world and what says how things move in it.
          */
         ArenaUpload: {
             /** Files */
@@ -2162,6 +2162,21 @@ export interface components {
              * @default 0.43
              */
             width: number;
+        };
+        /**
+         * Keyframe
+         * @description Where a timed mover is at a time.
+         */
+        Keyframe: {
+            /**
+             * T
+             * @description Seconds after the start.
+             */
+            t: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
         };
         /**
          * LidarConfig
@@ -4336,6 +4351,62 @@ export interface components {
              * @default 10000
              */
             warmup_steps: number;
+        };
+        /**
+         * Timed
+         * @description Goes as its keyframes say, straight and evenly from each to the next, whatever is in its way.
+         */
+        "Timed-Input": {
+            /**
+             * Keyframes
+             * @description In order of time; the first at 0 s.
+             */
+            keyframes: components["schemas"]["Keyframe"][];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "timed";
+            /**
+             * Loops
+             * @description Whether it begins anew after the last one; it stays there otherwise.
+             * @default true
+             */
+            loops: boolean;
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
+        };
+        /**
+         * Timed
+         * @description Goes as its keyframes say, straight and evenly from each to the next, whatever is in its way.
+         */
+        "Timed-Output": {
+            /**
+             * Keyframes
+             * @description In order of time; the first at 0 s.
+             */
+            keyframes: components["schemas"]["Keyframe"][];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "timed";
+            /**
+             * Loops
+             * @description Whether it begins anew after the last one; it stays there otherwise.
+             * @default true
+             */
+            loops: boolean;
+            /**
+             * Radius
+             * @description Metres.
+             * @default 0.25
+             */
+            radius: number;
         };
         /**
          * TrainingConfig

@@ -1,4 +1,4 @@
-/** An arena from above, drawn to scale: walls, obstacles, and where it has them patrols' rounds, start and target. */
+/** An arena from above, drawn to scale: walls, obstacles, and where it has them ways of what moves, start and target. */
 import type { ArenaGeometry } from '../api/types'
 import classes from './ArenaDrawing.module.css'
 
@@ -12,6 +12,12 @@ interface ArenaDrawingProps {
 const WALL = 0.012
 /** Length of the arrow at the start, likewise. */
 const ARROW = 0.05
+
+/** Where a mover goes, as far as the arena says: a patrol's corners, or a timed one's places in order. */
+function wayOf(mover: ArenaGeometry['movers'][number]): readonly { x: number; y: number }[] {
+  if (mover.kind === 'patrol') return mover.waypoints
+  return mover.kind === 'timed' ? mover.keyframes : []
+}
 
 export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
   const { width, height, circles, boxes, movers, start, target } = geometry
@@ -50,25 +56,22 @@ export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
             />
           ))}
         </g>
-        {movers.map((mover, index) =>
-          mover.kind === 'patrol' && mover.waypoints.length > 0 ? (
+        {movers.map((mover, index) => {
+          const way = wayOf(mover)
+          const Line = mover.kind === 'timed' ? 'polyline' : 'polygon'
+          return way.length > 0 ? (
             // biome-ignore lint/suspicious/noArrayIndexKey: an arena's movers stay in their order, and two may be alike.
             <g key={index}>
-              <polygon
+              <Line
                 className={classes.round}
-                points={mover.waypoints.map(({ x, y }) => `${x},${y}`).join(' ')}
+                points={way.map(({ x, y }) => `${x},${y}`).join(' ')}
                 strokeWidth={wall / 2}
                 strokeDasharray={`${2 * wall} ${1.5 * wall}`}
               />
-              <circle
-                className={classes.mover}
-                cx={mover.waypoints[0]?.x}
-                cy={mover.waypoints[0]?.y}
-                r={mover.radius}
-              />
+              <circle className={classes.mover} cx={way[0]?.x} cy={way[0]?.y} r={mover.radius} />
             </g>
-          ) : null,
-        )}
+          ) : null
+        })}
         {start && (
           <path
             className={classes.start}

@@ -12,7 +12,7 @@ import classes from './ArenaUpload.module.css'
 import { IconUpload } from './icons'
 import { Notice } from './ui'
 
-const ACCEPTED = '.yaml,.yml,.json,.world,.sdf,.pgm,.png'
+const ACCEPTED = '.yaml,.yml,.json,.world,.sdf,.pgm,.png,.cc'
 
 export function ArenaUpload() {
   const client = useQueryClient()
@@ -78,7 +78,9 @@ export function ArenaUpload() {
           )}
           <Text size="xs" c="dimmed">
             Read are arenas in our own YAML, Gazebo worlds (.world, .sdf) with cylinders and boxes, and ROS
-            maps: choose the YAML file and its image together.
+            maps: choose the YAML file and its image together. Of what moves in a world, actors are read from
+            their trajectories, and models that a plugin moves from a file of keyframes or the plugin’s source
+            (.cc), chosen together with the world.
           </Text>
           <Group justify="flex-end">
             <Button variant="default" onClick={close}>

@@ -9,9 +9,15 @@ export interface UploadFile {
 /** Larger files are refused by the server anyway; these are not even read. */
 const MAX_BYTES = 16 * 2 ** 20
 
+/** A world, its keyframes and the sources of its plugins. */
+const MAX_FILES = 18
+
 /** Reads files into base64; throws with a sentence for a person. */
 export async function filesForUpload(files: readonly File[]): Promise<UploadFile[]> {
-  if (files.length > 2) throw new Error('Choose one file, or the YAML file and the image of one ROS map.')
+  if (files.length > MAX_FILES)
+    throw new Error(
+      'Choose one file, the YAML file and the image of one ROS map, or one world and what says how things move in it.',
+    )
   const large = files.find((file) => file.size > MAX_BYTES)
   if (large) throw new Error(`${large.name} is larger than 16 MiB.`)
   return Promise.all(files.map(async (file) => ({ name: file.name, content: await base64(file) })))
