@@ -163,8 +163,8 @@ def way_of(place: str, model: Element, motions: Motions) -> tuple[str, Way] | No
     if plugins:
         raise ArenaFormatError(
             f"{place}: the plugin {_shown(plugins[0])} moves it, which is compiled code and can't be read: give the "
-            f"plugin's source (.cc) if it sets keyframes, or a file of keyframes ({FORMAT}) together with the world, or take "
-            "the plugin out if it moves nothing"
+            f"plugin's source (.cc) if it sets keyframes, or a file of keyframes ({FORMAT}) together with the world, or "
+            "take the plugin out if it moves nothing"
         )
     return None
 
