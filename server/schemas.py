@@ -4,6 +4,8 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from workers.statistics.seeds import FailedSeeds, Unit
+
 Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 """Text of one line that a person types and the database keeps: PostgreSQL holds no NUL."""
 
@@ -35,5 +37,8 @@ class Estimate(Schema):
     value: float
     low: float = Field(description="Lower end of the 95 % interval.")
     high: float = Field(description="Upper end of the 95 % interval.")
+    unit: Unit = Field(description="What the interval is over: all seeds that one could train, or one policy's episodes.")
     seeds: int = Field(ge=1, description="Runs that it is measured over.")
     episodes: int = Field(ge=1, description="Episodes of all those runs together.")
+    per_seed: list[float] = Field(description="The value of each of those runs.")
+    failed: FailedSeeds | None = Field(description="What so few seeds leave open; null unless it is a success rate.")

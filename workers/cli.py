@@ -21,7 +21,7 @@ from workers.reference.command import app as policies
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.command import reproduce
 from workers.runtime.worker import worker
-from workers.statistics import wilson_interval
+from workers.statistics.seeds import failed_seeds, success_rate
 
 app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)
 app.command()(export)
@@ -79,12 +79,24 @@ def describe(result: EvaluationResult) -> str:
     """An evaluation in one line."""
     count = len(result.episodes)
     arrivals = [episode for episode in result.episodes if episode.outcome == "arrival"]
-    low, high = wilson_interval(len(arrivals), count)
+    success = success_rate([len(arrivals)], [count])
     steps = f"{sum(e.steps for e in arrivals) / len(arrivals):6.1f} steps" if arrivals else "     - steps"
     reward = sum(episode.reward for episode in result.episodes) / max(1, sum(e.steps for e in result.episodes))
     return (
-        f"{len(arrivals) / count:6.1%} success [{low:.1%}, {high:.1%}] of {count} on {result.suite}, "
+        f"{success.value:6.1%} success [{success.low:.1%}, {success.high:.1%}] of {count} on {result.suite}, "
         f"{steps} per target, {reward:6.2f} reward per step"
+    )
+
+
+def describe_seeds(results: Sequence[EvaluationResult]) -> str:
+    """Several seeds of one training on one suite, in one line: what they say of all seeds, and what they leave open."""
+    arrivals = [sum(episode.outcome == "arrival" for episode in result.episodes) for result in results]
+    episodes = [len(result.episodes) for result in results]
+    success = success_rate(arrivals, episodes)
+    each = [one / count for one, count in zip(arrivals, episodes, strict=True)]
+    return (
+        f"{success.value:6.1%} success [{success.low:.1%}, {success.high:.1%}] over {len(results)} seeds on "
+        f"{results[0].suite} ({', '.join(f'{rate:.1%}' for rate in each)}). {failed_seeds(each).sentence}"
     )
 
 
@@ -145,18 +157,30 @@ def evaluate(
         str | None, typer.Option(help="A suite by name; that of each checkpoint's own task without it.")
     ] = None,
 ) -> None:
-    """Drive each checkpoint's policy through a frozen suite and print how it did, with a 95 % Wilson interval."""
+    """Drive each checkpoint's policy through a frozen suite and print how it did.
+
+    The 95 % interval of a checkpoint is over the episodes of its one policy (exact). Where the checkpoints are several seeds
+    of one training, a last line has the interval over seeds (Student's t), of the newest checkpoint of each.
+    """
     try:
         from sim.suites import load_suite, suite_for
         from workers.checkpoints import read_policy
         from workers.training.evaluation import evaluate as run
 
+        newest: dict[int, tuple[int, EvaluationResult]] = {}
+        alike = set()
         for checkpoint in checkpoints:
             manifest, policy = read_policy(checkpoint)
             task = manifest.training.task
             result = run(policy, task, suite_for(task) if suite is None else load_suite(suite))
             name = f"{checkpoint}: " if len(checkpoints) > 1 else ""
             _console.print(name + describe(result), highlight=False, markup=False, soft_wrap=True)
+            alike.add((manifest.training.model_dump_json(), result.suite_hash))
+            if manifest.seed not in newest or manifest.step > newest[manifest.seed][0]:
+                newest[manifest.seed] = manifest.step, result
+        if len(alike) == 1 and len(newest) > 1:
+            seeds = [result for _, (_, result) in sorted(newest.items())]
+            _console.print(describe_seeds(seeds), highlight=False, markup=False, soft_wrap=True)
     except (WorkerError, SimError, KeyError) as error:
         _fail(str(error.args[0]))
 

@@ -13,7 +13,7 @@ class Evaluation(Schema):
     suite_hash: str = Field(description="Only evaluations of the same hash may be compared.")
     episodes: int
     arrivals: int
-    success: Estimate = Field(description="Arrivals over episodes, with its Wilson interval.")
+    success: Estimate = Field(description="Arrivals over episodes of this one policy, with the exact interval.")
     steps_mean: float | None = Field(description="Control steps to the target, over the episodes that arrived.")
     reward_mean: float = Field(description="Summed reward of an episode.")
 

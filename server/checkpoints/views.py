@@ -3,15 +3,10 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from server import statistics
 from server.checkpoints.schemas import Checkpoint, Evaluation
 from server.database import tables
+from server.estimates import success_estimate
 from server.schemas import Estimate
-
-
-def estimate(interval: statistics.Interval, *, seeds: int, episodes: int) -> Estimate:
-    """An interval with what stands behind it."""
-    return Estimate(value=interval.value, low=interval.low, high=interval.high, seeds=seeds, episodes=episodes)
 
 
 def success_over_runs(evaluations: Sequence[tables.Evaluation]) -> Estimate | None:
@@ -20,20 +15,19 @@ def success_over_runs(evaluations: Sequence[tables.Evaluation]) -> Estimate | No
         return None
     (suite_hash, _), *_ = Counter(evaluation.suite_hash for evaluation in evaluations).most_common(1)
     alike = [evaluation for evaluation in evaluations if evaluation.suite_hash == suite_hash]
-    counts = [evaluation.episode_count for evaluation in alike]
-    interval = statistics.success_rate([evaluation.arrivals for evaluation in alike], counts)
-    return estimate(interval, seeds=len(alike), episodes=sum(counts))
+    return success_estimate(
+        [evaluation.arrivals for evaluation in alike], [evaluation.episode_count for evaluation in alike]
+    )
 
 
 def evaluation_view(evaluation: tables.Evaluation) -> Evaluation:
     """A checkpoint's evaluation in JSON."""
-    interval = statistics.wilson_interval(evaluation.arrivals, evaluation.episode_count)
     return Evaluation(
         suite=evaluation.suite,
         suite_hash=evaluation.suite_hash,
         episodes=evaluation.episode_count,
         arrivals=evaluation.arrivals,
-        success=estimate(interval, seeds=1, episodes=evaluation.episode_count),
+        success=success_estimate([evaluation.arrivals], [evaluation.episode_count]),
         steps_mean=evaluation.steps_mean,
         reward_mean=evaluation.reward_mean,
     )

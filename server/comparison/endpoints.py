@@ -17,9 +17,15 @@ ExperimentIds = Annotated[
 
 
 @router.get("", responses=NOT_FOUND)
-def compare(experiment_ids: ExperimentIds, services: ServicesDep) -> Comparison:
-    """Final figures side by side, with intervals, and what differs in the configurations."""
-    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)))
+def compare(
+    experiment_ids: ExperimentIds,
+    services: ServicesDep,
+    margin: Annotated[
+        float, Query(gt=0.0, le=0.5, description="Success rates that differ by less are equivalent, 0 to 1.")
+    ] = 0.02,
+) -> Comparison:
+    """Final figures side by side, with intervals and verdicts, and what differs in the configurations."""
+    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin)
 
 
 @router.get("/curves", responses=NOT_FOUND)
@@ -29,5 +35,5 @@ def compare_curves(
     name: Annotated[str, Query(max_length=64, description="Of the metric.")] = "eval/success_rate",
     points: Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")] = 400,
 ) -> Curves:
-    """One metric of every run on one grid, and each experiment's mean, interquartile mean and interval."""
+    """One metric of every run on one grid, and each experiment's mean and interval."""
     return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points)

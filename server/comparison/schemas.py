@@ -1,6 +1,6 @@
 """Experiments side by side in JSON."""
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -28,10 +28,32 @@ class Difference(Schema):
     values: list[Any] = Field(description="One an experiment, in their order; null where it has no such setting.")
 
 
+Measure = Literal["success", "steps_per_target"]
+ComparisonWord = Literal["better", "worse", "equivalent", "not told", "refused"]
+
+
+class ComparisonVerdict(Schema):
+    """What may be said of an experiment beside the first one, in one measure."""
+
+    measure: Measure
+    base: str = Field(description="Id of the first experiment.")
+    other: str = Field(description="Id of the one that is judged.")
+    word: ComparisonWord = Field(
+        description="Of the other: direction by the 95 % interval, equivalence by two one-sided tests at 5 %, or neither; "
+        "refused below five seeds or over different suites."
+    )
+    difference: float | None = Field(description="Other less base, of their means over seeds; null where refused.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+    margin: float = Field(description="Differences up to this do not matter.")
+    reason: str = Field(description="As a sentence, with figures.")
+
+
 class Comparison(Schema):
     """Experiments side by side, in the order asked for."""
 
     experiments: list[ComparedExperiment]
+    verdicts: list[ComparisonVerdict] = Field(description="Every experiment against the first.")
     differences: list[Difference]
     warnings: list[str] = Field(description="What speaks against reading too much into the figures.")
 
@@ -46,7 +68,8 @@ class SeedCurve(Schema):
 class ExperimentCurves(Schema):
     """An experiment's runs on the common grid, and what they are together.
 
-    `low` and `high` are the 95 % bootstrap interval of `mean`, over seeds; null where fewer than two have a value.
+    `low` and `high` are the 95 % interval of `mean` over seeds (Student's t, of rates on the scale of the logit); null where
+    fewer than two have a value.
     """
 
     id: str

@@ -1,28 +1,26 @@
 """Experiments side by side: final figures, differences, and curves on a common grid."""
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy.orm import Session
 
-from server import statistics
 from server.abandoned import stop_if_abandoned
-from server.checkpoints.repository import CheckpointRepository, decode_episodes
-from server.checkpoints.views import estimate
+from server.checkpoints.repository import CheckpointRepository
 from server.comparison.differences import differences
-from server.comparison.schemas import ComparedExperiment, Comparison, Curves, ExperimentCurves, SeedCurve
+from server.comparison.figures import FinalFigures, final_figures
+from server.comparison.schemas import Comparison, Curves, ExperimentCurves, SeedCurve
+from server.comparison.verdicts import verdicts
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
-from server.schemas import Estimate
 from server.services import Services
+from workers.statistics.seeds import means_band, rates_band
 
-# Below this, a bootstrap interval over seeds is far too narrow: one that says 95 % over 3 seeds covers 45 %.
-_ENOUGH_SEEDS = 5
+# Metrics between 0 and 1, and those among them that every evaluation counts over its suite's episodes.
+_RATE, _EVALUATION = "_rate", "eval/"
 
 
 class ComparisonService:
@@ -31,18 +29,31 @@ class ComparisonService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def compare(self, experiment_ids: Sequence[str]) -> Comparison:
-        """Final figures and differences, in the order asked for.
+    def compare(self, experiment_ids: Sequence[str], margin: float) -> Comparison:
+        """Final figures, verdicts and differences, in the order asked for.
+
+        Args:
+            experiment_ids: of those to compare; the first is what the others are held against.
+            margin: success rates that differ by less are equivalent, 0 to 1.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
-            compared = [_final_figures(session, experiment) for experiment in experiments]
-            warnings = _warnings(session, experiments, compared)
+            repository = CheckpointRepository(session)
+            figures = [
+                final_figures(experiment, repository.final_evaluations([run.id for run in experiment.runs]))
+                for experiment in experiments
+            ]
+            warnings = _warnings(experiments, figures)
         settings = [experiment.training for experiment in experiments]
-        return Comparison(experiments=compared, differences=differences(settings), warnings=warnings)
+        return Comparison(
+            experiments=[one.view() for one in figures],
+            verdicts=verdicts(figures, margin),
+            differences=differences(settings),
+            warnings=warnings,
+        )
 
     def curves(self, experiment_ids: Sequence[str], name: str, points: int) -> Curves:
         """One metric of all runs on one grid of at most `points` steps.
@@ -54,11 +65,13 @@ class ComparisonService:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
             repository = MetricRepository(session)
             series = {run.id: _series(repository, run.id, name) for experiment in experiments for run in experiment.runs}
+            final = CheckpointRepository(session).final_evaluations(list(series))
+            episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
         grid = common_grid(list(series.values()), points)
         return Curves(
             name=name,
             steps=grid.tolist(),
-            experiments=[_curves(experiment, series, grid) for experiment in experiments],
+            experiments=[_curves(experiment, series, grid, name, episodes) for experiment in experiments],
         )
 
 
@@ -83,14 +96,16 @@ def resample(points: Points, grid: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.interp(grid, points.steps[finite], points.values[finite].astype(np.float64), left=np.nan, right=np.nan)
 
 
-def _curves(experiment: tables.Experiment, series: dict[str, Points], grid: NDArray[np.int64]) -> ExperimentCurves:
+def _curves(
+    experiment: tables.Experiment, series: dict[str, Points], grid: NDArray[np.int64], name: str, episodes: Mapping[str, int]
+) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
-    present = np.isfinite(values)
-    count = present.sum(axis=0)
-    mean = np.full(grid.size, np.nan)
-    for index in np.flatnonzero(count):
-        mean[index] = values[present[:, index], index].mean()
-    low, high = statistics.curve_band(values)
+    driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
+    counted = name.startswith(_EVALUATION) and driven[np.isfinite(values).any(axis=1)].all()
+    if not name.endswith(_RATE):
+        mean, low, high = means_band(values)
+    else:
+        mean, low, high = rates_band(values, driven if counted else None)
     return ExperimentCurves(
         id=experiment.id,
         name=experiment.name,
@@ -98,71 +113,16 @@ def _curves(experiment: tables.Experiment, series: dict[str, Points], grid: NDAr
         mean=json_numbers(mean),
         low=json_numbers(low),
         high=json_numbers(high),
-        count=count.tolist(),
+        count=np.isfinite(values).sum(axis=0).tolist(),
     )
 
 
-def _final_figures(session: Session, experiment: tables.Experiment) -> ComparedExperiment:
-    evaluations = _alike(CheckpointRepository(session).final_evaluations([run.id for run in experiment.runs]))
-    if not evaluations:
-        return ComparedExperiment(
-            id=experiment.id,
-            name=experiment.name,
-            seeds=0,
-            episodes=0,
-            suite=None,
-            suite_hash=None,
-            success=None,
-            steps_per_target=None,
-            reward=None,
-        )
-    tables = [decode_episodes(evaluation) for evaluation in evaluations]
-    counts = [len(table) for table in tables]
-    success = statistics.success_rate([evaluation.arrivals for evaluation in evaluations], counts)
-    arrived = [[episode for episode in table if episode.outcome == "arrival"] for table in tables]
-    return ComparedExperiment(
-        id=experiment.id,
-        name=experiment.name,
-        seeds=len(tables),
-        episodes=sum(counts),
-        suite=evaluations[0].suite,
-        suite_hash=evaluations[0].suite_hash,
-        success=estimate(success, seeds=len(tables), episodes=sum(counts)),
-        steps_per_target=_over_seeds([np.array([float(e.steps) for e in table]) for table in arrived]),
-        reward=_over_seeds([np.array([e.reward for e in table]) for table in tables]),
-    )
-
-
-def _over_seeds(samples: list[NDArray[np.float64]]) -> Estimate | None:
-    """The estimate over the seeds that have any episode to show."""
-    samples = [values for values in samples if values.size]
-    if not samples:
-        return None
-    return estimate(statistics.seeds_estimate(samples), seeds=len(samples), episodes=sum(values.size for values in samples))
-
-
-def _alike(final: dict[str, tables.Evaluation]) -> list[tables.Evaluation]:
-    """Those on the suite that most of the runs were measured on: others can't be counted together with them."""
-    if not final:
-        return []
-    (suite_hash, _), *_ = Counter(evaluation.suite_hash for evaluation in final.values()).most_common(1)
-    return [evaluation for evaluation in final.values() if evaluation.suite_hash == suite_hash]
-
-
-def _warnings(
-    session: Session, experiments: Sequence[tables.Experiment], compared: Sequence[ComparedExperiment]
-) -> list[str]:
+def _warnings(experiments: Sequence[tables.Experiment], compared: Sequence[FinalFigures]) -> list[str]:
     warnings = []
     for experiment, figures in zip(experiments, compared, strict=True):
         if figures.seeds == 0:
             warnings.append(f"{experiment.name} has not been evaluated yet.")
             continue
-        if figures.seeds < _ENOUGH_SEEDS:
-            plural = "seed" if figures.seeds == 1 else "seeds"
-            warnings.append(
-                f"{experiment.name} has {figures.seeds} {plural}: fewer than {_ENOUGH_SEEDS} can't show that one "
-                "configuration beats another, and its intervals are too narrow."
-            )
         missing = len(experiment.runs) - figures.seeds
         if missing:
             warnings.append(f"{missing} of {len(experiment.runs)} runs of {experiment.name} are not in its figures.")

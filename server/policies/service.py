@@ -1,8 +1,8 @@
 """What a person may do with the policies that ship: look, take away."""
 
 from server.errors import NotFoundError
+from server.estimates import success_estimate
 from server.policies.schemas import PolicyEpisodes, ReferencePolicy, SuiteResult, SuiteRow
-from server.schemas import Estimate
 from workers.errors import UnknownPolicyError
 from workers.reference import library
 from workers.reference.figures import Figures
@@ -36,9 +36,9 @@ def view(policy: library.ReferencePolicy) -> ReferencePolicy:
             SuiteResult(
                 suite=result.suite,
                 suite_hash=result.suite_hash,
-                policy=_row(card.title, result.figures),
+                policy=_row(card.title, result.figures, trained=True),
                 baselines=[
-                    _row(baseline.name, measured.figures)
+                    _row(baseline.name, measured.figures, trained=False)
                     for baseline in library.baselines().baselines
                     for measured in baseline.results
                     if measured.suite_hash == result.suite_hash
@@ -63,16 +63,10 @@ def episodes(name: str, suite: str) -> PolicyEpisodes:
     return PolicyEpisodes(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=evaluation.episodes)
 
 
-def _row(name: str, figures: Figures) -> SuiteRow:
+def _row(name: str, figures: Figures, *, trained: bool) -> SuiteRow:
     return SuiteRow(
         name=name,
-        success=Estimate(
-            value=figures.success,
-            low=figures.success_low,
-            high=figures.success_high,
-            seeds=1,
-            episodes=figures.episodes,
-        ),
+        success=success_estimate([figures.arrivals], [figures.episodes], trained=trained),
         collision=figures.collision,
         timeout=figures.timeout,
         spl=figures.spl,

@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.services import Services
-from server.statistics import wilson_interval
 from tests.server.harness import Reports
+from workers.statistics.seeds import success_rate
 
 
 def test_checkpoints_are_listed_with_what_they_achieve(client: TestClient, reports: Reports) -> None:
@@ -22,13 +22,27 @@ def test_checkpoints_are_listed_with_what_they_achieve(client: TestClient, repor
     assert second["evaluation"] is None
     assert second["size"] == len("archive of step 2000")
     assert second["sha256"] == hashlib.sha256(b"archive of step 2000").hexdigest()
-    interval = wilson_interval(4, 10)
+    interval = success_rate([4], [10])
     assert first["evaluation"] == {
         "suite": "simple-200",
         "suite_hash": "hash-a",
         "episodes": 10,
         "arrivals": 4,
-        "success": {"value": 0.4, "low": interval.low, "high": interval.high, "seeds": 1, "episodes": 10},
+        "success": {
+            "value": 0.4,
+            "low": interval.low,
+            "high": interval.high,
+            "unit": "episodes",
+            "seeds": 1,
+            "episodes": 10,
+            "per_seed": [0.4],
+            "failed": {
+                "failed": 0,
+                "seeds": 1,
+                "at_most": pytest.approx(0.95),
+                "sentence": "One seed alone: of others up to 95 % may fail (one-sided 95 %).",
+            },
+        },
         # Of the four that arrived; the six collisions would make a bad policy look quick.
         "steps_mean": 120.0,
         "reward_mean": -20.0,
@@ -85,12 +99,16 @@ def test_the_success_of_an_experiment_is_that_of_its_last_checkpoints(client: Te
     reports.checkpoint(experiment["runs"][0], 1_000, reports.evaluation(arrivals=10))
     reports.checkpoint(experiment["runs"][0], 2_000, reports.evaluation(arrivals=8))
     reports.checkpoint(experiment["runs"][0], 2_500, None)
-    reports.checkpoint(experiment["runs"][1], 2_000, reports.evaluation(arrivals=8))
+    reports.checkpoint(experiment["runs"][1], 2_000, reports.evaluation(arrivals=7))
 
     success = client.get(f"/api/experiments/{experiment['id']}").json()["success"]
 
-    interval = wilson_interval(16, 20)
-    assert success == {"value": 0.8, "low": interval.low, "high": interval.high, "seeds": 2, "episodes": 20}
+    interval = success_rate([8, 7], [10, 10])
+    assert (success["value"], success["low"], success["high"]) == (0.75, interval.low, interval.high)
+    assert (success["unit"], success["seeds"], success["episodes"]) == ("seeds", 2, 20)
+    assert success["per_seed"] == [0.8, 0.7]
+    # 1 - 0.05 ** (1 / 2).
+    assert success["failed"]["sentence"] == "None of 2 seeds failed: up to 78 % may (one-sided 95 %)."
 
 
 def test_every_episode_behind_a_figure_can_be_read(client: TestClient, reports: Reports) -> None:

@@ -1,5 +1,7 @@
 """Experiments side by side: figures with what stands behind them, differences, warnings, curves on one grid."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +13,17 @@ from hypothesis import strategies as st
 from server.comparison.differences import differences
 from server.comparison.service import common_grid, resample
 from server.metrics.points import Points
-from server.statistics import success_rate
 from tests.server.harness import Reports
+from workers.statistics.seeds import success_rate
 
 
 def compare(client: TestClient, *experiments: dict[str, Any]) -> dict[str, Any]:
-    response = client.get("/api/compare", params={"experiment": [experiment["id"] for experiment in experiments]})
+    return compare_within(client, None, *experiments)
+
+
+def compare_within(client: TestClient, margin: float | None, *experiments: dict[str, Any]) -> dict[str, Any]:
+    params: dict[str, Any] = {"experiment": [experiment["id"] for experiment in experiments]}
+    response = client.get("/api/compare", params=params if margin is None else params | {"margin": margin})
     assert response.status_code == 200, response.text
     comparison: dict[str, Any] = response.json()
     return comparison
@@ -31,17 +38,14 @@ def test_figures_stand_on_the_last_checkpoint_of_every_seed(client: TestClient, 
     (figures,) = compare(client, experiment)["experiments"]
 
     assert (figures["name"], figures["seeds"], figures["episodes"], figures["suite"]) == ("Corridor", 2, 20, "simple-200")
-    expected = success_rate([8, 6], [10, 10])
-    assert figures["success"] == {
-        "value": 0.7,
-        "low": expected.low,
-        "high": expected.high,
-        "seeds": 2,
-        "episodes": 20,
-    }
+    expected, success = success_rate([8, 6], [10, 10]), figures["success"]
+    assert (success["value"], success["low"], success["high"]) == (0.7, expected.low, expected.high)
+    assert (success["unit"], success["seeds"], success["episodes"], success["per_seed"]) == ("seeds", 2, 20, [0.8, 0.6])
+    assert success["failed"]["sentence"] == "None of 2 seeds failed: up to 78 % may (one-sided 95 %)."
     # Over the episodes that arrived, 8 and 6: seeds count alike.
     assert figures["steps_per_target"]["value"] == 90.0
     assert figures["steps_per_target"]["episodes"] == 14
+    assert figures["steps_per_target"]["failed"] is None
     # Means of 60 and 20.
     assert figures["reward"]["value"] == pytest.approx(40.0)
     assert figures["reward"]["low"] < 40.0 < figures["reward"]["high"]
@@ -81,17 +85,86 @@ def test_differences_are_symmetric_and_empty_for_equals(one: dict[str, Any], oth
     assert forth == back
 
 
-def test_too_few_seeds_and_unfinished_runs_are_said(client: TestClient, reports: Reports) -> None:
+def test_unfinished_runs_are_said(client: TestClient, reports: Reports) -> None:
     experiment = reports.experiment("Corridor", seeds=(0, 1))
     assert compare(client, experiment)["warnings"] == ["Corridor has not been evaluated yet."]
 
     reports.checkpoint(experiment["runs"][0], 1_000, reports.evaluation(arrivals=10))
-    few, *others = compare(client, experiment)["warnings"]
-    assert few.startswith("Corridor has 1 seed: fewer than 5 can't show that one configuration beats another")
-    assert others == [
+    assert compare(client, experiment)["warnings"] == [
         "1 of 2 runs of Corridor are not in its figures.",
         "Corridor is not finished: its figures are those of its newest checkpoints.",
     ]
+
+
+def measured(
+    reports: Reports, name: str, arrivals: Sequence[int], *, steps: int = 80, suite_hash: str = "hash-a"
+) -> dict[str, Any]:
+    """An experiment whose seeds arrived so often of 1,000 times."""
+    experiment = reports.experiment(name, seeds=range(len(arrivals)))
+    for run, arrived in zip(experiment["runs"], arrivals, strict=True):
+        evaluation = reports.evaluation(arrivals=arrived, episodes=1_000, steps=steps, suite_hash=suite_hash)
+        reports.checkpoint(run, 1_000, evaluation)
+    return experiment
+
+
+def test_a_verdict_has_a_direction(client: TestClient, reports: Reports) -> None:
+    base = measured(reports, "base", (800, 820, 790, 850, 810), steps=100)
+    good = measured(reports, "good", (990, 980, 970, 990, 980), steps=80)
+
+    verdicts = compare(client, base, good)["verdicts"]
+    assert [(one["measure"], one["word"]) for one in verdicts] == [("success", "better"), ("steps_per_target", "better")]
+    assert {(one["base"], one["other"]) for one in verdicts} == {(base["id"], good["id"])}
+    success, steps = verdicts
+    assert success["difference"] == pytest.approx(0.982 - 0.814)
+    assert success["low"] < success["difference"] < success["high"]
+    assert success["margin"] == 0.02
+    assert success["reason"].startswith("16.8 points more, 95 % interval [+")
+    # Every arrival took as long: the seeds have no spread.
+    assert (steps["difference"], steps["low"], steps["high"]) == (-20.0, -20.0, -20.0)
+    assert steps["margin"] == pytest.approx(5.0)
+    assert steps["reason"] == "20.0 steps to the target fewer, 95 % interval [-20.0, -20.0]."
+
+    assert [one["word"] for one in compare(client, good, base)["verdicts"]] == ["worse", "worse"]
+
+
+def test_a_verdict_of_equivalence_is_within_the_margin_that_is_asked_for(client: TestClient, reports: Reports) -> None:
+    one = measured(reports, "one", (985, 980, 982, 978, 984))
+    other = measured(reports, "other", (979, 984, 981, 983, 980))
+
+    success, steps = compare(client, one, other)["verdicts"]
+    assert (success["word"], steps["word"]) == ("equivalent", "equivalent")
+    assert success["reason"].startswith("The two are equivalent within 2.0 points: 0.0 points less, 95 % interval [")
+    narrow = compare_within(client, 0.001, one, other)["verdicts"][0]
+    assert narrow["word"] == "not told"
+    assert narrow["reason"].endswith("5 seeds show neither a direction nor equivalence within 0.1 points.")
+
+
+def test_below_five_seeds_a_verdict_is_refused(client: TestClient, reports: Reports) -> None:
+    five, four = measured(reports, "five", (500,) * 5), measured(reports, "four", (1_000,) * 4)
+
+    for verdict in compare(client, five, four)["verdicts"]:
+        assert (verdict["word"], verdict["difference"], verdict["low"], verdict["high"]) == ("refused", None, None, None)
+        assert verdict["reason"] == "No verdict below 5 seeds: four has 4 to show."
+
+
+def test_over_different_suites_a_verdict_is_refused(client: TestClient, reports: Reports) -> None:
+    one, other = measured(reports, "one", (500,) * 5), measured(reports, "other", (900,) * 5, suite_hash="hash-b")
+
+    verdict = compare(client, one, other)["verdicts"][0]
+    assert verdict["word"] == "refused"
+    assert verdict["reason"].startswith("No verdict over different suites")
+
+
+def test_one_experiment_alone_has_no_verdict(client: TestClient, reports: Reports) -> None:
+    assert compare(client, measured(reports, "one", (900,) * 5))["verdicts"] == []
+
+
+def test_who_never_arrives_has_no_steps_to_judge(client: TestClient, reports: Reports) -> None:
+    one, other = measured(reports, "one", (900,) * 5), measured(reports, "never", (0,) * 5)
+
+    success, steps = compare(client, one, other)["verdicts"]
+    assert (success["word"], steps["word"]) == ("worse", "refused")
+    assert steps["reason"] == "No verdict below 5 seeds: never has 0 to show."
 
 
 def test_five_seeds_that_are_done_need_no_warning(client: TestClient, reports: Reports) -> None:
@@ -147,10 +220,35 @@ def test_curves_stand_on_one_grid(client: TestClient, reports: Reports) -> None:
     ]
     assert first["mean"] == [0.25, 0.625, 1.0, None]
     assert first["count"] == [2, 2, 1, 0]
-    # Both seeds' lower, both seeds' higher value are in more than 2.5 % of the replicates.
-    assert first["low"] == [0.0, 0.5, None, None]
-    assert first["high"] == [0.5, 0.75, None, None]
+    # Student's t on the logit: 0.625 with an error of 0.125, 0.125 / (0.625 * 0.375) = 0.5333, times 12.7062 is 6.777;
+    # logit(0.625) = 0.5108.
+    assert first["low"][1] == pytest.approx(1 / (1 + math.exp(6.777 - 0.5108)), abs=1e-4)
+    assert first["high"][1] == pytest.approx(1 / (1 + math.exp(-6.777 - 0.5108)), abs=1e-4)
+    assert (first["low"][2:], first["high"][2:]) == ([None, None], [None, None])
     assert second["mean"] == [None, None, None, 1.0]
+
+
+def test_the_band_of_other_metrics_is_students_t(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment(seeds=(0, 1))
+    for run, value in zip(experiment["runs"], (1.0, 3.0), strict=True):
+        reports.metrics(run, "train/return", {100: value})
+
+    parameters = {"experiment": experiment["id"], "name": "train/return"}
+    (curve,) = client.get("/api/compare/curves", params=parameters).json()["experiments"]
+    # Mean 2, error 1, one degree of freedom.
+    assert (curve["low"], curve["high"]) == ([pytest.approx(2 - 12.7062)], [pytest.approx(2 + 12.7062)])
+
+
+def test_seeds_that_all_arrive_still_have_a_band(client: TestClient, reports: Reports) -> None:
+    """Both evaluated on a suite of 10: 20 of 20 leave 1 - 0.025 ** (1 / 20) open."""
+    experiment = reports.experiment(seeds=(0, 1))
+    for run in experiment["runs"]:
+        reports.metrics(run, "eval/success_rate", {100: 1.0})
+        reports.checkpoint(run, 100, reports.evaluation(arrivals=10))
+
+    parameters = {"experiment": experiment["id"], "name": "eval/success_rate"}
+    (curve,) = client.get("/api/compare/curves", params=parameters).json()["experiments"]
+    assert (curve["low"], curve["high"]) == ([pytest.approx(0.025 ** (1 / 20))], [1.0])
 
 
 def test_long_curves_are_resampled(client: TestClient, reports: Reports) -> None:

@@ -14,6 +14,7 @@ from tests.server.harness import BASE_URL, TOKEN, Reports
 from workers.protocol import Queue
 from workers.reproduction.rows import ROWS, TABLES
 from workers.reproduction.table import TableRow
+from workers.statistics.intervals import exact_interval
 
 
 class RecordingDoorbell:
@@ -136,8 +137,10 @@ def test_the_finished_campaign_is_judged(client: TestClient, services: Services,
     assert judged["campaign"]["progress"] == 1.0
     assert judged["campaign"]["seconds_left"] is None
     ddpg = row_of(judged, "complex-basic-ddpg")
-    # 0.950 to 0.954: deviation 0.00158 over five, times 2.776.
-    assert ddpg["ours"]["success"] == pytest.approx({"mean": 0.952, "low": 0.950037, "high": 0.953963}, abs=1e-6)
+    # 0.950 to 0.954 differ less than chance: what 4,284 of 4,500 attempts leave open (Clopper and Pearson).
+    low, high = exact_interval(4_284, 4_500)
+    assert ddpg["ours"]["success"] == pytest.approx({"mean": 0.952, "low": float(low), "high": float(high)})
+    assert ddpg["ours"]["failed"]["sentence"] == "None of 5 seeds failed: up to 45 % may (one-sided 95 %)."
     assert [run["measured"]["success"] for run in ddpg["runs"]] == pytest.approx([0.95, 0.951, 0.952, 0.953, 0.954])
     words = {claim["id"]: claim["word"] for claim in judged["claims"]}
     assert words["complex-success"] == "holds"

@@ -108,7 +108,8 @@ def test_figures_by_hand() -> None:
     # Paths end at the arrival circle: 1.8 m of 3.6 m, and a path that is shorter than the shortest counts as 1.
     assert found.spl == pytest.approx((0.5 + 1.0) / 4)
     assert (found.success, found.collision, found.timeout, found.steps) == (0.5, 0.25, 0.25, 15.0)
-    assert found.success_low < 0.5 < found.success_high
+    # Clopper and Pearson (1934): 2 of 4.
+    assert (found.success_interval.low, found.success_interval.high) == pytest.approx((0.0676, 0.9324), abs=1e-4)
     assert figures([episode("timeout")], 0.2).steps is None
     # One definition: the curve's path efficiency is the table's SPL among those that arrived.
     result = EvaluationResult(suite="s", suite_hash="h", episodes=tuple(episodes))

@@ -105,14 +105,63 @@ def test_words_for_a_comparison(better: Sequence[float], worse: Sequence[float],
 
 
 def test_the_reason_has_the_difference_and_its_interval() -> None:
-    """Means 0.93 and 0.83; variances 0.00025 each over five: error 0.01, 8 degrees of freedom, 2.306 errors either way."""
+    """Means 0.93 and 0.83, deviations 0.0158 over five: on the logit [90.75, 94.71] and [80.95, 84.88].
+
+    The ends of the difference: 10 - hypot(2.25, 1.88) and 10 + hypot(1.71, 2.05).
+    """
     one = claim("complex-success")
     assert isinstance(one, Comparison)
     results = {one.better: seeds(0.91, 0.92, 0.93, 0.94, 0.95), one.worse: seeds(0.81, 0.82, 0.83, 0.84, 0.85)}
     verdict = judge(one, results)
-    assert verdict.reason == "10.0 points more, 95 % interval [+7.7, +12.3], all of it in favour of the claim."
+    assert verdict.reason == "10.0 points more, 95 % interval [+7.1, +12.7], all of it in favour of the claim."
     assert verdict.evidence == "The paper: 59 of 63 against 59 of 87 with one seed each, p < 0.001 (Fisher's exact test)."
     assert verdict.rows == (one.better, one.worse)
+
+
+def test_the_papers_effect_is_compatible_inside_our_interval() -> None:
+    """The paper: 59 of 63 against 59 of 87, 25.8 points more."""
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    results = {one.better: seeds(0.90, 0.95, 0.92, 0.97, 0.94), one.worse: seeds(0.60, 0.75, 0.68, 0.72, 0.65)}
+    found = judge(one, results).compatibility
+    assert found is not None
+    assert found.word == "compatible"
+    assert found.sentence == "The paper's effect, +25.8 points, lies inside our interval: compatible."
+
+
+def test_what_single_seeds_may_show_is_no_contradiction() -> None:
+    """Means 0.85 and 0.75, deviation 0.05: one seed of each spreads by 0.05 x sqrt(2 x 1.2), t with 8 degrees of freedom.
+
+    That is 17.9 points; the paper's own 63 and 87 attempts add 1.96 x sqrt(0.85 x 0.15 / 63 + 0.68 x 0.32 / 87) = 13.2.
+    """
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    step = 0.05 / math.sqrt(2.5)
+    better, worse = ([centre + step * place for place in (-2, -1, 0, 1, 2)] for centre in (0.85, 0.75))
+    found = judge(one, {one.better: seeds(*better), one.worse: seeds(*worse)}).compatibility
+    assert found is not None
+    assert found.word == "one seed's luck"
+    assert found.sentence == (
+        "The paper's effect, +25.8 points, lies outside our interval, but one seed of each, as the paper has, may show "
+        "-12.2 to +32.2."
+    )
+
+
+def test_an_effect_that_no_seed_shows_is_not_compatible() -> None:
+    """Vanilla PPO arrives in 30 % of the paper's attempts, and in all of ours."""
+    one = claim("simple-success-vanilla")
+    assert isinstance(one, Comparison)
+    verdict = judge(one, {one.better: seeds(1, 1, 1, 1, 1), one.worse: seeds(1, 1, 1, 1, 1)})
+    assert verdict.word == "does not hold"
+    assert verdict.compatibility is not None
+    assert verdict.compatibility.word == "not compatible"
+    assert verdict.compatibility.sentence.startswith("The paper's effect, +69.6 points, lies outside our interval, and")
+
+
+def test_a_curve_without_numbers_is_neither_compatible_nor_not() -> None:
+    one = claim("simple-converges-vanilla")
+    assert isinstance(one, Comparison)
+    assert judge(one, {one.better: seeds(*[1] * 5), one.worse: seeds(*[1] * 5, learned=None)}).compatibility is None
 
 
 def test_fewer_steps_are_better() -> None:
@@ -121,7 +170,7 @@ def test_fewer_steps_are_better() -> None:
     quick, slow = seeds(1, 1, 1, 1, 1, steps=100.0), seeds(1, 1, 1, 1, 1, steps=150.0)
     verdict = judge(one, {one.better: quick, one.worse: slow})
     assert verdict.word == "holds"
-    assert verdict.reason.startswith("50.0 steps per episode fewer, 95 % interval [+50.0, +50.0]")
+    assert verdict.reason.startswith("50.0 steps per episode fewer, 95 % interval [-50.0, -50.0]")
     assert judge(one, {one.better: slow, one.worse: quick}).reason.startswith("50.0 steps per episode more")
 
 
@@ -154,7 +203,8 @@ def test_without_results_nothing_can_be_told() -> None:
     verdicts = judge_all({})
     assert {verdict.word for verdict in verdicts} == {"can't be told"}
     assert len(verdicts) == len(CLAIMS)
-    assert verdicts[0].reason == "No seed of 5 done."
+    assert verdicts[0].reason == "No verdict below 5 seeds: 0 of 5 done."
+    assert {verdict.compatibility for verdict in verdicts} == {None}
 
 
 @given(st.lists(st.floats(0, 1), min_size=5, max_size=8), st.lists(st.floats(0, 1), min_size=5, max_size=8))
@@ -184,11 +234,11 @@ def test_the_papers_rows_have_no_collisions_to_report() -> None:
 
 
 def test_spread_over_seeds_stays_within_what_can_be() -> None:
-    """Mean 0.98, deviation 0.02 over five: 2.776 x 0.02 / sqrt(5) = 0.0248 either way, cut at 1."""
+    """Mean 0.98, error 0.02 / sqrt(5), on the logit of 4,410.5 in 4,501 that / (0.97989 x 0.02011) x 2.7764 = 1.2604."""
     spread = row_spread(seeds(0.96, 0.96, 0.98, 1.0, 1.0))
     assert spread is not None
-    assert spread.success.low == pytest.approx(0.98 - 0.02483, abs=1e-5)
-    assert spread.success.high == 1.0
+    assert (spread.success.low, spread.success.high) == pytest.approx((0.93255, 0.99421), abs=1e-4)
+    assert spread.failed.sentence == "None of 5 seeds failed: up to 45 % may (one-sided 95 %)."
     assert row_spread(seeds(0.5)) is not None
     assert row_spread([]) is None
 

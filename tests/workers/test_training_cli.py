@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import onnxruntime
@@ -79,6 +80,28 @@ def test_evaluate_names_each_of_several_checkpoints(tmp_path: Path, checkpoint: 
     assert first.startswith(f"{checkpoint}: ")
     assert second.startswith(f"{other}: ")
     assert first.removeprefix(f"{checkpoint}") == second.removeprefix(f"{other}")  # the same policy, the same scenarios
+
+
+def test_evaluate_tells_what_several_seeds_say_together(tmp_path: Path, checkpoint: Path) -> None:
+    """The same weights as two other seeds, and an older checkpoint of one of them, which does not count."""
+    options = ["evaluate", str(checkpoint)]
+    for name, seed, step in (("one", 4, 2_000), ("old", 4, 1_000), ("two", 5, 2_000)):
+        archive = tmp_path / f"{name}.zip"
+        with zipfile.ZipFile(checkpoint) as original, zipfile.ZipFile(archive, "w") as copy:
+            for entry in original.namelist():
+                content = original.read(entry)
+                if entry == "manifest.json":
+                    content = json.dumps(json.loads(content) | {"seed": seed, "step": step}).encode()
+                copy.writestr(entry, content)
+        options.append(str(archive))
+
+    result = CliRunner().invoke(app, options)
+
+    assert result.exit_code == 0, result.output
+    *each, together = result.output.splitlines()
+    assert len(each) == 4
+    assert re.search(r"success \[\d+\.\d%, \d+\.\d%\] over 3 seeds on simple-200 \(.*%, .*%, .*%\)\. ", together)
+    assert "of 3 seeds failed" in together or "All 3 seeds failed" in together
 
 
 def test_export_writes_onnx(tmp_path: Path, checkpoint: Path) -> None:

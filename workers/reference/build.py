@@ -187,10 +187,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for made_from in recipes:
         card = build(made_from, options.folder, options.seed)
         for result in card.results:
-            found = result.figures
+            found, interval = result.figures, result.figures.success_interval
             sys.stdout.write(
                 f"{card.name}, step {card.step:,}, {result.suite}: {found.success:.1%} success "
-                f"[{found.success_low:.1%}, {found.success_high:.1%}], SPL {found.spl:.2f}\n"
+                f"[{interval.low:.1%}, {interval.high:.1%}], SPL {found.spl:.2f}\n"
             )
 
 

@@ -19,9 +19,9 @@ def list_policies() -> None:
         card = policy.card
         typer.echo(f"{card.name}: {card.description}\n  {policy.archive}\n  made by: {card.command}")
         for result in card.results:
-            found = result.figures
+            found, interval = result.figures, result.figures.success_interval
             typer.echo(
-                f"  {result.suite}: {found.success:.1%} success [{found.success_low:.1%}, {found.success_high:.1%}] of "
+                f"  {result.suite}: {found.success:.1%} success [{interval.low:.1%}, {interval.high:.1%}] of "
                 f"{found.episodes}, {found.collision:.1%} collisions, {found.timeout:.1%} time-outs, SPL {found.spl:.2f}"
             )
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from sim.config import Frozen
 from workers.reporting import EpisodeResult
-from workers.statistics import wilson_interval
+from workers.statistics.intervals import Interval
+from workers.statistics.seeds import success_rate
 
 
 class Figures(Frozen):
@@ -12,7 +13,7 @@ class Figures(Frozen):
 
     Attributes:
         episodes: how many stand behind the rest.
-        success, success_low, success_high: arrivals, with the 95 % Wilson interval.
+        success: arrivals.
         collision: episodes that ended in one.
         timeout: episodes that took too long.
         spl: success weighted by path length (Anderson et al. 2018), for paths up to the target's arrival circle.
@@ -22,13 +23,21 @@ class Figures(Frozen):
 
     episodes: int
     success: float
-    success_low: float
-    success_high: float
     collision: float
     timeout: float
     spl: float
     steps: float | None
     min_clearance: float
+
+    @property
+    def arrivals(self) -> int:
+        """Episodes that arrived."""
+        return round(self.success * self.episodes)
+
+    @property
+    def success_interval(self) -> Interval:
+        """Success with the exact 95 % interval over the episodes of this one policy."""
+        return success_rate([self.arrivals], [self.episodes])
 
 
 def figures(episodes: Sequence[EpisodeResult], arrival_distance: float) -> Figures:
@@ -40,12 +49,9 @@ def figures(episodes: Sequence[EpisodeResult], arrival_distance: float) -> Figur
     """
     count = len(episodes)
     arrivals = [episode for episode in episodes if episode.outcome == "arrival"]
-    low, high = wilson_interval(len(arrivals), count)
     return Figures(
         episodes=count,
         success=len(arrivals) / count,
-        success_low=low,
-        success_high=high,
         collision=sum(episode.outcome == "collision" for episode in episodes) / count,
         timeout=sum(episode.outcome == "timeout" for episode in episodes) / count,
         spl=sum(episode.path_efficiency(arrival_distance) for episode in arrivals) / count,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.statistics import mean_interval
+from workers.statistics.seeds import means_band
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +36,8 @@ def band(curves: Floats) -> tuple[Floats, Floats, Floats]:
         mean, low and high, (points,) each; nan where a seed has no value: a mean over fewer seeds would jump, up where the
         worst is missing, as a seed is whose robots end no attempt any more.
     """
-    intervals = [mean_interval(column.tolist()) if np.isfinite(column).all() else (np.nan,) * 3 for column in curves.T]
-    mean, low, high = np.array(intervals, np.float64).reshape(-1, 3).T
-    return mean, low, high
+    mean, low, high = means_band(curves)
+    if len(curves) == 1:
+        low = high = mean
+    whole = np.isfinite(curves).all(axis=0)
+    return np.where(whole, mean, np.nan), np.where(whole, low, np.nan), np.where(whole, high, np.nan)

@@ -8,7 +8,8 @@ from workers.reproduction.campaign import Outcome
 from workers.reproduction.drawing import draw_curves
 from workers.reproduction.results import LEARNED, SeedResult, Spread, row_spread
 from workers.reproduction.rows import ROW_BY_ID, ROWS, STEPS, TABLES, Row, Table
-from workers.reproduction.verdict import LEAST_SEEDS, Verdict, Word, judge_all
+from workers.reproduction.verdict import Verdict, Word, judge_all
+from workers.statistics.differences import LEAST_SEEDS
 
 _HEAD = (
     "| method | | avg. reward | episodes | success % | steps per episode | collisions % | success % of each seed |\n"
@@ -17,9 +18,9 @@ _HEAD = (
 _PICTURE = Path("images") / "reproduction.svg"
 
 _MEASURED = f"""\
-Ours: the mean over seeds and its 95 % interval (Student's t). Every training has {STEPS:,} environment steps. A seed
-is its last policy, driven deterministically: ten robots, 10,000 steps each, target after target, as in the paper's
-tables; an episode is one target attempt, and a figure is that of one drive."""
+Ours: the mean over seeds and its 95 % interval ([how](statistics.md)). Every training has {STEPS:,} environment
+steps. A seed is its last policy, driven deterministically: ten robots, 10,000 steps each, target after target, as in
+the paper's tables; an episode is one target attempt, and a figure is that of one drive."""
 
 _CURVES = f"""\
 ![Reward of a target attempt over training steps, in the paper's arrangement]({_PICTURE.as_posix()})
@@ -28,11 +29,12 @@ Reward summed over a target attempt while training, exploration included, by env
 their mean. Band: its 95 % interval. The paper's own curves have no numbers that could be laid beside them."""
 
 _JUDGED = f"""\
-A comparison is judged by the difference of two means over seeds and its 95 % interval (Welch's t), from {LEAST_SEEDS}
-seeds on. It *holds* or *does not hold* where the whole interval lies on one side of zero; it *does not hold* either
-where the whole interval is smaller than what matters (1 point of success, 0.1 of reward, 1 step per episode);
-otherwise it *can't be told*. Convergence is the first evaluation on the frozen suite with {LEARNED:.0%} success. With
-so many comparisons at 95 %, about one interval in twenty misses the truth."""
+A comparison is judged by the difference of two means over seeds ([how](statistics.md)), and not at all below
+{LEAST_SEEDS} seeds. It *holds* or *does not hold* where the whole 95 % interval lies on one side of zero; it *does not hold*
+either where the two are equivalent: the 90 % interval within a margin (1 point of success, 0.1 of reward, 1 step per
+episode). Otherwise it *can't be told*. Convergence is the first evaluation on the frozen suite with {LEARNED:.0%} success.
+The paper's effect is *compatible* inside our interval; outside, it may be *one seed's luck*, since the paper trained
+one of each, or is *not compatible*. With so many comparisons at 95 %, about one interval in twenty misses the truth."""
 
 _PLURALS: dict[Word, str] = {"holds": "hold", "does not hold": "do not hold", "can't be told": "can't be told"}
 
@@ -128,7 +130,7 @@ def _ours(seeds: Sequence[SeedResult]) -> str:
         _spread(spread.success, 1, 100.0),
         _spread(spread.steps, 1),
         _spread(spread.collisions, 1, 100.0),
-        ", ".join(f"{100 * seed.measured.success:.1f}" for seed in seeds),
+        f"{', '.join(f'{100 * seed.measured.success:.1f}' for seed in seeds)}. {spread.failed.sentence}",
     )
     return f"| | ours, {'1 seed' if len(seeds) == 1 else f'{len(seeds)} seeds'} | {' | '.join(cells)} |"
 
@@ -142,7 +144,8 @@ def _spread(spread: Spread, decimals: int, factor: float = 1.0) -> str:
 
 def _sentence(verdict: Verdict) -> str:
     parts = [f"- **{verdict.word.capitalize()}:** {verdict.statement} *({verdict.source})* {verdict.reason}"]
-    return " ".join([*parts, *filter(None, (verdict.evidence, verdict.reading))])
+    effect = verdict.compatibility.sentence if verdict.compatibility else None
+    return " ".join([*parts, *filter(None, (effect, verdict.evidence, verdict.reading))])
 
 
 def _duration(seconds: float) -> str:

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from sim.config import Frozen
+from workers.reproduction.rows import DRIVES
 from workers.reproduction.table import TableRow
-from workers.statistics import mean_interval
+from workers.statistics.intervals import Interval
+from workers.statistics.seeds import FailedSeeds, failed_seeds, mean_interval, success_rate
 
 LEARNED = 0.9
 """A training has learned its task once the frozen suite sees this success rate."""
@@ -23,6 +25,11 @@ class SeedResult(Frozen):
     steps: int
     measured: TableRow
     learned_at: int | None
+
+    @property
+    def attempts(self) -> float:
+        """Target attempts of all its drives together."""
+        return self.measured.episodes * DRIVES
 
 
 Results = Mapping[str, Sequence[SeedResult]]
@@ -75,12 +82,20 @@ def learned_at(steps: Sequence[int], success: Sequence[float]) -> int | None:
     return next((step for step, rate in zip(steps, success, strict=True) if rate >= LEARNED), None)
 
 
-def spread(values: Sequence[float], least: float = 0.0, most: float = float("inf")) -> Spread:
-    """The mean of at least one seed; the interval is cut to the range that such a number can have."""
-    mean, low, high = mean_interval(values)
-    if len(values) < 2:
-        return Spread(mean=mean, low=None, high=None)
-    return Spread(mean=mean, low=max(least, low), high=min(most, high))
+def spread(values: Sequence[float], least: float = 0.0) -> Spread:
+    """The mean of at least one seed with Student's t; the interval is cut where such a number begins."""
+    return _spread(mean_interval(values), len(values), least)
+
+
+def rate_spread(rates: Sequence[float], attempts: Sequence[float]) -> Spread:
+    """The mean rate of at least one seed, with the interval of success rates."""
+    return _spread(success_rate([rate * n for rate, n in zip(rates, attempts, strict=True)], attempts), len(rates), 0.0)
+
+
+def _spread(interval: Interval, seeds: int, least: float) -> Spread:
+    if seeds < 2:
+        return Spread(mean=interval.value, low=None, high=None)
+    return Spread(mean=interval.value, low=max(least, interval.low), high=interval.high)
 
 
 class RowSpread(Frozen):
@@ -91,17 +106,19 @@ class RowSpread(Frozen):
     success: Spread
     collisions: Spread
     steps: Spread
+    failed: FailedSeeds
 
 
 def row_spread(seeds: Sequence[SeedResult]) -> RowSpread | None:
     """All figures of a row; None before the first seed is done."""
     if not seeds:
         return None
-    rows = [seed.measured for seed in seeds]
+    rows, attempts = [seed.measured for seed in seeds], [seed.attempts for seed in seeds]
     return RowSpread(
         reward=spread([row.reward or 0.0 for row in rows], least=float("-inf")),
         episodes=spread([row.episodes for row in rows]),
-        success=spread([row.success for row in rows], most=1.0),
-        collisions=spread([row.collisions or 0.0 for row in rows], most=1.0),
+        success=rate_spread([row.success for row in rows], attempts),
+        collisions=rate_spread([row.collisions or 0.0 for row in rows], attempts),
         steps=spread([row.steps for row in rows]),
+        failed=failed_seeds([row.success for row in rows]),
     )

@@ -19,8 +19,9 @@ STEPS = 600_000
 EVALUATE_EVERY = 25_000
 """Environment steps between two looks at the frozen suite: how finely speed of learning is told."""
 
-# One drive of 10,000 steps, as the paper's, holds about 90 attempts: ten of them are a fairer sample.
-_DRIVES = 10
+DRIVES = 10
+"""Of each trained policy: one of 10,000 steps, as the paper's, holds about 90 attempts, ten are a fairer sample."""
+
 # A checkpoint of DDPG holds its replay memory, so only every 200,000 steps keep one.
 _EVALUATIONS_PER_CHECKPOINT = 8
 # The least that a training and its evaluations may be scaled down to.
@@ -60,7 +61,7 @@ def _training(arena: str, reward: str, algorithm: Algorithm) -> TrainingConfig:
         algorithm=algorithm,
         steps=STEPS,
         evaluation=EvaluationConfig(
-            every_steps=EVALUATE_EVERY, evaluations_per_checkpoint=_EVALUATIONS_PER_CHECKPOINT, drives=_DRIVES
+            every_steps=EVALUATE_EVERY, evaluations_per_checkpoint=_EVALUATIONS_PER_CHECKPOINT, drives=DRIVES
         ),
     )
 

@@ -1,16 +1,23 @@
 """What a campaign says of the paper's claims: one of three words, the figures behind it, and the paper's own evidence."""
 
-from collections.abc import Callable, Sequence
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 from sim.config import Frozen
-from workers.reproduction.claims import CLAIMS, AnyClaim, Comparison, Measure, Safety, Untested
-from workers.reproduction.results import LEARNED, Results, SeedResult, spread
-from workers.reproduction.rows import EVALUATE_EVERY, ROW_BY_ID
-from workers.statistics import difference_interval, fisher_exact
-
-LEAST_SEEDS = 5
-"""No method beats another with fewer seeds than this."""
+from workers.reproduction.claims import CLAIMS, AnyClaim, Comparison, Safety, Untested
+from workers.reproduction.compatibility import Compatibility, compatibility
+from workers.reproduction.measures import SCALES, values_of
+from workers.reproduction.results import LEARNED, Results, SeedResult, rate_spread
+from workers.reproduction.rows import ROW_BY_ID
+from workers.statistics.differences import (
+    LEAST_SEEDS,
+    Difference,
+    Rates,
+    difference_of_means,
+    difference_of_rates,
+    fisher_exact,
+)
+from workers.statistics.wording import Scale, effect, equivalence, favourable, untold
 
 SAFE = 0.01
 """A row of fewer collisions than this per attempt drives without them, for what a drive can tell."""
@@ -25,6 +32,7 @@ class Verdict(Frozen):
         id, statement, source: of the claim.
         word: holds, does not hold, or can't be told.
         reason: why, with figures, as a sentence.
+        compatibility: whether the paper's effect can be ours; None where either has no number.
         evidence: what the paper's own figures can carry, as a sentence; None where it gives none.
         reading: what of our reading may explain a difference; None where nothing is known.
         rows: that were looked at.
@@ -35,42 +43,30 @@ class Verdict(Frozen):
     source: str
     word: Word
     reason: str
+    compatibility: Compatibility | None
     evidence: str | None
     reading: str | None
     rows: tuple[str, ...]
 
 
-class _Scale(Frozen):
-    """How a measure is compared and written."""
+class _Ruling(NamedTuple):
+    """What of a verdict is worked out."""
 
-    unit: str
-    factor: float
-    decimals: int
-    # Smaller differences than this are none that anybody drives by.
-    matters: float
-    more_is_better: bool
-
-
-_SCALES: dict[Measure, _Scale] = {
-    "success": _Scale(unit="points", factor=100.0, decimals=1, matters=0.01, more_is_better=True),
-    "reward": _Scale(unit="reward per step", factor=1.0, decimals=2, matters=0.1, more_is_better=True),
-    "steps": _Scale(unit="steps per episode", factor=1.0, decimals=1, matters=1.0, more_is_better=False),
-    "learned_at": _Scale(unit="training steps", factor=1.0, decimals=0, matters=float(EVALUATE_EVERY), more_is_better=False),
-}
+    word: Word
+    reason: str
+    compatibility: Compatibility | None = None
 
 
 def judge(claim: AnyClaim, results: Results) -> Verdict:
     """A claim against what a campaign has measured so far."""
     match claim:
         case Comparison():
-            word, reason = _compare(claim, results)
-            return _verdict(claim, word, reason, _evidence(claim), (claim.better, claim.worse))
+            return _verdict(claim, _compare(claim, results), _evidence(claim), (claim.better, claim.worse))
         case Safety():
-            word, reason = _safety(results.get(claim.row, ()))
-            return _verdict(claim, word, reason, "The paper gives no collision rate.", (claim.row,))
+            return _verdict(claim, _safety(results.get(claim.row, ())), "The paper gives no collision rate.", (claim.row,))
         case Untested():
             reason = f"{claim.reason[0].upper()}{claim.reason[1:]}."
-            return _verdict(claim, "can't be told", reason, None, ())
+            return _verdict(claim, _Ruling("can't be told", reason), None, ())
 
 
 def judge_all(results: Results) -> tuple[Verdict, ...]:
@@ -78,47 +74,54 @@ def judge_all(results: Results) -> tuple[Verdict, ...]:
     return tuple(judge(claim, results) for claim in CLAIMS)
 
 
-def _verdict(claim: AnyClaim, word: Word, reason: str, evidence: str | None, rows: tuple[str, ...]) -> Verdict:
+def _verdict(claim: AnyClaim, ruling: _Ruling, evidence: str | None, rows: tuple[str, ...]) -> Verdict:
     return Verdict(
         id=claim.id,
         statement=claim.statement,
         source=claim.source,
-        word=word,
-        reason=reason,
+        word=ruling.word,
+        reason=ruling.reason,
+        compatibility=ruling.compatibility,
         evidence=evidence,
         reading=claim.reading,
         rows=rows,
     )
 
 
-def _compare(claim: Comparison, results: Results) -> tuple[Word, str]:
+def _compare(claim: Comparison, results: Results) -> _Ruling:
     better, worse = results.get(claim.better, ()), results.get(claim.worse, ())
     if min(len(better), len(worse)) < LEAST_SEEDS:
-        return "can't be told", _too_few(min(len(better), len(worse)))
+        return _Ruling("can't be told", _too_few(min(len(better), len(worse))))
     horizon = min(seed.steps for seed in (*better, *worse))
-    values = _values(claim.measure, horizon)
-    firsts, seconds = values(better), values(worse)
+    firsts, seconds = (values_of(claim.measure, seeds, horizon) for seeds in (better, worse))
     if claim.measure == "learned_at" and {*firsts, *seconds} == {float(horizon)}:
-        return "can't be told", f"No seed of either reached {LEARNED:.0%} on the frozen suite."
-    scale = _SCALES[claim.measure]
-    difference, low, high = difference_interval(firsts, seconds)
-    if not scale.more_is_better:
-        # From here on a positive number speaks for the claim.
-        difference, low, high = -difference, -high, -low
-    figures = _figures(scale, difference, low, high)
-    if max(-low, high) <= scale.matters:
-        return "does not hold", f"The two differ by less than {_number(scale, scale.matters)} {scale.unit}: {figures}."
-    if low > 0.0:
-        return "holds", f"{figures}, all of it in favour of the claim."
-    if high < 0.0:
-        return "does not hold", f"{figures}, all of it against the claim."
-    return "can't be told", f"{figures}, on both sides of zero."
+        return _Ruling("can't be told", f"No seed of either reached {LEARNED:.0%} on the frozen suite.")
+    scale = SCALES[claim.measure]
+    if claim.measure == "success":
+        difference = difference_of_rates(_rates(better), _rates(worse))
+    else:
+        difference = difference_of_means(firsts, seconds)
+    word, reason = _word(scale, difference, min(len(better), len(worse)))
+    papers = ROW_BY_ID[claim.better].paper, ROW_BY_ID[claim.worse].paper
+    return _Ruling(word, reason, compatibility(claim.measure, difference, (better, worse), papers))
 
 
-def _safety(seeds: Sequence[SeedResult]) -> tuple[Word, str]:
+def _word(scale: Scale, difference: Difference, seeds: int) -> tuple[Word, str]:
+    match favourable(scale, difference).word(scale.margin):
+        case "equivalent":
+            return "does not hold", equivalence(scale, difference)
+        case "higher":
+            return "holds", f"{effect(scale, difference)}, all of it in favour of the claim."
+        case "lower":
+            return "does not hold", f"{effect(scale, difference)}, all of it against the claim."
+        case "not told":
+            return "can't be told", untold(scale, difference, seeds)
+
+
+def _safety(seeds: Sequence[SeedResult]) -> _Ruling:
     if len(seeds) < LEAST_SEEDS:
-        return "can't be told", _too_few(len(seeds))
-    rates = spread([seed.measured.collisions or 0.0 for seed in seeds], most=1.0)
+        return _Ruling("can't be told", _too_few(len(seeds)))
+    rates = rate_spread([seed.measured.collisions or 0.0 for seed in seeds], [seed.attempts for seed in seeds])
     assert rates.low is not None
     assert rates.high is not None
     figures = (
@@ -126,47 +129,19 @@ def _safety(seeds: Sequence[SeedResult]) -> tuple[Word, str]:
         f"95 % interval [{100 * rates.low:.1f}, {100 * rates.high:.1f}]"
     )
     if rates.high <= SAFE:
-        return "holds", f"{figures}: at most one in a hundred."
+        return _Ruling("holds", f"{figures}: at most one in a hundred.")
     if rates.low > SAFE:
-        return "does not hold", f"{figures}: more than one in a hundred."
-    return "can't be told", f"{figures}: on both sides of one in a hundred."
+        return _Ruling("does not hold", f"{figures}: more than one in a hundred.")
+    return _Ruling("can't be told", f"{figures}: on both sides of one in a hundred.")
 
 
 def _too_few(seeds: int) -> str:
-    done = "No seed" if seeds == 0 else "1 seed" if seeds == 1 else f"{seeds} seeds"
-    return f"{done} of {LEAST_SEEDS} done."
+    return f"No verdict below {LEAST_SEEDS} seeds: {seeds} of {LEAST_SEEDS} done."
 
 
-def _values(measure: Measure, horizon: int) -> Callable[[Sequence[SeedResult]], list[float]]:
-    """The measure of each seed; who had not learned by the horizon counts as having learned there, which favours it."""
-
-    def value(seed: SeedResult) -> float:
-        match measure:
-            case "success":
-                return seed.measured.success
-            case "reward":
-                return seed.measured.reward or 0.0
-            case "steps":
-                return seed.measured.steps
-            case "learned_at":
-                return float(min(horizon, horizon if seed.learned_at is None else seed.learned_at))
-
-    return lambda seeds: [value(seed) for seed in seeds]
-
-
-def _figures(scale: _Scale, difference: float, low: float, high: float) -> str:
-    way = ("more", "less") if scale.more_is_better else ("fewer", "more")
-    word = way[0] if difference >= 0.0 else way[1]
-    return (
-        f"{_number(scale, abs(difference))} {scale.unit} {word}, 95 % interval "
-        f"[{_number(scale, low, signed=True)}, {_number(scale, high, signed=True)}]"
-    )
-
-
-def _number(scale: _Scale, value: float, *, signed: bool = False) -> str:
-    # "-0.0" would be a sign without a meaning.
-    rounded = round(value * scale.factor, scale.decimals) + 0.0
-    return f"{rounded:{'+' if signed else ''},.{scale.decimals}f}"
+def _rates(seeds: Sequence[SeedResult]) -> Rates:
+    attempts = [seed.attempts for seed in seeds]
+    return Rates([seed.measured.success * n for seed, n in zip(seeds, attempts, strict=True)], attempts)
 
 
 def _evidence(claim: Comparison) -> str:

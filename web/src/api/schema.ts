@@ -197,7 +197,7 @@ export interface paths {
         };
         /**
          * Compare
-         * @description Final figures side by side, with intervals, and what differs in the configurations.
+         * @description Final figures side by side, with intervals and verdicts, and what differs in the configurations.
          */
         get: operations["compare_api_compare_get"];
         put?: never;
@@ -217,7 +217,7 @@ export interface paths {
         };
         /**
          * Compare Curves
-         * @description One metric of every run on one grid, and each experiment's mean, interquartile mean and interval.
+         * @description One metric of every run on one grid, and each experiment's mean and interval.
          */
         get: operations["compare_curves_api_compare_curves_get"];
         put?: never;
@@ -1373,10 +1373,85 @@ export interface components {
             /** Experiments */
             experiments: components["schemas"]["ComparedExperiment"][];
             /**
+             * Verdicts
+             * @description Every experiment against the first.
+             */
+            verdicts: components["schemas"]["ComparisonVerdict"][];
+            /**
              * Warnings
              * @description What speaks against reading too much into the figures.
              */
             warnings: string[];
+        };
+        /**
+         * ComparisonVerdict
+         * @description What may be said of an experiment beside the first one, in one measure.
+         */
+        ComparisonVerdict: {
+            /**
+             * Base
+             * @description Id of the first experiment.
+             */
+            base: string;
+            /**
+             * Difference
+             * @description Other less base, of their means over seeds; null where refused.
+             */
+            difference: number | null;
+            /**
+             * High
+             * @description Upper end of its 95 % interval.
+             */
+            high: number | null;
+            /**
+             * Low
+             * @description Lower end of its 95 % interval.
+             */
+            low: number | null;
+            /**
+             * Margin
+             * @description Differences up to this do not matter.
+             */
+            margin: number;
+            /**
+             * Measure
+             * @enum {string}
+             */
+            measure: "success" | "steps_per_target";
+            /**
+             * Other
+             * @description Id of the one that is judged.
+             */
+            other: string;
+            /**
+             * Reason
+             * @description As a sentence, with figures.
+             */
+            reason: string;
+            /**
+             * Word
+             * @description Of the other: direction by the 95 % interval, equivalence by two one-sided tests at 5 %, or neither; refused below five seeds or over different suites.
+             * @enum {string}
+             */
+            word: "better" | "worse" | "equivalent" | "not told" | "refused";
+        };
+        /**
+         * Compatibility
+         * @description The paper's effect beside ours.
+         *
+         *     Attributes:
+         *         word: compatible: inside our interval. One seed's luck: outside, but two single seeds of ours may differ as much. Not
+         *             compatible: neither.
+         *         sentence: with figures.
+         */
+        Compatibility: {
+            /** Sentence */
+            sentence: string;
+            /**
+             * Word
+             * @enum {string}
+             */
+            word: "compatible" | "one seed's luck" | "not compatible";
         };
         /**
          * Curves
@@ -1710,6 +1785,8 @@ export interface components {
              * @description Episodes of all those runs together.
              */
             episodes: number;
+            /** @description What so few seeds leave open; null unless it is a success rate. */
+            failed: components["schemas"]["FailedSeeds"] | null;
             /**
              * High
              * @description Upper end of the 95 % interval.
@@ -1721,10 +1798,21 @@ export interface components {
              */
             low: number;
             /**
+             * Per Seed
+             * @description The value of each of those runs.
+             */
+            per_seed: number[];
+            /**
              * Seeds
              * @description Runs that it is measured over.
              */
             seeds: number;
+            /**
+             * Unit
+             * @description What the interval is over: all seeds that one could train, or one policy's episodes.
+             * @enum {string}
+             */
+            unit: "seeds" | "episodes";
             /** Value */
             value: number;
         };
@@ -1747,7 +1835,7 @@ export interface components {
              * @description Control steps to the target, over the episodes that arrived.
              */
             steps_mean: number | null;
-            /** @description Arrivals over episodes, with its Wilson interval. */
+            /** @description Arrivals over episodes of this one policy, with the exact interval. */
             success: components["schemas"]["Estimate"];
             /** Suite */
             suite: string;
@@ -1921,7 +2009,8 @@ export interface components {
          * ExperimentCurves
          * @description An experiment's runs on the common grid, and what they are together.
          *
-         *     `low` and `high` are the 95 % bootstrap interval of `mean`, over seeds; null where fewer than two have a value.
+         *     `low` and `high` are the 95 % interval of `mean` over seeds (Student's t, of rates on the scale of the logit); null where
+         *     fewer than two have a value.
          */
         ExperimentCurves: {
             /**
@@ -1949,6 +2038,28 @@ export interface components {
         ExperimentPatch: {
             /** Name */
             name: string;
+        };
+        /**
+         * FailedSeeds
+         * @description What a few seeds leave open about those that were not trained.
+         *
+         *     A seed has failed if it arrives at most half as often as the best of them, or never.
+         *
+         *     Attributes:
+         *         failed: seeds that have.
+         *         seeds: of so many.
+         *         at_most: share of all seeds that may fail, one-sided 95 %, exact.
+         *         sentence: the same in words.
+         */
+        FailedSeeds: {
+            /** At Most */
+            at_most: number;
+            /** Failed */
+            failed: number;
+            /** Seeds */
+            seeds: number;
+            /** Sentence */
+            sentence: string;
         };
         /**
          * GeneratedArenaConfig
@@ -3470,6 +3581,7 @@ export interface components {
         RowSpread: {
             collisions: components["schemas"]["Spread"];
             episodes: components["schemas"]["Spread"];
+            failed: components["schemas"]["FailedSeeds"];
             reward: components["schemas"]["Spread"];
             steps: components["schemas"]["Spread"];
             success: components["schemas"]["Spread"];
@@ -4495,11 +4607,13 @@ export interface components {
          *         id, statement, source: of the claim.
          *         word: holds, does not hold, or can't be told.
          *         reason: why, with figures, as a sentence.
+         *         compatibility: whether the paper's effect can be ours; None where either has no number.
          *         evidence: what the paper's own figures can carry, as a sentence; None where it gives none.
          *         reading: what of our reading may explain a difference; None where nothing is known.
          *         rows: that were looked at.
          */
         Verdict: {
+            compatibility: components["schemas"]["Compatibility"] | null;
             /** Evidence */
             evidence: string | null;
             /** Id */
@@ -5225,6 +5339,8 @@ export interface operations {
             query: {
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
+                /** @description Success rates that differ by less are equivalent, 0 to 1. */
+                margin?: number;
             };
             header?: never;
             path?: never;

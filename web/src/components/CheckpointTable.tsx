@@ -4,7 +4,8 @@ import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
 import { IconDownload } from './icons'
-import { Message, SuccessEstimate } from './ui'
+import { SuccessEstimate } from './MeasuredEstimate'
+import { Message } from './ui'
 import ui from './ui.module.css'
 
 interface CheckpointTableProps {
@@ -74,7 +75,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                 )}
               </Table.Td>
               <Table.Td>
-                <SuccessEstimate estimate={checkpoint.evaluation?.success ?? null} episodes />
+                <SuccessEstimate estimate={checkpoint.evaluation?.success ?? null} />
               </Table.Td>
               <Table.Td visibleFrom="md" ta="right" className={ui.number}>
                 {checkpoint.evaluation?.steps_mean == null

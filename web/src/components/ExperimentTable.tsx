@@ -7,8 +7,9 @@ import { age, dateTime, duration, percent, words } from '../lib/format'
 import { useNow } from '../lib/hooks'
 import { ExperimentMenu } from './ExperimentMenu'
 import classes from './ExperimentTable.module.css'
+import { SuccessEstimate } from './MeasuredEstimate'
 import { isActive } from './states'
-import { LoadingRows, ProgressBar, StateLabel, SuccessEstimate } from './ui'
+import { LoadingRows, ProgressBar, StateLabel } from './ui'
 import ui from './ui.module.css'
 
 interface ExperimentTableProps {
@@ -59,7 +60,7 @@ export function ExperimentTable({ experiments, ticked, onTick, menu = true }: Ex
             <Table.Th visibleFrom="md" w={80}>
               Reward
             </Table.Th>
-            <Table.Th visibleFrom="md" w={230}>
+            <Table.Th visibleFrom="md" w={260}>
               Success, 95 % interval
             </Table.Th>
             <Table.Th visibleFrom="md" w={100} ta="right">

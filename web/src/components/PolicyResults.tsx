@@ -3,7 +3,7 @@ import { Table } from '@mantine/core'
 import type { ReferencePolicy } from '../api/types'
 import { percent, significant, words } from '../lib/format'
 import table from './ExperimentTable.module.css'
-import { SuccessEstimate } from './ui'
+import { SuccessEstimate } from './MeasuredEstimate'
 import ui from './ui.module.css'
 
 interface PolicyResultsProps {
@@ -38,7 +38,7 @@ export function PolicyResults({ results }: PolicyResultsProps) {
                   {row === policy ? 'This one' : words(row.name)}
                 </Table.Td>
                 <Table.Td>
-                  <SuccessEstimate estimate={row.success} episodes />
+                  <SuccessEstimate estimate={row.success} />
                 </Table.Td>
                 <Table.Td ta="right" className={ui.number}>
                   {percent(row.collision)}

@@ -1,10 +1,9 @@
 /** The small parts that every page is made of. */
-import { Alert, Button, Skeleton, Title, Tooltip, useComputedColorScheme } from '@mantine/core'
+import { Alert, Button, Skeleton, Title, useComputedColorScheme } from '@mantine/core'
 import type { CSSProperties, ReactNode } from 'react'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
-import type { Estimate, ExperimentState } from '../api/types'
+import type { ExperimentState } from '../api/types'
 import { lineColor } from '../charts/palette'
-import { count, percent, percentRange, plural } from '../lib/format'
 import { IconAlertCircle, IconAlertTriangle } from './icons'
 import { STATES } from './states'
 import classes from './ui.module.css'
@@ -179,31 +178,6 @@ export function ProgressBar({
     >
       <span style={{ width: `${share}%` }} />
     </div>
-  )
-}
-
-interface SuccessEstimateProps {
-  estimate: Estimate | null
-  /** Says in full what stands behind the number; otherwise its tooltip does. */
-  detail?: boolean
-  /** Whether N counts episodes (of one policy) rather than seeds. */
-  episodes?: boolean
-}
-
-/** "98.4 %  97.1–99.4 %  N = 5": a success rate, its interval, and what stands behind it. */
-export function SuccessEstimate({ estimate, detail = false, episodes = false }: SuccessEstimateProps) {
-  if (!estimate) return <span className={classes.quiet}>–</span>
-  const { value, low, high } = estimate
-  const basis = `${plural(estimate.seeds, 'seed')}, ${plural(estimate.episodes, 'episode')}`
-  const short = `N = ${count(episodes ? estimate.episodes : estimate.seeds)}`
-  return (
-    <Tooltip label={`95 % interval ${percentRange(low, high)}, from ${basis}`} disabled={detail}>
-      <span className={`${classes.number} ${classes.estimate}`}>
-        <strong>{percent(value)}</strong>
-        <span className={classes.quiet}>{percentRange(low, high)}</span>
-        <span className={classes.quiet}>{detail ? basis : short}</span>
-      </span>
-    </Tooltip>
   )
 }
 

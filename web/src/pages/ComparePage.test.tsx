@@ -20,7 +20,8 @@ test('figures with intervals and N, warnings, curves, and what differs', async (
   expect(figures).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%/)
   expect(figures).toHaveTextContent('2 seeds × 200 episodes')
   expect(figures).toHaveTextContent('not evaluated yet')
-  expect(screen.getByTestId('warnings')).toHaveTextContent('fewer than 5')
+  expect(figures).toHaveTextContent(/Seeds: 98\.0\s%, 98\.8\s%None of 2 seeds failed: up to 78 % may/)
+  expect(screen.getByTestId('warnings')).toHaveTextContent('Alone has not been evaluated yet.')
   const differences = await screen.findByTestId('differences')
   expect(
     within(differences)
@@ -34,6 +35,21 @@ test('figures with intervals and N, warnings, curves, and what differs', async (
   expect(server.asked.some((path) => path.startsWith('/api/compare?experiment=exp1&experiment=exp2'))).toBe(
     true,
   )
+})
+
+test('a verdict in a word, with its reason, and refused where seeds are few', async () => {
+  const server = startServer(routes)
+  const { router, user } = open('/compare?experiment=exp1&experiment=exp2')
+  const [, refused, better] = within(await screen.findByTestId('verdicts')).getAllByRole('row')
+  expect(refused).toHaveTextContent('AloneSuccessrefusedNo verdict below 5 seeds: Corridor has 2 to show.')
+  expect(better).toHaveTextContent('AloneSteps to the targetbetter8.1 steps to the target fewer')
+  expect(screen.getByText(/^1 comparison, seeds against seeds/)).toBeInTheDocument()
+
+  const margin = screen.getByRole('textbox', { name: 'Success is equivalent within (points)' })
+  await user.clear(margin)
+  await user.type(margin, '5')
+  expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2&margin=0.05')
+  await vi.waitFor(() => expect(server.asked.at(-1)).toContain('margin=0.05'))
 })
 
 test('with none chosen there is a list to choose from', async () => {

@@ -4,19 +4,24 @@ import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
-import type { Comparison, Estimate } from '../api/types'
+import type { Comparison } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
+import { ComparisonVerdicts } from '../components/ComparisonVerdicts'
 import { settingText } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import { ExperimentList } from '../components/ExperimentList'
 import table from '../components/ExperimentTable.module.css'
+import { FigureEstimate } from '../components/MeasuredEstimate'
 import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
 import { MAX_COMPARED } from '../lib/comparison'
-import { count, percent, percentRange, plural, significant } from '../lib/format'
+import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
+
+/** Success rates that differ by less are equivalent, unless the address says otherwise. */
+const MARGIN = 0.02
 
 export function ComparePage() {
   useTitle('Compare')
@@ -43,7 +48,20 @@ export function ComparePage() {
       />
     )
   }
-  return <Chosen chosen={chosen} onChange={() => setPicking(true)} />
+  const margin = Number(search.get('margin')) || MARGIN
+  return (
+    <Chosen
+      chosen={chosen}
+      margin={margin}
+      onMargin={(next) =>
+        setSearch(
+          { experiment: chosen, ...(next === MARGIN ? {} : { margin: String(next) }) },
+          { replace: true },
+        )
+      }
+      onChange={() => setPicking(true)}
+    />
+  )
 }
 
 interface PickerProps {
@@ -97,11 +115,18 @@ function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
   )
 }
 
-function Chosen({ chosen, onChange }: { chosen: readonly string[]; onChange: () => void }) {
+interface ChosenProps {
+  chosen: readonly string[]
+  margin: number
+  onMargin: (margin: number) => void
+  onChange: () => void
+}
+
+function Chosen({ chosen, margin, onMargin, onChange }: ChosenProps) {
   const { data, error, refetch } = $api.useQuery(
     'get',
     '/api/compare',
-    { params: { query: { experiment: [...chosen] } } },
+    { params: { query: { experiment: [...chosen], margin } } },
     { placeholderData: keepPreviousData },
   )
   return (
@@ -125,14 +150,25 @@ function Chosen({ chosen, onChange }: { chosen: readonly string[]; onChange: () 
       ) : (
         <Stack gap="md">
           {data && data.warnings.length > 0 && <Warnings warnings={data.warnings} />}
-          <Panel title="Final figures" flush>
+          <Panel
+            title="Final figures"
+            flush
+            actions={
+              <Text size="xs" c="dimmed">
+                mean over seeds, 95 % interval (Student's t)
+              </Text>
+            }
+          >
             {data ? <Figures comparison={data} /> : <Skeleton height={120} m="md" w="auto" />}
           </Panel>
+          {data && data.verdicts.length > 0 && (
+            <ComparisonVerdicts comparison={data} margin={margin} onMargin={onMargin} />
+          )}
           <Panel
             title="Curves"
             actions={
               <Text size="xs" c="dimmed">
-                thin: single seeds · bold: their mean · band: 95 % interval
+                thin: single seeds · bold: their mean · band: 95 % interval over seeds
               </Text>
             }
           >
@@ -189,13 +225,13 @@ function Figures({ comparison }: { comparison: Comparison }) {
                 </Group>
               </Table.Td>
               <Table.Td>
-                <Figure estimate={one.success} format={percent} range={percentRange} />
+                <FigureEstimate estimate={one.success} format={percent} range={percentRange} />
               </Table.Td>
               <Table.Td>
-                <Figure estimate={one.steps_per_target} />
+                <FigureEstimate estimate={one.steps_per_target} />
               </Table.Td>
               <Table.Td>
-                <Figure estimate={one.reward} />
+                <FigureEstimate estimate={one.reward} />
               </Table.Td>
               <Table.Td ta="right" className={ui.number}>
                 {one.seeds === 0
@@ -210,31 +246,6 @@ function Figures({ comparison }: { comparison: Comparison }) {
         </Table.Tbody>
       </Table>
     </Table.ScrollContainer>
-  )
-}
-
-const three = (value: number) => significant(value, 3)
-
-interface FigureProps {
-  estimate: Estimate | null
-  format?: (value: number) => string
-  range?: (low: number, high: number) => string
-}
-
-function Figure({
-  estimate,
-  format = three,
-  range = (low, high) => `${three(low)}–${three(high)}`,
-}: FigureProps) {
-  if (!estimate) return <span className={ui.quiet}>–</span>
-  return (
-    <span className={ui.number}>
-      <strong>{format(estimate.value)}</strong>
-      <span className={ui.quiet}>
-        {'  '}
-        {range(estimate.low, estimate.high)}
-      </span>
-    </span>
   )
 }
 

@@ -18,7 +18,11 @@ test('its runs, its success with what stands behind it, and what differs from th
   const runs = await screen.findAllByTestId('run')
   expect(runs.map((run) => run.textContent?.slice(0, 6))).toEqual(['Seed 0', 'Seed 1'])
   expect(screen.getByRole('link', { name: 'Seed 1' })).toHaveAttribute('href', '/runs/run2')
-  expect(screen.getByText('2 seeds, 400 episodes')).toBeInTheDocument()
+  expect(
+    screen.getByText(
+      /^Over 2 seeds, 400 episodes: 98\.0\s%, 98\.8\s%\. None of 2 seeds failed: up to 78 % may/,
+    ),
+  ).toBeInTheDocument()
   expect(await screen.findByText(/default 300\s000/)).toBeInTheDocument()
   expect(screen.getByRole('link', { name: 'Duplicate' })).toHaveAttribute('href', '/new?from=exp1')
 })

@@ -22,8 +22,12 @@ test('every policy with its figures, and what can be done with it', async () => 
   const { user } = open('/policies')
   const card = await screen.findByTestId('policy')
   expect(card).toHaveTextContent('Drives between 17 obstacles.')
-  expect(card).toHaveTextContent(/simple-200\s*99\.0\s%.*N = 200\s*dynamic window, untrained: 98\.0\s%/)
-  expect(card).toHaveTextContent(/clutter-500\s*95\.0\s%.*N = 500\s*dynamic window, untrained: 99\.8\s%/)
+  expect(card).toHaveTextContent(
+    /simple-200\s*99\.0\s%.*N = 200\s*Over the 200 episodes of one policy\.\s*dynamic window, untrained: 98\.0\s%/,
+  )
+  expect(card).toHaveTextContent(
+    /clutter-500\s*95\.0\s%.*N = 500\s*Over the 500 episodes of one policy\.\s*dynamic window, untrained: 99\.8\s%/,
+  )
   expect(within(card).getByRole('link', { name: 'Watch Crowd' })).toHaveAttribute('href', '/policies/crowd')
   expect(within(card).getByRole('link', { name: 'Train one like Crowd' })).toHaveAttribute(
     'href',

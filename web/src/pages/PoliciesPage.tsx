@@ -5,8 +5,9 @@ import { $api } from '../api/client'
 import type { ReferencePolicy } from '../api/types'
 import { ArenaPicture } from '../components/ArenaPicture'
 import { IconPlayerPlay } from '../components/icons'
+import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { PolicyActions } from '../components/PolicyActions'
-import { Page, Panel, QueryError, SuccessEstimate } from '../components/ui'
+import { Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { inShort, summaryOf } from '../lib/experiments'
 import { percent } from '../lib/format'
@@ -87,7 +88,7 @@ function Result({ suite, row, baseline }: { suite: string; row: Row; baseline: R
     <>
       <dt>{suite}</dt>
       <dd>
-        <SuccessEstimate estimate={row.success} episodes />
+        <SuccessEstimate estimate={row.success} />
         {baseline && (
           <Text size="xs" className={ui.quiet}>
             {baseline.name}, untrained: {percent(baseline.success.value)}

@@ -71,6 +71,7 @@ test('paper and ours stand side by side, with intervals', async () => {
   expect(ours).toHaveTextContent(/ours, 1 seed\s*14\.20\s*14\.19 to 14\.21/)
   expect(ours).toHaveTextContent(/83\.0\s%\s*82\.0\s% to 84\.0\s%/)
   expect(notYet).toHaveTextContent(/^ours–+$/)
+  expect(paper).toHaveTextContent('None of 2 seeds failed: up to 78 % may (one-sided 95 %).')
   expect(screen.getByRole('link', { name: 'ResBlock PPO' })).toHaveAttribute('href', '/experiments/exp1')
 })
 
@@ -81,6 +82,7 @@ test('a sentence for each claim, with its word, its figures and the paper’s ow
   expect(holds).toHaveAttribute('data-word', 'holds')
   expect(holds).toHaveTextContent('9.6 points more, 95 % interval [+6.6, +12.6]')
   expect(holds).toHaveTextContent('59 of 63 against 59 of 87')
+  expect(holds).toHaveTextContent('The paper’s effect, +25.8 points, lies inside our interval: compatible.')
   expect(open_).toHaveTextContent("can't be told")
   expect(screen.getByTestId('told')).toHaveTextContent("1 hold · 0 do not hold · 1 can't be told")
 })

@@ -26,7 +26,7 @@ test('each training with its state, what it trains, and its success with interva
   expect(first).toHaveTextContent('Corridor')
   expect(first).toHaveTextContent('Running')
   expect(first).toHaveTextContent('PPO, MLP')
-  expect(first).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%\s*N = 2/)
+  expect(first).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%\s*N = 2 seeds, none failed: up to 78 % may/)
   expect(rows[1]).toHaveTextContent('Failed')
   expect(rows[1]).toHaveTextContent('Complex, 4 moving · PPO, MLP')
   expect(document.title).toBe('Trainings – Mapless')

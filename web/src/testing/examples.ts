@@ -6,6 +6,7 @@ import type {
   Comparison,
   Curves,
   Episodes,
+  Estimate,
   Experiment,
   ListedExperiment,
   LiveState,
@@ -63,6 +64,35 @@ export const training = {
   steps: 300_000,
 } as unknown as Experiment['training']
 
+const noneFailed: NonNullable<Estimate['failed']> = {
+  failed: 0,
+  seeds: 2,
+  at_most: 0.776,
+  sentence: 'None of 2 seeds failed: up to 78 % may (one-sided 95 %).',
+}
+
+const twoSeeds: Estimate = {
+  value: 0.984,
+  low: 0.961,
+  high: 0.993,
+  unit: 'seeds',
+  seeds: 2,
+  episodes: 400,
+  per_seed: [0.98, 0.988],
+  failed: noneFailed,
+}
+
+const onePolicy = (value: number, low: number, high: number, episodes: number): Estimate => ({
+  value,
+  low,
+  high,
+  unit: 'episodes',
+  seeds: 1,
+  episodes,
+  per_seed: [value],
+  failed: null,
+})
+
 export const experiment: Experiment = {
   id: 'exp1',
   name: 'Corridor',
@@ -83,7 +113,7 @@ export const experiment: Experiment = {
       steps_per_second: null,
     },
   ],
-  success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
+  success: twoSeeds,
 }
 
 /** The same in short. */
@@ -131,7 +161,7 @@ const best: Checkpoint = {
     suite_hash: 'c0ffee',
     episodes: 200,
     arrivals: 177,
-    success: { value: 0.885, low: 0.833, high: 0.922, seeds: 1, episodes: 200 },
+    success: onePolicy(0.885, 0.833, 0.922, 200),
     steps_mean: 104.2,
     reward_mean: 1790,
   },
@@ -190,7 +220,7 @@ export const replay: Replay = {
 
 const row = (name: string, value: number, episodes = 200) => ({
   name,
-  success: { value, low: value - 0.01, high: value, seeds: 1, episodes },
+  success: onePolicy(value, value - 0.01, value, episodes),
   collision: 1 - value,
   timeout: 0,
   spl: 0.9 * value,
@@ -259,9 +289,16 @@ export const comparison: Comparison = {
       episodes: 400,
       suite: 'simple-200',
       suite_hash: 'c0ffee',
-      success: { value: 0.984, low: 0.961, high: 0.993, seeds: 2, episodes: 400 },
-      steps_per_target: { value: 104.2, low: 101.9, high: 106.7, seeds: 2, episodes: 393 },
-      reward: { value: 1790, low: 1772, high: 1804, seeds: 2, episodes: 400 },
+      success: twoSeeds,
+      steps_per_target: {
+        ...twoSeeds,
+        value: 104.2,
+        low: 101.9,
+        high: 106.7,
+        per_seed: [104, 104.4],
+        failed: null,
+      },
+      reward: { ...twoSeeds, value: 1790, low: 1772, high: 1804, per_seed: [1785, 1795], failed: null },
     },
     {
       id: 'exp2',
@@ -279,7 +316,31 @@ export const comparison: Comparison = {
     { path: 'algorithm.learning_rate', values: [0.001, 0.0003] },
     { path: 'algorithm.network.hidden_sizes', values: [[64, 64], null] },
   ],
-  warnings: ['Corridor has 2 seeds: fewer than 5 cannot show that one configuration beats another.'],
+  verdicts: [
+    {
+      measure: 'success',
+      base: 'exp1',
+      other: 'exp2',
+      word: 'refused',
+      difference: null,
+      low: null,
+      high: null,
+      margin: 0.02,
+      reason: 'No verdict below 5 seeds: Corridor has 2 to show.',
+    },
+    {
+      measure: 'steps_per_target',
+      base: 'exp1',
+      other: 'exp2',
+      word: 'better',
+      difference: -8.1,
+      low: -12.3,
+      high: -3.9,
+      margin: 5.2,
+      reason: '8.1 steps to the target fewer, 95 % interval [-12.3, -3.9].',
+    },
+  ],
+  warnings: ['Alone has not been evaluated yet.'],
 } as Comparison
 
 const ADVANCED = { 'x-advanced': true }
@@ -481,6 +542,7 @@ export const reproduction: Reproduction = {
         success: spread(0.83),
         collisions: spread(0.13),
         steps: spread(109.5),
+        failed: noneFailed,
       },
       experiment_id: 'exp1',
       runs: [
@@ -496,6 +558,10 @@ export const reproduction: Reproduction = {
       source: 'Results, table 2',
       word: 'holds',
       reason: '9.6 points more, 95 % interval [+6.6, +12.6], all of it in favour of the claim.',
+      compatibility: {
+        word: 'compatible',
+        sentence: 'The paper’s effect, +25.8 points, lies inside our interval: compatible.',
+      },
       evidence: 'The paper: 59 of 63 against 59 of 87.',
       reading: null,
       rows: ['complex-ddpg', 'complex-resblock'],
@@ -506,6 +572,7 @@ export const reproduction: Reproduction = {
       source: 'Results',
       word: "can't be told",
       reason: 'Nothing changes in either arena.',
+      compatibility: null,
       evidence: null,
       reading: null,
       rows: [],

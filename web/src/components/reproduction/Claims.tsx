@@ -27,6 +27,11 @@ export function Claims({ claims }: { claims: readonly Verdict[] }) {
             <div>
               <div className={classes.statement}>{claim.statement}</div>
               <div>{claim.reason}</div>
+              {claim.compatibility && (
+                <div data-testid="compatibility" data-word={claim.compatibility.word}>
+                  {claim.compatibility.sentence}
+                </div>
+              )}
               <div className={ui.quiet}>{[claim.evidence, claim.reading].filter(Boolean).join(' ')}</div>
               <div className={`${ui.quiet} ${classes.source}`}>{claim.source}</div>
             </div>
@@ -34,8 +39,10 @@ export function Claims({ claims }: { claims: readonly Verdict[] }) {
         ))}
       </ul>
       <Text size="xs" c="dimmed" mt="md" maw="100ch">
-        A comparison is judged by the difference of two means over seeds and its 95 % interval (Welch's t),
-        from five seeds on. With so many comparisons about one interval in twenty misses the truth.
+        A comparison is judged by the difference of two means over seeds and its 95 % interval, and not at all
+        below five seeds; two are equivalent where the 90 % interval lies within a margin. The paper trained
+        one seed of each: its effect is compatible inside our interval, and outside only as far as single
+        seeds spread. With so many comparisons about one interval in twenty misses the truth.
       </Text>
     </Panel>
   )

@@ -23,7 +23,7 @@ export function PaperFigures({ reproduction }: { reproduction: Reproduction }) {
       title="Learning curves"
       actions={
         <Text size="xs" c="dimmed">
-          thin: single seeds · bold: their mean · band: 95 % interval
+          thin: single seeds · bold: their mean · band: 95 % interval over seeds
         </Text>
       }
     >

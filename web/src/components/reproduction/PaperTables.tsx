@@ -79,6 +79,7 @@ function Lines({ row, label }: { row: CampaignRow; label: string }) {
         <Figure text={DASH} />
         <Table.Td rowSpan={2}>
           <SeedStrip row={row} />
+          {ours && <div className={`${ui.quiet} ${classes.interval}`}>{ours.failed.sentence}</div>}
         </Table.Td>
       </Table.Tr>
       <Table.Tr className={classes.ours} data-testid="our-row">
@@ -117,7 +118,7 @@ function Measured({
     <Table.Td ta="right" className={ui.number}>
       <strong>{write(spread.mean)}</strong>
       {spread.low !== null && spread.high !== null && (
-        <div className={`${ui.quiet} ${classes.interval}`} title="95 % interval over seeds">
+        <div className={`${ui.quiet} ${classes.interval}`} title="95 % interval over seeds (Student's t)">
           {write(spread.low)} to {write(spread.high)}
         </div>
       )}
