@@ -1,6 +1,6 @@
 import { screen } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { experiment, status } from '../testing/examples'
+import { listed, status } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -24,7 +24,7 @@ test('without a login every page asks for the token, and goes on once it has it'
 
   server.routes['POST /api/login'] = new Response(null, { status: 204 })
   server.routes['GET /api/status'] = status
-  server.routes['GET /api/experiments'] = { items: [experiment], total: 1 }
+  server.routes['GET /api/experiments'] = { items: [listed], total: 1 }
   await user.clear(token)
   await user.type(token, ' right {Enter}')
   expect(await screen.findByTestId('experiment')).toHaveTextContent('Corridor')
