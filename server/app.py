@@ -22,6 +22,7 @@ from server.files import FileStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.monitoring import endpoints as monitoring
+from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
 from server.policies import endpoints as policies
@@ -121,6 +122,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(RequestTimesMiddleware, instruments=services.instruments)
     app.add_middleware(SlowClientMiddleware, seconds=services.settings.request_seconds)
     app.add_middleware(ClientAddressMiddleware, trusted_proxies=services.settings.trusted_proxies)
+    app.add_middleware(RunLogsMiddleware)
     return app
 
 

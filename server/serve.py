@@ -10,6 +10,7 @@ import uvicorn
 from server.listening import listen, login_url
 from server.settings import Settings
 from server.slow_clients import timed_protocol
+from workers.logs import configure
 from workers.runtime.supervised import end_with_supervisor
 
 # Streams end by themselves when the bus closes; this is for a client that takes its time to read the last bytes.
@@ -46,6 +47,7 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
         OSError: the data directory can't be written.
     """
     end_with_supervisor()
+    configure(settings.log_format)
     listener = listen(settings)
     # Late, so that a port that is taken is answered at once.
     from server.app import create_app
@@ -56,6 +58,8 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
         services = app.state.services
         config = uvicorn.Config(
             app,
+            # As the rest of us, and no line for each request.
+            log_config=None,
             log_level="warning",
             access_log=False,
             server_header=False,

@@ -7,6 +7,8 @@ from typing import Self
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from workers.logs import LogFormat
+
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
 
 # A token that an attacker on the network may guess at needs at least this many characters.
@@ -74,6 +76,7 @@ class Settings(BaseSettings):
         None, ge=0, le=256, description="Local worker processes of `mapless up`; one a core if not given."
     )
     lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run.")
+    log_format: LogFormat = Field("text", description="Of the log on standard error: `text`, or `json`, an object a line.")
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
     max_replay_bytes: int = Field(256 * 2**20, ge=0, description="Of all replays that are kept; older ones are made again.")

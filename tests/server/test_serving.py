@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from typing import IO
 
 import httpx
 from typer.testing import CliRunner
@@ -27,13 +28,16 @@ def environment(data: Path) -> dict[str, str]:
 
 
 @contextmanager
-def serving(data: Path, port: str = "0", **settings: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+def serving(
+    data: Path, port: str = "0", stderr: IO[bytes] | None = None, **settings: str
+) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """`mapless serve` while the block lasts, and its login URL."""
     with subprocess.Popen(
         [sys.executable, "-m", "server", "serve", "--port", port],
         cwd=ROOT,
         env=environment(data) | settings,
         stdout=subprocess.PIPE,
+        stderr=stderr,
         text=True,
     ) as process:
         try:

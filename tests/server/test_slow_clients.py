@@ -26,8 +26,8 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     (directory / "dist" / "index.html").touch()
     with (directory / "dist" / "assets" / "large").open("wb") as file:
         file.truncate(LARGE)
-    settings = {"MAPLESS_REQUEST_SECONDS": str(SECONDS), "MAPLESS_WEB_DIST": str(directory / "dist")}
-    with serving(directory / "data", **settings) as (_, url):
+    dist = str(directory / "dist")
+    with serving(directory / "data", MAPLESS_REQUEST_SECONDS=str(SECONDS), MAPLESS_WEB_DIST=dist) as (_, url):
         yield url
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from workers.logs import LogFormat
 from workers.protocol import Queue
 
 
@@ -35,6 +36,7 @@ class WorkerSettings(BaseSettings):
         default_factory=_private_place,
         description="Reports and checkpoints on their way to the server; in the user's cache folder if not given.",
     )
+    log_format: LogFormat = Field("text", description="Of the log: `text`, or `json`, an object a line.")
     min_free_bytes: int = Field(
         256 * 2**20, ge=0, description="Free space in the work folder below which a worker takes up no run."
     )

@@ -11,6 +11,7 @@ from celery import shared_task
 from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_shutting_down
 
 from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError, UnfitError
+from workers.logs import process_is_about
 from workers.protocol import Claim
 from workers.runtime.app import TRAIN_TASK
 from workers.runtime.attempt import Attempt
@@ -61,6 +62,11 @@ worker_process_shutdown.connect(_close_slot)
 @shared_task(name=TRAIN_TASK)
 def train(run_id: str, attempt: int) -> None:
     """Train a run, if it is still to be had at `attempt`; every other message is one too many, and dropped."""
+    with process_is_about(run_id):
+        _train(run_id, attempt)
+
+
+def _train(run_id: str, attempt: int) -> None:
     assert _slot is not None
     try:
         trainer = _slot.take_trainer()

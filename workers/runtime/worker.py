@@ -3,12 +3,13 @@
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
 
 from workers.errors import UnfitError
+from workers.logs import configure
 from workers.protocol import Queue
 from workers.runtime.fitness import make_private
 from workers.runtime.settings import WorkerSettings
@@ -66,9 +67,15 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     end_with_supervisor()
 
     # Late, so that `mapless worker --help` does not wait for Celery.
+    from celery.signals import setup_logging
+
     import workers.runtime.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
     from workers.runtime.app import create_app
 
+    if settings.log_format == "json":
+        # Celery's own lines are for people.
+        setup_logging.connect(_log_json, weak=False)
+        _log_json()
     app = create_app(settings.broker_url)
     app.worker_main(
         [
@@ -86,6 +93,10 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     )
 
 
+def _log_json(**_: Any) -> None:
+    configure("json")
+
+
 def usable_cores() -> int:
     """The processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
@@ -100,6 +111,7 @@ def _environment(settings: WorkerSettings) -> dict[str, str]:
         "WORKER_QUEUE": settings.worker_queue,
         "WORKER_NAME": settings.worker_name,
         "WORK_DIR": str(Path(settings.work_dir).resolve()),
+        "LOG_FORMAT": settings.log_format,
         "MIN_FREE_BYTES": str(settings.min_free_bytes),
     }
     return {f"MAPLESS_{name}": value for name, value in values.items()}

@@ -1,0 +1,106 @@
+"""The log as an object a line: what, when, how bad, of which run; of the server and of a worker."""
+
+import json
+import logging
+import subprocess
+import sys
+import threading
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import anyio
+import httpx
+import pytest
+
+from tests.server.test_serving import ROOT, environment, serving
+from workers.logs import JsonFormatter, about, process_is_about
+
+
+def line(message: str = "hello %s", *arguments: object, error: BaseException | None = None) -> dict[str, Any]:
+    info = (type(error), error, error.__traceback__) if error else None
+    record = logging.LogRecord("server.sweeper", logging.WARNING, "f.py", 1, message, arguments, info)
+    text = JsonFormatter().format(record)
+    assert "\n" not in text
+    said: dict[str, Any] = json.loads(text)
+    return said
+
+
+def test_a_line_says_what_when_and_how_bad() -> None:
+    said = line("hello %s", "wörld\n")
+
+    assert {key: said[key] for key in ("level", "logger", "message")} == {
+        "level": "WARNING",
+        "logger": "server.sweeper",
+        "message": "hello wörld\n",
+    }
+    assert abs(datetime.fromisoformat(said["time"]).timestamp() - time.time()) < 60
+    assert "run" not in said
+    assert "ValueError: no" in line("oh", error=ValueError("no"))["exception"]
+
+
+def test_a_line_names_the_run_that_it_is_about_on_every_thread_that_works_for_it() -> None:
+    async def work() -> str:
+        with about("r1"):
+            said = await anyio.to_thread.run_sync(line, "on a thread")
+        return str(said["run"])
+
+    assert anyio.run(work) == "r1"
+    assert "run" not in line("afterwards")
+    with process_is_about("r2"):
+        found: list[dict[str, Any]] = []
+        thread = threading.Thread(target=lambda: found.append(line("on a thread of its own")))
+        thread.start()
+        thread.join()
+    assert found[0]["run"] == "r2"
+    assert "run" not in line("afterwards")
+
+
+@pytest.mark.parametrize("log_format", ["json", "text"])
+def test_what_the_server_logs_for_a_run_names_it(tmp_path: Path, log_format: str) -> None:
+    log = tmp_path / "log"
+    with (
+        log.open("wb") as file,
+        serving(tmp_path / "data", stderr=file, MAPLESS_LOG_FORMAT=log_format) as (process, url),
+    ):
+        # A proxy that nobody has told of is worth a line.
+        httpx.get(f"{url.partition('/?')[0]}/api/runs/0123456789abcdef", headers={"X-Forwarded-For": "203.0.113.4"})
+        process.terminate()
+        process.wait(timeout=20)
+    lines = log.read_text().splitlines()
+    if log_format == "json":
+        (said,) = [found for found in map(json.loads, lines) if found["logger"] == "server.security.proxies"]
+        assert said["run"] == "0123456789abcdef"
+        assert said["level"] == "WARNING"
+    else:
+        assert any("MAPLESS_TRUSTED_PROXIES" in found and "[run 0123456789abcdef]" in found for found in lines)
+
+
+def test_a_worker_logs_objects_too(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    settings = {
+        "MAPLESS_SERVER_URL": "http://127.0.0.1:9",
+        "MAPLESS_BROKER_URL": f"sqla+sqlite:///{tmp_path / 'broker.db'}",
+        "MAPLESS_WORKER_TOKEN": "a-worker-token-for-tests",
+        "MAPLESS_WORK_DIR": str(tmp_path / "work"),
+        "MAPLESS_LOG_FORMAT": "json",
+    }
+    command = [sys.executable, "-m", "workers", "worker", "--concurrency=1"]
+    with (
+        log.open("wb") as file,
+        subprocess.Popen(
+            command, cwd=ROOT, env=environment(tmp_path) | settings, stdout=subprocess.DEVNULL, stderr=file
+        ) as process,
+    ):
+        try:
+            deadline = time.monotonic() + 60
+            while not log.read_text().count("\n"):
+                assert time.monotonic() < deadline, "it says nothing"
+                assert process.poll() is None
+                time.sleep(0.2)
+        finally:
+            process.terminate()
+            process.wait(timeout=30)
+    said = [json.loads(found) for found in log.read_text().splitlines()]
+    assert {"time", "level", "logger", "message"} <= set(said[0])
