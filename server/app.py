@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 
 from fastapi import APIRouter, FastAPI
+from starlette.middleware.gzip import GZipMiddleware
 
 from server import pages
 from server.abandoned import AbandonedRequestsMiddleware
@@ -66,6 +67,11 @@ ROUTERS: tuple[APIRouter, ...] = (
     monitoring.router,
 )
 
+# Bytes; less fits into one packet anyway.
+_COMPRESS_FROM = 1_000
+# Curves shrink to a fifth; higher levels take several times the time for a few per cent.
+_COMPRESS_LEVEL = 3
+
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
@@ -115,6 +121,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     pages.mount_pages(app, services.settings.web_dist)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
+    app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
     app.add_middleware(
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )

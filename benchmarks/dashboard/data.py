@@ -153,6 +153,9 @@ class _Maker:
         self._lab.stopped = [run.id for run in runs[2:]]
         self._checkpoints(self._lab.many, sizes.checkpoints, sizes.long_points)
         self._checkpoints(self._lab.few, min(50, sizes.checkpoints), sizes.long_points)
+        for run_id in self._lab.stopped:
+            # They go on from before their end: what lies beyond is dropped.
+            self._checkpoints(run_id, 1, int(0.95 * sizes.long_points))
         with self._database.write() as session:
             for run_id in self._lab.stopped:
                 session.get_one(tables.Run, run_id).state = "stopped"

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from server.abandoned import stop_if_abandoned
 from server.checkpoints.repository import CheckpointRepository
 from server.comparison.differences import differences
 from server.comparison.figures import FinalFigures, final_figures
@@ -63,9 +62,10 @@ class ComparisonService:
         """
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
-            repository = MetricRepository(session)
-            series = {run.id: _series(repository, run.id, name) for experiment in experiments for run in experiment.runs}
-            final = CheckpointRepository(session).final_evaluations(list(series))
+            run_ids = [run.id for experiment in experiments for run in experiment.runs]
+            read = MetricRepository(session).read_many(run_ids, [name])
+            series = {run_id: read[run_id].get(name, Points.joined([])) for run_id in run_ids}
+            final = CheckpointRepository(session).final_evaluations(run_ids)
             episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
         grid = common_grid(list(series.values()), points)
         return Curves(
@@ -75,17 +75,18 @@ class ComparisonService:
         )
 
 
-def _series(repository: MetricRepository, run_id: str, name: str) -> Points:
-    stop_if_abandoned()
-    return repository.read(run_id, [name]).get(name, Points.joined([]))
-
-
 def common_grid(series: Sequence[Points], limit: int) -> NDArray[np.int64]:
     """The steps of all series together or, where those are more than `limit`, as many evenly spaced over their range."""
-    steps = np.unique(np.concatenate([points.steps for points in series])) if series else np.zeros(0, np.int64)
-    if steps.size <= limit:
-        return steps
-    return np.unique(np.linspace(steps[0], steps[-1], limit).round().astype(np.int64))
+    ordered = [points.steps for points in series if len(points)]
+    if not ordered:
+        return np.zeros(0, np.int64)
+    # Where one series alone has too many, the others need not be looked through.
+    if max(steps.size for steps in ordered) <= limit:
+        together = np.unique(np.concatenate(ordered))
+        if together.size <= limit:
+            return together
+    first, last = min(steps[0] for steps in ordered), max(steps[-1] for steps in ordered)
+    return np.unique(np.linspace(first, last, limit).round().astype(np.int64))
 
 
 def resample(points: Points, grid: NDArray[np.int64]) -> NDArray[np.float64]:

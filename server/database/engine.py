@@ -90,6 +90,10 @@ def _check_encoding(connection: "PsycopgConnection[Any]", _record: ConnectionPoo
         )
 
 
+def _lower(text: str | None) -> str | None:
+    return None if text is None else text.lower()
+
+
 def _create_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
@@ -105,6 +109,8 @@ def _create_engine(url: str) -> Engine:
     def _configure(connection: SqliteConnection, _record: ConnectionPoolEntry) -> None:
         # The driver would begin transactions by itself, deferred ones; _begin does it instead.
         connection.isolation_level = None
+        # SQLite's own knows no letters but the 26 of ASCII.
+        connection.create_function("lower", 1, _lower, deterministic=True)
         for pragma in ("journal_mode=WAL", "synchronous=NORMAL", f"busy_timeout={_BUSY_TIMEOUT_MS}", "foreign_keys=ON"):
             connection.execute(f"PRAGMA {pragma}")
 

@@ -69,19 +69,20 @@ class Points:
         return zlib.compress(steps.tobytes() + self.times.astype("<f8").tobytes() + planes.tobytes(), _LEVEL)
 
     @classmethod
-    def decode(cls, data: bytes, count: int) -> Self:
-        """The `count` points that `encode` wrote.
+    def decode(cls, data: bytes, count: int) -> "Points":
+        """The first `count` of the points that `encode` wrote; what was cut off later may still lie behind them.
 
         Raises:
-            ValueError: `data` holds another number of points.
+            ValueError: `data` holds fewer points.
         """
         raw = zlib.decompress(data)
-        if len(raw) != 20 * count:
+        kept, rest = divmod(len(raw), 20)
+        if rest or kept < count:
             raise ValueError(f"{len(raw)} bytes are not {count} points")
-        steps = np.cumsum(np.frombuffer(raw, "<i8", count))
-        times = np.frombuffer(raw, "<f8", count, 8 * count)
-        planes = np.frombuffer(raw, np.uint8, 4 * count, 16 * count).reshape(4, count)
-        return cls(steps, times, np.ascontiguousarray(planes.T).view("<f4").ravel())
+        steps = np.cumsum(np.frombuffer(raw, "<i8", kept))
+        times = np.frombuffer(raw, "<f8", kept, 8 * kept)
+        planes = np.frombuffer(raw, np.uint8, 4 * kept, 16 * kept).reshape(4, kept)
+        return cls(steps, times, np.ascontiguousarray(planes.T).view("<f4").ravel())[:count]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

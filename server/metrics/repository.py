@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
+from server.abandoned import stop_if_abandoned
 from server.database import tables
 from server.metrics.points import Points
 
@@ -19,6 +20,7 @@ COMPACT_AFTER = 500
 _CHUNK_POINTS = 4_096
 # Rows in one INSERT; SQLite takes at most 32,766 parameters.
 _INSERT_ROWS = 1_000
+_RUNS_A_QUERY = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,37 +97,61 @@ class MetricRepository:
             tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step > step
         )
         for chunk in self._session.scalars(straddling).all():
-            points = _decode(chunk)
-            kept = points[: int((points.steps <= step).sum())]
-            chunk.last_step, chunk.count, chunk.points = int(kept.steps[-1]), len(kept), kept.encode()
+            # Counting them out is enough: packing a run's last chunks anew would take many times as long.
+            kept = _decode(chunk).steps
+            chunk.count = int(np.searchsorted(kept, step, side="right"))
+            chunk.last_step = int(kept[chunk.count - 1])
         self._session.flush()
-        self._session.execute(
-            delete(tables.LatestMetric).where(tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step)
-        )
-        known = self._session.scalars(select(tables.LatestMetric.name).where(tables.LatestMetric.run_id == run_id)).all()
-        newest = {
-            name: last
-            for name, points in self.read(run_id).items()
-            if name not in known and (last := _last_finite(points)) is not None
-        }
-        self._set_latest(run_id, newest)
+        beyond = [tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step]
+        lost = set(self._session.scalars(select(tables.LatestMetric.name).where(*beyond)))
+        self._session.execute(delete(tables.LatestMetric).where(*beyond))
+        self._set_latest(run_id, self._newest(run_id, lost))
+
+    def _newest(self, run_id: str, names: Collection[str]) -> dict[str, tuple[int, float]]:
+        """Step and value of the newest number of each of these series, looked for from the end."""
+        newest: dict[str, tuple[int, float]] = {}
+        if not names:
+            return newest
+        rows = select(tables.MetricRow.step, tables.MetricRow.values).where(tables.MetricRow.run_id == run_id)
+        for step, values in self._session.execute(
+            rows.order_by(tables.MetricRow.seq.desc()).execution_options(yield_per=16)
+        ):
+            for name, value in values.items():
+                if name in names and value is not None:
+                    newest.setdefault(name, (step, value))
+            if len(newest) == len(names):
+                return newest
+        last_chunks = self._last_chunks(run_id, [name for name in names if name not in newest])
+        for name, chunk in last_chunks.items():
+            found = _last_finite(_decode(chunk)) or _last_finite(self.read(run_id, [name])[name])
+            if found is not None:
+                newest[name] = found
+        return newest
 
     def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
         """The run's series by name, all or those of `names` that it has."""
-        query = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id).order_by(tables.MetricChunk.first_step)
-        if names is not None:
-            query = query.where(tables.MetricChunk.name.in_(names))
-        parts: dict[str, list[Points]] = defaultdict(list)
-        for chunk in self._session.scalars(query):
-            parts[chunk.name].append(_decode(chunk))
-        for name, points in _series(self._rows(run_id)).items():
-            if names is None or name in names:
-                parts[name].append(points)
-        return {name: Points.joined(parts[name]) for name in sorted(parts)}
+        return self.read_many([run_id], names)[run_id]
+
+    def read_many(self, run_ids: Collection[str], names: Collection[str] | None = None) -> dict[str, dict[str, Points]]:
+        """The series of each of several runs, by run and name, in as many queries as for one."""
+        parts: dict[str, dict[str, list[Points]]] = {run_id: defaultdict(list) for run_id in run_ids}
+        for some in _portions(run_ids):
+            chunks = select(tables.MetricChunk).where(tables.MetricChunk.run_id.in_(some))
+            if names is not None:
+                chunks = chunks.where(tables.MetricChunk.name.in_(names))
+            for chunk in self._session.scalars(chunks.order_by(tables.MetricChunk.run_id, tables.MetricChunk.first_step)):
+                stop_if_abandoned()
+                parts[chunk.run_id][chunk.name].append(_decode(chunk))
+            for run_id, rows in self._rows_of(some).items():
+                for name, points in _series(rows).items():
+                    if names is None or name in names:
+                        parts[run_id][name].append(points)
+        return {run_id: {name: Points.joined(series[name]) for name in sorted(series)} for run_id, series in parts.items()}
 
     def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
+        last_chunks = self._last_chunks(run_id, fresh)
         for name, points in fresh.items():
-            last = self._last_chunk(run_id, name)
+            last = last_chunks.get(name)
             # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
             if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
                 points = Points.joined([_decode(last), points])
@@ -134,16 +160,33 @@ class MetricRepository:
             self._add_chunks(run_id, name, points)
 
     def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
-        query = select(tables.MetricRow).where(tables.MetricRow.run_id == run_id).order_by(tables.MetricRow.seq)
-        return self._session.scalars(query).all()
+        return self._rows_of([run_id]).get(run_id, [])
+
+    def _rows_of(self, run_ids: Collection[str]) -> dict[str, list[tables.MetricRow]]:
+        query = select(tables.MetricRow).where(tables.MetricRow.run_id.in_(run_ids)).order_by(tables.MetricRow.seq)
+        rows: dict[str, list[tables.MetricRow]] = defaultdict(list)
+        for row in self._session.scalars(query):
+            rows[row.run_id].append(row)
+        return rows
 
     def _count_rows(self, run_id: str) -> int:
         query = select(func.count()).select_from(tables.MetricRow).where(tables.MetricRow.run_id == run_id)
         return self._session.scalar(query) or 0
 
-    def _last_chunk(self, run_id: str, name: str) -> tables.MetricChunk | None:
-        query = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.name == name)
-        return self._session.scalars(query.order_by(tables.MetricChunk.first_step.desc()).limit(1)).first()
+    def _last_chunks(self, run_id: str, names: Collection[str]) -> dict[str, tables.MetricChunk]:
+        """The last chunk of each of these series that has one."""
+        of_these = [tables.MetricChunk.run_id == run_id, tables.MetricChunk.name.in_(names)]
+        last = (
+            select(tables.MetricChunk.name, func.max(tables.MetricChunk.first_step).label("first_step"))
+            .where(*of_these)
+            .group_by(tables.MetricChunk.name)
+            .subquery()
+        )
+        query = select(tables.MetricChunk).where(*of_these)
+        query = query.join(
+            last, (last.c.name == tables.MetricChunk.name) & (last.c.first_step == tables.MetricChunk.first_step)
+        )
+        return {chunk.name: chunk for chunk in self._session.scalars(query)}
 
     def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
         for start in range(0, len(points), _CHUNK_POINTS):
@@ -173,6 +216,13 @@ class MetricRepository:
 
 def _decode(chunk: tables.MetricChunk) -> Points:
     return Points.decode(chunk.points, chunk.count)
+
+
+def _portions(run_ids: Collection[str]) -> Iterator[list[str]]:
+    """The runs in lists that a query takes: SQLite knows 32,766 parameters."""
+    ids = list(run_ids)
+    for start in range(0, len(ids), _RUNS_A_QUERY):
+        yield ids[start : start + _RUNS_A_QUERY]
 
 
 def _last_finite(points: Points) -> tuple[int, float] | None:

@@ -148,5 +148,5 @@ def _experiment(row: Row, campaign: str, request: CampaignCreate) -> tables.Expe
 
 
 def _evaluations(session: Session, run_ids: Sequence[str]) -> dict[str, Points]:
-    repository = MetricRepository(session)
-    return {run_id: repository.read(run_id, [EVAL_SUCCESS]).get(EVAL_SUCCESS, Points.joined([])) for run_id in run_ids}
+    read = MetricRepository(session).read_many(run_ids, [EVAL_SUCCESS])
+    return {run_id: series.get(EVAL_SUCCESS, Points.joined([])) for run_id, series in read.items()}

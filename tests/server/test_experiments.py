@@ -142,6 +142,8 @@ def test_the_list_is_searched_filtered_and_paged(client: TestClient, reports: Re
         return [experiment["name"] for experiment in page["items"]]
 
     assert listed() == names[::-1]
+    # Beyond ASCII too.
+    assert listed(query="éLAN") == ["Élan"]
     assert listed(query="MAZE") == ["maze 500", "Maze 50%"]
     # A search is for what it says, not a pattern.
     assert listed(query="50%") == ["Maze 50%"]

@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
+from sqlalchemy import event
 
 from server.database import tables
 from server.database.engine import Database
@@ -119,6 +120,65 @@ def test_what_a_lost_attempt_did_beyond_its_checkpoint_is_dropped(
 
     assert steps(database) == left
     assert latest(database) == ({"loss/policy": (left[-1], -float(left[-1]))} if left else {})
+
+
+def test_a_cut_costs_the_same_however_long_the_run_is(database: Database) -> None:
+    steps = np.arange(1, 50_001, dtype=np.int64)
+    values = np.linspace(0.0, 1.0, steps.size, dtype=np.float32)
+    series = {name: Points(steps, steps.astype(float), values) for name in ("a", "b")}
+    gone = {"gone": Points(steps[-10:], steps[-10:].astype(float), values[-10:])}
+    rare = {"rare": Points(steps[:1], steps[:1].astype(float), np.array([7.0], np.float32))}
+    with database.write() as session:
+        MetricRepository(session).add_series("r", series | gone | rare)
+    loaded: list[str] = []
+
+    def load(chunk: tables.MetricChunk, _context: object) -> None:
+        loaded.append(chunk.name)
+
+    event.listen(tables.MetricChunk, "load", load)
+    try:
+        with database.write() as session:
+            MetricRepository(session).drop_beyond("r", 45_000)
+    finally:
+        event.remove(tables.MetricChunk, "load", load)
+
+    # Of 13 chunks of each series the one that is cut, and once more as the last that is left.
+    assert len(loaded) <= 4
+    with database.read() as session:
+        latest = {row.name: (row.step, row.value) for row in session.query(tables.LatestMetric)}
+        left = MetricRepository(session).read("r")
+    assert latest == {
+        "a": (45_000, pytest.approx(0.9, abs=1e-3)),
+        "b": (45_000, pytest.approx(0.9, abs=1e-3)),
+        "rare": (1, 7),
+    }
+    assert {name: len(points) for name, points in left.items()} == {"a": 45_000, "b": 45_000, "rare": 1}
+    assert np.array_equal(left["a"].values, values[:45_000])
+
+
+def test_many_runs_are_read_in_two_queries(database: Database) -> None:
+    with database.write() as session:
+        experiment = tables.Experiment(id="many", name="many", training={})
+        experiment.runs = [tables.Run(id=f"m{seed}", seed=seed) for seed in range(30)]
+        session.add(experiment)
+        session.flush()
+        for run in experiment.runs:
+            repository = MetricRepository(session)
+            repository.append_rows(run.id, [ReportedRow(1, 10, 0.0, {"a": 1.0, "b": 2.0})])
+            repository.compact(run.id)
+            repository.append_rows(run.id, [ReportedRow(2, 20, 0.0, {"a": float(run.seed)})])
+    asked: list[str] = []
+
+    @event.listens_for(database.engine, "before_cursor_execute")
+    def _(_connection: object, _cursor: object, statement: str, *_rest: object) -> None:
+        asked.append(statement)
+
+    with database.read() as session:
+        read = MetricRepository(session).read_many([f"m{seed}" for seed in range(30)], ["a"])
+    assert len([query for query in asked if query.startswith("SELECT")]) == 2
+    assert {run_id: series["a"].values.tolist() for run_id, series in read.items()} == {
+        f"m{seed}": [1.0, float(seed)] for seed in range(30)
+    }
 
 
 def test_the_next_attempt_continues_where_the_lost_one_was_cut(database: Database) -> None:

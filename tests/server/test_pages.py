@@ -19,6 +19,18 @@ def dist(settings: Settings) -> Path:
     return settings.web_dist
 
 
+def test_what_is_large_comes_compressed_to_who_takes_it_so(dist: Path, client: TestClient) -> None:
+    script = "export const answer = 42\n" * 1_000
+    (dist / "assets" / "large-abc123.js").write_text(script)
+    for accepted, encoding in (("gzip", "gzip"), ("identity", None)):
+        response = client.get("/assets/large-abc123.js", headers={"Accept-Encoding": accepted})
+        assert response.headers.get("content-encoding") == encoding
+        assert response.text == script
+    compressed = client.get("/api/openapi.json", headers={"Accept-Encoding": "gzip"})
+    assert compressed.headers["content-encoding"] == "gzip"
+    assert int(compressed.headers["content-length"]) < len(compressed.content) / 5
+
+
 @pytest.mark.parametrize("path", ["/", "/experiments/abc", "/runs/x/y", "/apiary"])
 def test_every_route_of_the_application_is_its_one_page(dist: Path, client: TestClient, path: str) -> None:
     response = client.get(path)
