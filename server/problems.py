@@ -12,6 +12,26 @@ from server.errors import ErrorBody, ServiceError
 Responses = dict[int | str, dict[str, Any]]
 
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
+ANYWHERE: Responses = UNAUTHORIZED | {
+    400: {"model": ErrorBody, "description": "No request that can be read: its body, its address or its Host"},
+    403: {"model": ErrorBody, "description": "From another site's page, or with a token that does not open this"},
+    408: {"model": ErrorBody, "description": "The request took too long to arrive"},
+    413: {"model": ErrorBody, "description": "The body is too large"},
+    503: {"model": ErrorBody, "description": "Busy: Retry-After says when to come again"},
+}
+"""How any request may be refused, before or whatever it asks for."""
+UNUSABLE: Responses = {
+    422: {
+        "description": "Fields that are refused, each with its place; or in one sentence what is wrong with the whole",
+        "content": {
+            "application/json": {
+                "schema": {
+                    "anyOf": [{"$ref": f"#/components/schemas/{name}"} for name in ("HTTPValidationError", "ErrorBody")]
+                }
+            }
+        },
+    }
+}
 NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}
 CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
 EXPORT_FAILED: Responses = {
