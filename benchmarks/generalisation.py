@@ -25,7 +25,7 @@ from workers.policy import torch_policy
 from workers.reference.library import FOLDER, ReferencePolicy
 
 SUITES = ("clutter-500", "barn-20", "crowd-200")
-THICKETS = TaskConfig(arena=GeneratedArenaConfig(name="thicket", difficulty=0.9))
+THICKETS = TaskConfig(arena=GeneratedArenaConfig(name="thicket", difficulty=0.9, seed=0))
 CROWD, FIRST_CROWD_MAP = 4000, 20_000  # scenarios, one a map; the first of these maps among those kept for suites
 POLICIES = ("clutter", "thickets", "crowd")
 PLANNERS = {

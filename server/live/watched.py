@@ -14,6 +14,7 @@ from server.policies.service import find
 from server.runs.repository import RunRepository
 from server.runs.states import FINISHED
 from server.services import Services
+from sim.arenas import with_maps_of
 from sim.config import TaskConfig
 
 # No run's id has a hyphen.
@@ -48,12 +49,13 @@ def watched(services: Services, identifier: str) -> Watched:
     """
     if identifier.startswith(_POLICY):
         policy = find(identifier.removeprefix(_POLICY))
-        return Watched(identifier, policy.card.training.task, lambda path: _copy(policy.archive, path))
+        task = with_maps_of(policy.card.training.task, policy.card.seed)
+        return Watched(identifier, task, lambda path: _copy(policy.archive, path))
     with services.database.read() as session:
         run = RunRepository(session).get(identifier)
-        training = training_of(run.experiment)
+        training, seed = training_of(run.experiment), run.seed
         best = _best(session, identifier) if run.state in FINISHED else None
-    task = with_geometry(training, services.arenas).task
+    task = with_maps_of(with_geometry(training, services.arenas).task, seed)
     if best is None:
         return Watched(identifier, task, None)
     return Watched(identifier, task, lambda path: CheckpointService(services).download(best).save(path))

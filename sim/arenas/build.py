@@ -9,6 +9,7 @@ from sim.arenas.geometry import Arena
 from sim.arenas.mover import Mover
 from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig, MoversConfig, TaskConfig
 from sim.errors import ArenaError
+from sim.streams import MAPS, stream_seed
 
 _ROOM = 0.05  # m between what a robot keeps from obstacles and the way that is left for it: what the default one has
 
@@ -48,6 +49,20 @@ def build_task_arenas(task: TaskConfig) -> tuple[Arena, ...]:
         ArenaError: as there.
     """
     return build_arenas(task.arena, clearance=arena_clearance(task))
+
+
+def with_maps_of(task: TaskConfig, seed: int) -> TaskConfig:
+    """The task as one training seed meets it: with the pool of maps that is its own, where seeds have pools of their own.
+
+    Args:
+        task: of a training; an environment that is made from it as it is has the pool of its map seed.
+        seed: of the training.
+    """
+    arena = task.arena
+    if not isinstance(arena, GeneratedArenaConfig) or not arena.own_maps:
+        return task
+    own = stream_seed(seed, (*MAPS, arena.seed), bits=31)
+    return task.model_copy(update={"arena": arena.model_copy(update={"seed": own, "own_maps": False})})
 
 
 def build_arena(config: AnyArenaConfig, index: int, *, clearance: float = CLEARANCE) -> Arena:

@@ -1,6 +1,7 @@
 """Where robots drive: built-in arenas, pools that are drawn from a seed, and arenas from files (pydantic only)."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -51,6 +52,12 @@ class GeneratedArenaConfig(Frozen):
         description="Different arenas of the training; with few of them the policy learns them by heart.",
         json_schema_extra=ADVANCED,
     )
+    own_maps: bool = Field(
+        True,
+        title="Maps of its own for each seed",
+        description="Results over seeds then tell what other maps would give; else all seeds train on the same ones.",
+        json_schema_extra=ADVANCED,
+    )
     seed: int = Field(
         0,
         ge=0,
@@ -60,6 +67,14 @@ class GeneratedArenaConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
     movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_map_seed_was_that_of_one_pool(cls, arena: Any) -> Any:
+        """Configurations written before seeds had maps of their own name a map seed and nothing else: they mean one pool."""
+        if isinstance(arena, Mapping) and "seed" in arena and "own_maps" not in arena:
+            return {**arena, "own_maps": False}
+        return arena
 
 
 class ImportedArenaConfig(Frozen):

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sim.arenas import Arena, build_arenas, free_distance
+from sim.arenas import Arena, build_arenas, free_distance, with_maps_of
 from sim.arenas.cells import Grid, components, free_mask
 from sim.arenas.families import CLEARANCE, FAMILIES, SUITE_SEEDS, generate_arena, pool_seeds
 from sim.arenas.planner import Planner
 from sim.config import MAX_MAPS, FamilyName, GeneratedArenaConfig, TaskConfig
 from sim.errors import ArenaError
+from sim.suites import suite_for
 
 families = st.sampled_from(sorted(FAMILIES))
 difficulties = st.floats(0.0, 1.0)
@@ -128,3 +129,28 @@ def test_a_fixed_arena_has_no_difficulty_and_stays_as_it_was_written() -> None:
 def test_arguments_out_of_range_are_refused(arguments: dict[str, object], reason: str) -> None:
     with pytest.raises(ArenaError, match=reason):
         generate_arena(**({"family": "clutter", "difficulty": 0.5, "seed": 1} | arguments))  # type: ignore[arg-type]
+
+
+def test_each_training_seed_draws_maps_of_its_own_unless_one_pool_is_for_all() -> None:
+    task = TaskConfig(arena=GeneratedArenaConfig(name="rooms", maps=4))
+    pools = [with_maps_of(task, seed).arena for seed in range(20)]
+    seeds = {pool.seed for pool in pools if isinstance(pool, GeneratedArenaConfig)}
+    assert len(seeds) == 20
+    assert all(0 <= seed < 2**31 for seed in seeds)
+    assert with_maps_of(task, 3) == with_maps_of(task, 3)
+    assert with_maps_of(with_maps_of(task, 3), 4) == with_maps_of(task, 3)  # told once, it stays
+    other = TaskConfig(arena=GeneratedArenaConfig(name="rooms", maps=4, seed=1, own_maps=True))
+    assert with_maps_of(other, 3) != with_maps_of(task, 3)
+    one = TaskConfig(arena=GeneratedArenaConfig(name="rooms", maps=4, own_maps=False))
+    assert with_maps_of(one, 3) == one
+    assert with_maps_of(TaskConfig(), 3) == TaskConfig()
+    # The suite on which they are measured is the same for all of them.
+    assert suite_for(with_maps_of(task, 3)).hash == suite_for(task).hash
+
+
+def test_a_configuration_of_before_seeds_had_maps_of_their_own_means_one_pool() -> None:
+    stored = {"name": "clutter", "difficulty": 0.9, "maps": 1024, "seed": 0}
+    assert not GeneratedArenaConfig.model_validate(stored).own_maps
+    assert GeneratedArenaConfig.model_validate({"name": "clutter"}).own_maps
+    again = GeneratedArenaConfig(own_maps=True, seed=7)
+    assert GeneratedArenaConfig.model_validate_json(again.model_dump_json()) == again

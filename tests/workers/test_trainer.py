@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 import torch
 
-from sim.config import ArenaConfig, JackalConfig, MoversConfig, RandomisationConfig, TaskConfig
+from sim.arenas import build_arena, with_maps_of
+from sim.config import ArenaConfig, GeneratedArenaConfig, JackalConfig, MoversConfig, RandomisationConfig, TaskConfig
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveMismatchError, NonFiniteError
 from workers.frames import Frame
+from workers.live.viewing import Unwatched
 from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.table import TableRow
 from workers.training.evaluation import evaluation_metrics
 from workers.training.metrics import TrainingMetrics
-from workers.training.trainer import train
+from workers.training.trainer import Training, train
 
 REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress", "reward/penalty"}
 METRICS = {
@@ -292,3 +294,14 @@ def test_drives_are_reported_once_at_the_end_and_checkpoints_only_where_asked_fo
     assert measured[0] == 4_096
     assert measured[1] is not None
     assert measured[1].episodes * measured[1].steps == pytest.approx(500)
+
+
+def test_seeds_train_on_maps_of_their_own_and_the_view_draws_these(tmp_path: Path) -> None:
+    pool = GeneratedArenaConfig(name="rooms", maps=2)
+    for own in (True, False):
+        task = TaskConfig(arena=pool.model_copy(update={"own_maps": own}))
+        config = TrainingConfig(task=task, algorithm=PpoConfig(robots=16, rollout_steps=8, minibatch_size=64), steps=1_000)
+        first, second = (Training(config, seed, Recorder(), tmp_path, Unwatched(), 0.2).env.arenas for seed in (1, 2))
+        assert (first[0].boxes.tolist() == second[0].boxes.tolist()) != own
+        drawn = build_arena(with_maps_of(task, 1).arena, 0)
+        assert drawn.boxes.tolist() == first[0].boxes.tolist()

@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from pydantic import TypeAdapter
 
+from sim.arenas import with_maps_of
 from workers.checkpoints import read_policy
 from workers.frames import Frame
 from workers.live.viewer import LiveViewer
@@ -64,7 +65,7 @@ def drive(archive: Path, wishes: Iterable[bytes], stream: BinaryIO) -> None:
     """
     manifest, policy = read_policy(archive)
     output = _Output(stream)
-    viewer = LiveViewer(manifest.training.task, output)
+    viewer = LiveViewer(with_maps_of(manifest.training.task, manifest.seed), output)
     try:
         for line in wishes:
             wish = _WISH.validate_json(line)

@@ -49,7 +49,7 @@ RECIPES: tuple[Recipe, ...] = (
         "never seen: three minutes on one core.",
         training=TrainingConfig(
             task=TaskConfig(
-                arena=GeneratedArenaConfig(name="clutter", difficulty=0.9, maps=1024),
+                arena=GeneratedArenaConfig(name="clutter", difficulty=0.9, maps=1024, seed=0),
                 lidar=LidarConfig(rays=60, batches=30, field_of_view=360.0),
             ),
             algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128))),
@@ -66,7 +66,7 @@ RECIPES: tuple[Recipe, ...] = (
         "seen: four minutes on one core.",
         training=TrainingConfig(
             task=TaskConfig(
-                arena=GeneratedArenaConfig(name="mixed", difficulty=0.8, maps=256),
+                arena=GeneratedArenaConfig(name="mixed", difficulty=0.8, maps=256, seed=0),
                 lidar=LidarConfig(rays=120, batches=60, field_of_view=360.0),
                 reward=RewardConfig(collision=-1000.0),
             ),
@@ -84,7 +84,7 @@ RECIPES: tuple[Recipe, ...] = (
         "its last three scans; four minutes on one core.",
         training=TrainingConfig(
             task=TaskConfig(
-                arena=GeneratedArenaConfig(name="clutter", difficulty=0.4, maps=256, movers=MoversConfig(count=10)),
+                arena=GeneratedArenaConfig(name="clutter", difficulty=0.4, maps=256, seed=0, movers=MoversConfig(count=10)),
                 lidar=LidarConfig(batches=30),
                 frames=3,
             ),

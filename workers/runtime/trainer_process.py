@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from sim.arenas import with_maps_of
 from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import ArchiveFormatError, ArchiveIntegrityError, WorkerError
@@ -156,7 +157,7 @@ def main(descriptor: int, parent: int) -> None:
                 reporter,
                 Path(job.directory),
                 Path(job.resume) if job.resume else None,
-                viewer=LiveViewer(config.task, reporter),
+                viewer=LiveViewer(with_maps_of(config.task, job.seed), reporter),
             )
         except (ArchiveFormatError, ArchiveIntegrityError) as error:
             # Whether it is damaged where it is kept as well is for the server to say.

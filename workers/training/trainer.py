@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from sim.arenas import with_maps_of
 from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout
 from sim.suites import suite_for
@@ -99,7 +100,8 @@ class Training:
         self.suite = suite_for(config.task)
         self.observation_layout = observation_layout(config.task)
         self.algorithm = build_algorithm(config.algorithm, self.observation_layout.size, seed, _device(config.device))
-        self.env = NavigationVectorEnv(config.task, self.algorithm.robots, seed=seed, copy=False)
+        self.task = with_maps_of(config.task, seed)
+        self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
         self.observations, _ = self.env.reset(seed=seed)
         self.metrics = TrainingMetrics(self.algorithm.robots)
         self.steps_per_update = self.algorithm.steps_per_update * self.algorithm.robots
@@ -201,7 +203,7 @@ class Training:
         if not config.drives or self.updates < self.total_updates:
             return {}
         with self.metrics.phase("evaluation"):
-            return drive(self.policy(torch_policy), self.config.task, config.drives, config.drive_steps).metrics()
+            return drive(self.policy(torch_policy), self.task, config.drives, config.drive_steps).metrics()
 
     def policy(self, runner: Callable[..., PolicyFunction]) -> PolicyFunction:
         """A copy of the newest deterministic policy."""

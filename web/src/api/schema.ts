@@ -2086,6 +2086,12 @@ export interface components {
              */
             name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
             /**
+             * Maps of its own for each seed
+             * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
+             * @default true
+             */
+            own_maps: boolean;
+            /**
              * Map seed
              * @description Which maps; the suites' maps are never among them.
              * @default 0
@@ -2116,6 +2122,12 @@ export interface components {
              * @enum {string}
              */
             name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
+            /**
+             * Maps of its own for each seed
+             * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
+             * @default true
+             */
+            own_maps: boolean;
             /**
              * Map seed
              * @description Which maps; the suites' maps are never among them.
