@@ -56,7 +56,7 @@ HASHES = {
 def test_a_suite_is_what_it_was_and_its_procedure_makes_it_again(name: str) -> None:
     suite = load_suite(name)
     assert suite.hash == HASHES[name]
-    assert build_suite(name) == (Path(sim.__path__[0]) / "data" / f"{name}.json").read_text("utf-8")
+    assert build_suite(name) == (Path(sim.suites.__path__[0]) / "data" / f"{name}.json").read_text("utf-8")
 
 
 def test_a_suite_of_other_maps_is_drawn_as_the_frozen_one_was() -> None:

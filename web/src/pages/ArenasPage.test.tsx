@@ -18,7 +18,7 @@ const GALLERY: ArenaSummary[] = [
     kind: 'generated',
     key: 'maze',
     title: 'Maze',
-    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0, movers },
+    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0, own_maps: false, movers },
     imported_at: null,
   },
   {
@@ -107,7 +107,7 @@ test('the difficulty is what is drawn, and what the training starts with', async
   await user.click(maze.getByRole('link', { name: 'Train on it' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/new'))
   const chosen = new URLSearchParams(router.state.location.search).get('arena')
-  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1, movers })
+  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1, own_maps: false, movers })
 })
 
 test('the launch form takes the chosen arena, and ignores what is none', async () => {
