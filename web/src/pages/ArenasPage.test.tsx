@@ -107,7 +107,14 @@ test('the difficulty is what is drawn, and what the training starts with', async
   await user.click(maze.getByRole('link', { name: 'Train on it' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/new'))
   const chosen = new URLSearchParams(router.state.location.search).get('arena')
-  expect(arenaFromSearch(chosen)).toEqual({ name: 'maze', difficulty: 0.6, maps: 64, seed: 1, own_maps: false, movers })
+  expect(arenaFromSearch(chosen)).toEqual({
+    name: 'maze',
+    difficulty: 0.6,
+    maps: 64,
+    seed: 1,
+    own_maps: false,
+    movers,
+  })
 })
 
 test('the launch form takes the chosen arena, and ignores what is none', async () => {
