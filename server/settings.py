@@ -69,7 +69,9 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(None, description="Login token; generated and kept in the data directory if not given.")
     worker_token: SecretStr | None = Field(None, description="The workers' token; generated likewise.")
     metrics_token: SecretStr | None = Field(
-        None, min_length=16, description="Opens /metrics and nothing else, for Prometheus; without it the login token does."
+        None,
+        min_length=16,
+        description="Opens /metrics and nothing else, for Prometheus (16 characters or more); the login token does too.",
     )
 
     workers: int | None = Field(
