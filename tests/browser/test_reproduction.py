@@ -35,7 +35,7 @@ def test_a_trial_from_the_button_to_the_tables_and_a_cancelled_campaign(context:
         expect(line).to_contain_text("ours, 1 seed")
     claims = page.get_by_test_id("claim")
     expect(claims).to_have_count(len(CLAIMS))
-    expect(claims.first).to_contain_text("1 seed of 5 done.")
+    expect(claims.first).to_contain_text("No verdict below 5 seeds: 1 of 5 done.")
     expect(page.get_by_test_id("chart").first).to_be_visible(timeout=SOON)
 
     # Each seed leads to its run, with checkpoints and 3D view; the experiment leads back.

@@ -153,7 +153,7 @@ def test_two_trainings_run_to_their_end_and_are_compared(context: BrowserContext
     expect(figures).to_contain_text("1 seed × 200 episodes")
     expect(figures).to_contain_text("simple-200")
     expect(page.get_by_test_id("differences")).to_contain_text("Network")
-    expect(page.get_by_test_id("warnings")).to_contain_text("fewer than 5")
+    expect(page.get_by_test_id("verdicts")).to_contain_text("No verdict below 5 seeds")
     expect(page.get_by_test_id("chart").first).to_be_visible()
 
 

@@ -27,7 +27,7 @@ export function SuccessEstimate({ estimate, detail = false }: SuccessEstimatePro
         <strong>{percent(value)}</strong>
         <span className={classes.quiet}>{percentRange(low, high)}</span>
         {detail ? (
-          <span className={classes.quiet}>{behind}</span>
+          <span className={classes.open}>{behind}</span>
         ) : (
           <>
             <span className={overSeeds ? classes.open : classes.quiet}>{shortOf(estimate)}</span>
