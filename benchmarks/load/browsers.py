@@ -11,6 +11,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import httpx
 
@@ -19,36 +20,48 @@ from benchmarks.load.plan import PagesTold, Plan, StreamsTold, read_plan, tell
 _TIMEOUT = httpx.Timeout(30.0)
 
 
-def pages(plan: Plan, dice: random.Random) -> Iterator[tuple[str, ...]]:
-    """The requests of one page after another: every other one is a run's, the rest experiments and their list."""
+@dataclass(frozen=True)
+class Page:
+    """What a page asks for when it opens, and the stream of the changes of what it shows."""
+
+    requests: tuple[str, ...]
+    stream: str
+
+
+def pages(plan: Plan, number: int) -> Iterator[Page]:
+    """The pages that a browser opens: every other one is a run's, the rest experiments and their list."""
+    dice = random.Random(number)
     while True:
         run_id, experiment_id = dice.choice(plan.run_ids), dice.choice(plan.experiment_ids)
-        yield dice.choice(
+        run = Page(
             (
-                *2
-                * (
-                    (
-                        f"/api/runs/{run_id}",
-                        f"/api/runs/{run_id}/metrics",
-                        f"/api/runs/{run_id}/checkpoints",
-                        f"/api/runs/{run_id}/events",
-                        "/api/status",
-                    ),
-                ),
-                (f"/api/experiments/{experiment_id}", "/api/status"),
-                ("/api/experiments", "/api/status"),
-            )
+                f"/api/runs/{run_id}",
+                f"/api/runs/{run_id}/metrics",
+                f"/api/runs/{run_id}/checkpoints",
+                f"/api/runs/{run_id}/events",
+                "/api/status",
+            ),
+            f"/api/events?follow=shown&run={run_id}",
         )
+        experiment = Page(
+            (f"/api/experiments/{experiment_id}", "/api/status"), f"/api/events?follow=shown&experiment={experiment_id}"
+        )
+        everything = Page(("/api/experiments", "/api/status"), "/api/events?follow=shown&reports=true")
+        yield dice.choice((run, run, experiment, everything))
+
+
+def first_wait(plan: Plan, number: int) -> float:
+    """Seconds until a browser opens its first page, so that browsers do not walk in step."""
+    return plan.page_seconds * number / plan.browsers
 
 
 async def _open_pages(plan: Plan, number: int, client: httpx.AsyncClient, told: PagesTold, errors: Counter[str]) -> None:
-    dice = random.Random(number)
-    await asyncio.sleep(plan.page_seconds * dice.random())
-    for requests in pages(plan, dice):
+    await asyncio.sleep(first_wait(plan, number))
+    for page in pages(plan, number):
         if plan.over:
             return
         opened = time.perf_counter()
-        answers = await asyncio.gather(*(client.get(path) for path in requests), return_exceptions=True)
+        answers = await asyncio.gather(*(client.get(path) for path in page.requests), return_exceptions=True)
         took = time.perf_counter() - opened
         told.seconds.append(took)
         for answer in answers:
@@ -74,19 +87,25 @@ async def open_pages(plan: Plan) -> PagesTold:
     return told.model_copy(update={"errors": dict(errors)})
 
 
-async def _read_stream(plan: Plan, client: httpx.AsyncClient, told: StreamsTold) -> None:
-    while not plan.over:
-        try:
-            async with asyncio.timeout(plan.end - time.time()), client.stream("GET", "/api/events") as response:
-                response.raise_for_status()
-                async for block in response.aiter_raw():
-                    told.bytes += len(block)
-        except TimeoutError:
+async def _read_stream(plan: Plan, number: int, client: httpx.AsyncClient, told: StreamsTold) -> None:
+    """The stream of each page, for as long as the page is open."""
+    await asyncio.sleep(first_wait(plan, number))
+    for page in pages(plan, number):
+        until = min(time.time() + plan.page_seconds, plan.end)
+        while time.time() < until:
+            try:
+                async with asyncio.timeout(until - time.time()), client.stream("GET", page.stream) as response:
+                    response.raise_for_status()
+                    async for block in response.aiter_raw():
+                        told.bytes += len(block)
+            except TimeoutError:
+                break
+            except httpx.HTTPError:
+                pass
+            told.ended += 1
+            await asyncio.sleep(1.0)
+        if plan.over:
             return
-        except httpx.HTTPError:
-            pass
-        told.ended += 1
-        await asyncio.sleep(1.0)
 
 
 async def read_streams(plan: Plan) -> StreamsTold:
@@ -99,8 +118,8 @@ async def read_streams(plan: Plan) -> StreamsTold:
         ) as client,
         asyncio.TaskGroup() as group,
     ):
-        for _ in range(plan.browsers):
-            group.create_task(_read_stream(plan, client, told))
+        for number in range(plan.browsers):
+            group.create_task(_read_stream(plan, number, client, told))
     return told
 
 
