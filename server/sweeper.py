@@ -25,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 _SWEEPS_PER_LEASE = 5
 # A run that waits although a worker is idle is rung again after this long: its message was lost.
-RING_AGAIN_SECONDS = 10.0
+RING_AGAIN_SECONDS = 3.0
 
 
 class Sweeper:

@@ -12,10 +12,25 @@ from benchmarks.chaos.report import NOTHING, figures, table
 from benchmarks.chaos.stack import Mode
 from tests.conftest import POSTGRES, require_service
 
-# One of each way in which something ends, stands still, falls silent, is cut or lies.
-EMBEDDED = ("trainer killed", "worker killed", "link cut", "upload cut", "server killed", "database locked")
-PRODUCTION = ("trainer killed", "link refused", "server restarted", "database killed", "broker cut")
-
+# One of each way in which something ends, stands still, falls silent, is cut, is full or lies.
+EMBEDDED = (
+    "trainer killed",
+    "worker killed",
+    "link cut",
+    "server killed",
+    "database locked",
+    "spool altered",
+    "checkpoint damaged",
+    "clock set back",
+)
+PRODUCTION = (
+    "upload cut",
+    "claim's answer lost",
+    "worker's disk full",
+    "server restarted",
+    "database killed",
+    "broker cut",
+)
 
 # Minutes where other work has the cores; a run that stands still is noticed long before.
 pytestmark = pytest.mark.timeout(600)
