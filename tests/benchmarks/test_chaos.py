@@ -40,7 +40,7 @@ def inject(mode: Mode, names: tuple[str, ...]) -> None:
     kinds = tuple(kind for kind in KINDS if kind.name in names)
     assert len(kinds) == len(names)
     outcome, verdict = campaign(
-        kinds=kinds, faults=len(kinds), mode=mode, seed=1, runs=1, steps=150_000, lease_seconds=3.0, talk=False
+        kinds=kinds, faults=len(kinds), mode=mode, seed=1, runs=1, steps=120_000, lease_seconds=3.0, talk=False
     )
     told = figures(outcome, verdict)
     assert {name: told[name] for name in NOTHING} == dict.fromkeys(NOTHING, 0), f"{outcome}\n{asdict(verdict)}"
