@@ -12,6 +12,7 @@ from server.comparison.schemas import Comparison, Curves, ExperimentCurves, Seed
 from server.comparison.verdicts import verdicts
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
+from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
@@ -63,8 +64,9 @@ class ComparisonService:
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
             run_ids = [run.id for experiment in experiments for run in experiment.runs]
-            read = MetricRepository(session).read_many(run_ids, [name])
-            series = {run_id: read[run_id].get(name, Points.joined([])) for run_id in run_ids}
+            # Finer than the grid: what is looked at is the grid's.
+            read = MetricRepository(session).curves(run_ids, [name], max(points, SUMMARY_WIDTH))
+            series = {run_id: read[run_id].get(name, Buckets.of(Points.joined([]))) for run_id in run_ids}
             final = CheckpointRepository(session).final_evaluations(run_ids)
             episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
         grid = common_grid(list(series.values()), points)
@@ -75,7 +77,7 @@ class ComparisonService:
         )
 
 
-def common_grid(series: Sequence[Points], limit: int) -> NDArray[np.int64]:
+def common_grid(series: Sequence[Buckets], limit: int) -> NDArray[np.int64]:
     """The steps of all series together or, where those are more than `limit`, as many evenly spaced over their range."""
     ordered = [points.steps for points in series if len(points)]
     if not ordered:
@@ -89,16 +91,20 @@ def common_grid(series: Sequence[Points], limit: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(first, last, limit).round().astype(np.int64))
 
 
-def resample(points: Points, grid: NDArray[np.int64]) -> NDArray[np.float64]:
+def resample(points: Buckets, grid: NDArray[np.int64]) -> NDArray[np.float64]:
     """The series at the grid's steps, linear in between; nan before its first finite point and after its last."""
-    finite = np.isfinite(points.values)
+    finite = np.isfinite(points.mean)
     if not finite.any():
         return np.full(grid.size, np.nan)
-    return np.interp(grid, points.steps[finite], points.values[finite].astype(np.float64), left=np.nan, right=np.nan)
+    return np.interp(grid, points.steps[finite], points.mean[finite], left=np.nan, right=np.nan)
 
 
 def _curves(
-    experiment: tables.Experiment, series: dict[str, Points], grid: NDArray[np.int64], name: str, episodes: Mapping[str, int]
+    experiment: tables.Experiment,
+    series: dict[str, Buckets],
+    grid: NDArray[np.int64],
+    name: str,
+    episodes: Mapping[str, int],
 ) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])

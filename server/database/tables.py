@@ -103,6 +103,23 @@ class MetricChunk(Base):
     points: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class MetricSummary(Base):
+    """What a long series looks like: `Buckets` of its first points, and the newest one that they do not hold.
+
+    `last_step` is that of the last point that it knows; what follows is in chunks and rows. Where the newest point was
+    cut off, `last_step` is that of the last of the `buckets`; `data` may hold more of them, which were cut off too.
+    """
+
+    __tablename__ = "metric_summaries"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    buckets: Mapped[int] = mapped_column(Integer)
+    last_step: Mapped[int] = mapped_column(BigInteger)
+    newest: Mapped[float | None] = mapped_column(Float)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class LatestMetric(Base):
     """The newest value of each series, for lists."""
 

@@ -1,9 +1,8 @@
 """Reads a run's curves and hands them to the rules."""
 
-import numpy as np
-
 from server.diagnoses.schemas import Diagnoses
 from server.experiments.stored import training_of
+from server.metrics.buckets import SUMMARY_WIDTH
 from server.metrics.repository import MetricRepository
 from server.runs.repository import RunRepository
 from server.services import Services
@@ -25,7 +24,7 @@ class DiagnosisService:
         with self._services.database.read() as session:
             run = RunRepository(session).get(run_id)
             training = training_of(run.experiment)
-            series = MetricRepository(session).read(run_id)
-        curves = {name: Series(points.steps, points.values.astype(np.float64)) for name, points in series.items()}
+            series = MetricRepository(session).curves([run_id], None, SUMMARY_WIDTH)[run_id]
+        curves = {name: Series(buckets.steps, buckets.mean) for name, buckets in series.items()}
         history = History(training, curves)
         return Diagnoses(run_id=run_id, step=history.step, diagnoses=diagnose(history))

@@ -12,7 +12,9 @@ from sqlalchemy.orm import Session
 
 from server.abandoned import stop_if_abandoned
 from server.database import tables
+from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
+from server.metrics.summaries import SummaryRepository, summarized
 
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
 COMPACT_AFTER = 500
@@ -38,6 +40,7 @@ class MetricRepository:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+        self._summaries = SummaryRepository(session)
         backend = session.get_bind().dialect.name
         # Both databases know ON CONFLICT; SQLAlchemy has it in each one's own insert.
         self._insert = postgresql.insert if backend == "postgresql" else sqlite.insert
@@ -102,6 +105,7 @@ class MetricRepository:
             chunk.count = int(np.searchsorted(kept, step, side="right"))
             chunk.last_step = int(kept[chunk.count - 1])
         self._session.flush()
+        self._summaries.cut(run_id, step)
         beyond = [tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step]
         lost = set(self._session.scalars(select(tables.LatestMetric.name).where(*beyond)))
         self._session.execute(delete(tables.LatestMetric).where(*beyond))
@@ -134,11 +138,25 @@ class MetricRepository:
 
     def read_many(self, run_ids: Collection[str], names: Collection[str] | None = None) -> dict[str, dict[str, Points]]:
         """The series of each of several runs, by run and name, in as many queries as for one."""
+        return self._read(run_ids, names, beyond_summaries=False)
+
+    def _read(
+        self, run_ids: Collection[str], names: Collection[str] | None, *, beyond_summaries: bool
+    ) -> dict[str, dict[str, Points]]:
+        """All points of the series, or those alone that no summary knows."""
         parts: dict[str, dict[str, list[Points]]] = {run_id: defaultdict(list) for run_id in run_ids}
         for some in _portions(run_ids):
             chunks = select(tables.MetricChunk).where(tables.MetricChunk.run_id.in_(some))
             if names is not None:
                 chunks = chunks.where(tables.MetricChunk.name.in_(names))
+            if beyond_summaries:
+                chunks = chunks.outerjoin(
+                    tables.MetricSummary,
+                    (tables.MetricSummary.run_id == tables.MetricChunk.run_id)
+                    & (tables.MetricSummary.name == tables.MetricChunk.name),
+                ).where(
+                    tables.MetricSummary.run_id.is_(None) | (tables.MetricChunk.last_step > tables.MetricSummary.last_step)
+                )
             for chunk in self._session.scalars(chunks.order_by(tables.MetricChunk.run_id, tables.MetricChunk.first_step)):
                 stop_if_abandoned()
                 parts[chunk.run_id][chunk.name].append(_decode(chunk))
@@ -148,16 +166,58 @@ class MetricRepository:
                         parts[run_id][name].append(points)
         return {run_id: {name: Points.joined(series[name]) for name in sorted(series)} for run_id, series in parts.items()}
 
+    def curves(self, run_ids: Collection[str], names: Collection[str] | None, limit: int) -> dict[str, dict[str, Buckets]]:
+        """The series of several runs at most `limit` (at least 2) buckets wide, by run and name.
+
+        Of a long series its summary is read, and what came after it, unless more is asked for than the summary shows.
+        """
+        summaries = self._summaries.of(run_ids, names) if limit <= SUMMARY_WIDTH else []
+        known = {(summary.run_id, summary.name): summary for summary in summaries}
+        read = self._read(run_ids, names, beyond_summaries=bool(known))
+        curves: dict[str, dict[str, Buckets]] = {}
+        for run_id, series in read.items():
+            curves[run_id] = {}
+            for name in sorted({*series, *(name for run, name in known if run == run_id)}):
+                points, summary = series.get(name, Points.joined([])), known.get((run_id, name))
+                if summary is None:
+                    buckets = Buckets.of(points)
+                else:
+                    after = int(np.searchsorted(points.steps, summary.last_step, side="right"))
+                    buckets = Buckets.joined([summarized(summary), Buckets.of(points[after:])])
+                curves[run_id][name] = buckets.cut(limit)
+        return curves
+
     def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
         last_chunks = self._last_chunks(run_id, fresh)
+        known = {summary.name: summary for summary in self._summaries.of([run_id], fresh)}
         for name, points in fresh.items():
-            last = last_chunks.get(name)
+            last, began = last_chunks.get(name), int(points.steps[0])
             # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
             if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
                 points = Points.joined([_decode(last), points])
                 self._session.delete(last)
                 self._session.flush()
             self._add_chunks(run_id, name, points)
+            if name in known or len(points) > _CHUNK_POINTS or (last is not None and last.count >= _CHUNK_POINTS):
+                self._summarize(run_id, name, known.get(name), began)
+
+    def _summarize(self, run_id: str, name: str, known: tables.MetricSummary | None, began: int) -> None:
+        """Bring a series' summary up to its chunks, to which points from the step `began` on were added."""
+        is_long = known is not None
+        if known is not None and began <= known.last_step:
+            # Points came late: nothing can be appended, so all is looked at once more.
+            known = None
+        chunks = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.name == name)
+        if known is not None:
+            chunks = chunks.where(tables.MetricChunk.last_step > known.last_step)
+        self._session.flush()
+        points = Points.joined(
+            [_decode(chunk) for chunk in self._session.scalars(chunks.order_by(tables.MetricChunk.first_step))]
+        )
+        if known is not None:
+            points = points[int(np.searchsorted(points.steps, known.last_step, side="right")) :]
+        if is_long or len(points) > _CHUNK_POINTS:
+            self._summaries.write(run_id, name, known, points)
 
     def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
         return self._rows_of([run_id]).get(run_id, [])

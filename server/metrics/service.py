@@ -5,7 +5,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from server.metrics.points import Points, downsample
+from server.metrics.buckets import Buckets
 from server.metrics.repository import MetricRepository
 from server.metrics.schemas import Metrics, Series
 from server.runs.repository import RunRepository
@@ -26,18 +26,17 @@ class MetricService:
         """
         with self._services.database.read() as session:
             RunRepository(session).get(run_id)
-            series = MetricRepository(session).read(run_id, names)
-        return Metrics(series=[_view(name, values, points) for name, values in series.items()])
+            series = MetricRepository(session).curves([run_id], names, points)[run_id]
+        return Metrics(series=[_view(name, buckets) for name, buckets in series.items()])
 
 
-def _view(name: str, points: Points, limit: int) -> Series:
-    buckets = downsample(points, limit)
+def _view(name: str, buckets: Buckets) -> Series:
     return Series(
         name=name,
         steps=buckets.steps.tolist(),
-        values=json_numbers(buckets.values),
-        min=None if buckets.low is None else json_numbers(buckets.low),
-        max=None if buckets.high is None else json_numbers(buckets.high),
+        values=json_numbers(buckets.mean),
+        min=None if buckets.single else json_numbers(buckets.low),
+        max=None if buckets.single else json_numbers(buckets.high),
     )
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from server.comparison.differences import differences
 from server.comparison.service import common_grid, resample
+from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from tests.server.harness import Reports
 from workers.statistics.seeds import success_rate
@@ -277,7 +278,7 @@ series = st.lists(
 
 @given(st.lists(series, min_size=1, max_size=4), st.integers(2, 30))
 def test_resampling_stays_within_each_curve(curves: list[list[tuple[int, float]]], limit: int) -> None:
-    points = [Points.of([p[0] for p in curve], [0.0] * len(curve), [p[1] for p in curve]) for curve in curves]
+    points = [Buckets.of(Points.of([p[0] for p in curve], [0.0] * len(curve), [p[1] for p in curve])) for curve in curves]
     grid = common_grid(points, limit)
 
     assert grid.size <= limit
@@ -286,8 +287,8 @@ def test_resampling_stays_within_each_curve(curves: list[list[tuple[int, float]]
         values = resample(curve, grid)
         inside = (grid >= curve.steps[0]) & (grid <= curve.steps[-1])
         assert (np.isfinite(values) == inside).all()
-        assert (values[inside] >= curve.values.min() - 1e-3).all()
-        assert (values[inside] <= curve.values.max() + 1e-3).all()
+        assert (values[inside] >= curve.mean.min() - 1e-3).all()
+        assert (values[inside] <= curve.mean.max() + 1e-3).all()
 
 
 @pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves"])

@@ -14,7 +14,8 @@ from sqlalchemy import event
 from server.database import tables
 from server.database.engine import Database
 from server.database.migrate import upgrade
-from server.metrics.points import Points, downsample
+from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
+from server.metrics.points import Points
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.services import Services
 
@@ -156,6 +157,89 @@ def test_a_cut_costs_the_same_however_long_the_run_is(database: Database) -> Non
     assert np.array_equal(left["a"].values, values[:45_000])
 
 
+def add(database: Database, first: int, last: int, seed: int = 0) -> None:
+    """Points of the steps from `first` to `last`, each once."""
+    steps = np.arange(first, last + 1, dtype=np.int64)
+    values = np.random.default_rng(seed).normal(size=steps.size).astype(np.float32)
+    with database.write() as session:
+        MetricRepository(session).add_series("r", {"a": Points(steps, steps.astype(float), values)})
+
+
+def agrees(database: Database) -> None:
+    """The curve that is read from the summary says of every point what the points say."""
+    with database.read() as session:
+        repository = MetricRepository(session)
+        points = repository.read("r")["a"]
+        curve = repository.curves(["r"], None, 600)["r"]["a"]
+    assert len(curve) <= 600
+    assert int(curve.sizes.sum()) == len(points)
+    assert (np.diff(curve.steps) > 0).all()
+    ends = np.cumsum(curve.sizes)
+    assert curve.steps.tolist() == points.steps[ends - 1].tolist()
+    parts = np.split(points.values.astype(np.float64), ends[:-1])
+    assert curve.low.tolist() == [part.min() for part in parts]
+    assert curve.high.tolist() == [part.max() for part in parts]
+    assert curve.mean == pytest.approx(np.array([part.mean() for part in parts]), rel=1e-5, abs=1e-6)
+    assert (curve.steps[-1], curve.mean[-1]) == (points.steps[-1], points.values[-1])
+
+
+def test_a_long_curve_is_read_from_its_summary_as_the_points_say(database: Database) -> None:
+    add(database, 1, 30_000)
+    agrees(database)
+    for first in range(30_001, 36_000, 700):
+        add(database, first, first + 699, seed=first)
+    agrees(database)
+    append(database, rows(40_000, 40_001, name="a"))
+    agrees(database)
+    compact(database)
+    agrees(database)
+    # A lost attempt's points go, in the middle of a bucket and of a chunk, and others follow.
+    with database.write() as session:
+        MetricRepository(session).drop_beyond("r", 21_777)
+    agrees(database)
+    add(database, 21_778, 23_000, seed=3)
+    agrees(database)
+    # What comes late is counted where it belongs.
+    add(database, 22_990, 24_000, seed=4)
+    agrees(database)
+    with database.write() as session:
+        MetricRepository(session).drop_beyond("r", -1)
+    add(database, 1, 9_000)
+    agrees(database)
+
+
+def test_looking_at_a_curve_costs_the_same_however_long_the_run_is(database: Database) -> None:
+    add(database, 1, 200_000)
+    add(database, 200_001, 200_100)
+    loaded: list[int] = []
+
+    def load(chunk: tables.MetricChunk, _context: object) -> None:
+        loaded.append(chunk.count)
+
+    event.listen(tables.MetricChunk, "load", load)
+    try:
+        with database.read() as session:
+            curves = MetricRepository(session).curves(["r"], ["a"], SUMMARY_WIDTH)
+    finally:
+        event.remove(tables.MetricChunk, "load", load)
+    assert loaded == []
+    assert SUMMARY_WIDTH / 2 < len(curves["r"]["a"]) <= SUMMARY_WIDTH
+    with database.read() as session:
+        (summary,) = session.query(tables.MetricSummary)
+        assert MAX_BUCKETS / 2 < summary.buckets <= MAX_BUCKETS
+        chunks = session.query(tables.MetricChunk)
+        assert len(summary.data) < 0.05 * sum(len(chunk.points) for chunk in chunks)
+
+
+def test_a_curve_of_an_older_database_has_no_summary_and_is_read_all_the_same(database: Database) -> None:
+    add(database, 1, 10_000)
+    with database.write() as session:
+        session.query(tables.MetricSummary).delete()
+    agrees(database)
+    add(database, 10_001, 13_000, seed=1)
+    agrees(database)
+
+
 def test_many_runs_are_read_in_two_queries(database: Database) -> None:
     with database.write() as session:
         experiment = tables.Experiment(id="many", name="many", training={})
@@ -229,33 +313,29 @@ def test_of_several_values_at_one_step_the_last_counts() -> None:
 @given(points_strategy, st.integers(2, 50))
 def test_downsampling_keeps_extremes_ends_and_order(points: list[tuple[int, float, float]], limit: int) -> None:
     original = Points.of([p[0] for p in points], [p[1] for p in points], [p[2] for p in points])
-    cut = downsample(original, limit)
+    cut = Buckets.of(original).cut(limit)
 
     if len(points) <= limit:
-        assert cut.low is None
-        assert cut.values.tolist() == original.values.tolist()
+        assert cut.single
+        assert cut.mean.tolist() == original.values.tolist()
         return
-    assert cut.low is not None
-    assert cut.high is not None
     assert cut.steps.size == limit
     assert (np.diff(cut.steps) > 0).all()
     assert cut.low.min() == original.values.min()
     assert cut.high.max() == original.values.max()
-    assert (cut.low <= cut.values).all()
-    assert (cut.values <= cut.high).all()
+    assert (cut.low <= cut.mean).all()
+    assert (cut.mean <= cut.high).all()
     # The newest point stands alone, so that the end of a curve is what the run's page says in figures.
-    assert (cut.steps[-1], cut.values[-1]) == (original.steps[-1], original.values[-1])
+    assert (cut.steps[-1], cut.mean[-1]) == (original.steps[-1], original.values[-1])
 
 
 def test_downsampling_worked_by_hand() -> None:
-    cut = downsample(Points.of([1, 2, 3, 4, 5], [0] * 5, [1, 3, 5, math.nan, 2]), 3)
+    cut = Buckets.of(Points.of([1, 2, 3, 4, 5], [0] * 5, [1, 3, 5, math.nan, 2])).cut(3)
 
     # Two buckets of two and the newest point.
     assert cut.steps.tolist() == [2, 4, 5]
-    assert cut.values.tolist() == [2, 5, 2]
-    assert cut.low is not None
+    assert cut.mean.tolist() == [2, 5, 2]
     assert cut.low.tolist() == [1, 5, 2]
-    assert cut.high is not None
     assert cut.high.tolist() == [3, 5, 2]
 
 
