@@ -44,5 +44,9 @@ class PlacementError(SimError):
     """A requested pose or target does not fit into the arena."""
 
 
+class FormulaError(SimError):
+    """A formula of the reward is not a finite number for what a robot met."""
+
+
 class SuiteError(SimError):
     """A suite is unknown, does not fit the task, or has changed since its hash was taken."""

@@ -13,11 +13,12 @@ import pymunk
 from numpy.typing import NDArray
 
 from sim.arenas import Arena
-from sim.config import TaskConfig
+from sim.config import FormulaTerm, RewardTerm, TaskConfig
 from sim.footprint import rectangle_clearance
 from sim.lidar import drawn_ray_angles
 from sim.observations import near_distance
 from sim.physics import add_arena, robot_body
+from sim.rewards import constants, evaluate
 
 Outcome = Literal["none", "arrival", "collision", "timeout"]
 
@@ -47,6 +48,7 @@ class Step:
 
     observation: NDArray[np.float64]
     reward: float
+    terms: tuple[float, ...]
     outcome: Outcome
 
 
@@ -82,7 +84,7 @@ class ReferenceWorld:
         self.body.angle = pose[2]
         self.target = target
         self.steps = 0
-        self.velocities = (0.0, 0.0)
+        self.velocities = self.last_velocities = (0.0, 0.0)
         self.distance = math.dist(pose[:2], target)
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
 
@@ -130,23 +132,63 @@ class ReferenceWorld:
             polar = (self.distance / (self.distance + 1.0), bearing / math.pi, heading / math.pi)
         return np.array([*scan, *self.velocities, *polar, abs(bearing) / math.pi])
 
-    def reward(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> float:
-        """The task's reward for a step that began `before` metres from the target (paper, Eq. 4 and 5)."""
-        reward = self.task.reward
-        if outcome == "arrival":
-            return reward.arrival
-        if outcome == "collision":
-            return reward.collision
-        progress = reward.progress * (before - self.distance)
-        if reward.name == "basic":
-            return progress
-        if reward.name == "clearance":
-            hd = (
-                min(r for r, angle in zip(ranges, self._angles, strict=True) if abs(angle) <= _AHEAD) / self.task.lidar.range
-            )
-        else:
-            hd = 1.0 - abs(self.bearing()) / math.pi
-        return float(progress * 2.0 ** min(before / self.distance, _MAX_RATIO) - reward.penalty * (1.0 - hd))
+    def reward_terms(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> tuple[float, ...]:
+        """The reward's terms for a step that began `before` metres from the target (paper, Eq. 4 and 5)."""
+        return tuple(term.weight * self._worth(term, before, ranges, outcome) for term in self.task.reward.terms)
+
+    def _worth(self, term: RewardTerm, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> float:
+        """A term before its weight, see `sim.config.reward`."""
+        if isinstance(term, FormulaTerm):
+            return evaluate(term.formula, self._quantities(before, ranges, outcome))
+        if term.name in ("arrival", "collision", "timeout"):
+            return float(term.name == outcome)
+        if outcome in ("arrival", "collision"):
+            return 0.0
+        changes = np.subtract(self.velocities, self.last_velocities)
+        match term.name:
+            case "progress":
+                ratio = min(before / self.distance, _MAX_RATIO)
+                return (before - self.distance) * (2.0**ratio if term.exponential else 1.0)
+            case "time":
+                return self.task.control_period
+            case "clearance":
+                return 1.0 - self._ahead(ranges) / self.task.lidar.range
+            case "proximity":
+                return max(0.0, 1.0 - max(self.clearance(), 0.0) / term.margin)
+            case "alignment":
+                return abs(self.bearing()) / math.pi
+            case "smoothness":
+                return float(changes @ changes)
+            case "speed":
+                return self.task.robot.max_linear_speed * self.velocities[0]
+            case _:  # people: nothing moves here
+                return 0.0
+
+    def _ahead(self, ranges: NDArray[np.float64]) -> float:
+        """Free distance within 30 degrees of the heading, metres."""
+        return float(min(r for r, angle in zip(ranges, self._angles, strict=True) if abs(angle) <= _AHEAD))
+
+    def _quantities(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> dict[str, float]:
+        """What formulas may read, see `sim.config.expression`."""
+        limits = self.task.robot.max_linear_speed, self.task.robot.max_angular_speed
+        return constants(self.task) | {
+            "distance": self.distance,
+            "previous_distance": before,
+            "bearing": self.bearing(),
+            "heading": wrapped(self.body.angle),
+            "speed": limits[0] * self.velocities[0],
+            "turning_rate": limits[1] * self.velocities[1],
+            "last_speed": limits[0] * self.last_velocities[0],
+            "last_turning_rate": limits[1] * self.last_velocities[1],
+            "clearance": self.clearance(),
+            "ahead": self._ahead(ranges),
+            "nearest": float(ranges.min()),
+            "mover": 100.0,
+            "steps": float(self.steps),
+            "arrived": float(outcome == "arrival"),
+            "collided": float(outcome == "collision"),
+            "timed_out": float(outcome == "timeout"),
+        }
 
     def step(self, linear: float, angular: float) -> Step:
         """Drive for one control period; `linear` in [0, 1] and `angular` in [-1, 1] are fractions of the limits."""
@@ -160,7 +202,7 @@ class ReferenceWorld:
         self.space.step(task.control_period)
 
         self.steps += 1
-        self.velocities = (linear, angular)
+        self.last_velocities, self.velocities = self.velocities, (linear, angular)
         before, self.distance = self.distance, math.dist(self.body.position, self.target)
         ranges = self.scan()
         outcome: Outcome = "none"
@@ -170,4 +212,5 @@ class ReferenceWorld:
             outcome = "collision"
         elif self.steps >= task.step_limit:
             outcome = "timeout"
-        return Step(self.observe(ranges), self.reward(before, ranges, outcome), outcome)
+        terms = self.reward_terms(before, ranges, outcome)
+        return Step(self.observe(ranges), sum(terms), terms, outcome)

@@ -10,17 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import FreeSpace, free_space
 from sim.config import RandomisationConfig, TaskConfig
+from sim.config.expression import QUANTITIES
 from sim.disturbances import longest_delay, quantity_spans
 from sim.errors import PlacementError
 from sim.footprint import rectangle_clearance
-from sim.kernels.bundles import REWARD_TERMS, Geometry, Robots
+from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
 from sim.kernels.random import seed_streams
 from sim.kernels.records import (
-    ALIGNMENT,
-    BASIC,
-    CLEARANCE,
     DISTANCE_NOISE,
     DROPOUT,
     FIELD_OF_VIEW,
@@ -40,6 +38,7 @@ from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.movers import Movers
 from sim.observations import near_distance, observation_size
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
+from sim.rewards import Formulas, pack_terms, reads_changes
 from sim.shapes import pack_shapes
 from sim.streams import ENVIRONMENT, Stream
 
@@ -51,7 +50,6 @@ Restart = Literal["same step", "next step", "reset"]
 `World.reset` is called."""
 
 _OBSERVATIONS = {"paper": PAPER, "improved": IMPROVED}
-_REWARDS = {"basic": BASIC, "clearance": CLEARANCE, "alignment": ALIGNMENT}
 
 
 def spawn_space(task: TaskConfig, arena: Arena) -> FreeSpace:
@@ -105,11 +103,6 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "observation": _OBSERVATIONS[task.observation],
         "frames": task.frames,
         "near": near_distance(task),
-        "reward": _REWARDS[task.reward.name],
-        "arrival_reward": task.reward.arrival,
-        "collision_reward": task.reward.collision,
-        "progress": task.reward.progress,
-        "penalty": task.reward.penalty,
         "arrival_distance": task.arrival_distance,
         "collision_distance": task.collision_distance,
         "step_limit": task.step_limit,
@@ -119,7 +112,7 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "min_target_distance": max(float(MIN_TARGET_DISTANCE), task.arrival_distance + ARRIVAL_MARGIN),
         "path_samples": _path_samples(task),
     }
-    for name, value in values.items():
+    for name, value in (values | pack_terms(task.reward)).items():
         parameters[name] = value
     return parameters
 
@@ -194,6 +187,7 @@ class World:
             discs=self.movers.discs,
         )
         numbers = observation_size(task)
+        self._formulas = formulas = Formulas(task, robots)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -203,7 +197,8 @@ class World:
             observations=np.zeros((robots, numbers), dtype=np.float32),
             final_observations=np.zeros((robots, numbers), dtype=np.float32),
             rewards=np.zeros(robots, dtype=np.float32),
-            terms=np.zeros((robots, len(REWARD_TERMS)), dtype=np.float32),
+            terms=np.zeros((robots, len(task.reward.terms)), dtype=np.float32),
+            quantities=np.zeros((len(QUANTITIES) if len(formulas) else 0, robots), dtype=np.float32),
             terminations=np.zeros(robots, dtype=np.bool_),
             truncations=np.zeros(robots, dtype=np.bool_),
             outcomes=np.zeros(robots, dtype=np.uint8),
@@ -317,6 +312,7 @@ class World:
 
         Raises:
             ValueError: an action is not finite.
+            FormulaError: a formula of the reward is not.
         """
         space = self._space
         ended = self.robots.terminations | self.robots.truncations if self._restart == "next step" else None
@@ -331,6 +327,7 @@ class World:
         count = step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
         if count:
             space.put(self._placed[:count])
+        self._formulas.add(self.robots)
         if ended is not None and ended.any():
             self._begin(ended)
 
@@ -359,9 +356,11 @@ class World:
 
     def _state(self) -> dict[str, NDArray[np.generic]]:
         """The arrays that the future depends on; those that have nothing to say in this task are left out."""
-        state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in ROBOT.names or ()}
+        changes = {"last_linear", "last_angular"} if not reads_changes(self.task.reward) else set()
+        names = (name for name in ROBOT.names or () if name not in changes)
+        state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in names}
         drawn = self.task.randomisation
-        constant = {"records"} if drawn != RandomisationConfig() else {"records", "drawn"}
+        constant = {"records", "terms", "quantities"} | (set() if drawn != RandomisationConfig() else {"drawn"})
         constant |= set() if drawn.field_of_view else {"ray_cos", "ray_sin", "ahead"}
         arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
         rays = self.task.lidar.rays
@@ -381,6 +380,8 @@ class World:
             ValueError: the state is of another task or number of robots.
         """
         targets = self._state()
+        # The terms of the last step were part of it once.
+        state = {name: array for name, array in state.items() if name != "terms"}
         if state.keys() != targets.keys():
             raise ValueError(f"not a state of this environment: {sorted(state.keys() ^ targets.keys())} do not match")
         for name, target in targets.items():

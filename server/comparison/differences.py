@@ -5,6 +5,9 @@ from typing import Any
 
 from server.comparison.schemas import Difference
 
+_NAMES = ("name", "label")
+"""What the objects of a list, such as a reward's terms, are told apart by."""
+
 
 def differences(configurations: Sequence[Mapping[str, Any]]) -> list[Difference]:
     """The settings that are not the same in all `configurations`, by dotted path; a setting that one lacks is null there."""
@@ -19,5 +22,7 @@ def _flatten(value: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]
     leaves: list[tuple[str, Any]] = []
     for key, child in value.items():
         path = f"{prefix}{key}"
+        if isinstance(child, list) and child and all(isinstance(item, Mapping) and "name" in item for item in child):
+            child = {item.get("label", item["name"]): {k: v for k, v in item.items() if k not in _NAMES} for item in child}
         leaves.extend(_flatten(child, f"{path}.") if isinstance(child, Mapping) else [(path, child)])
     return leaves

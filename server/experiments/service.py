@@ -166,7 +166,7 @@ def _listed(experiment: Experiment) -> ListedExperiment:
         robot=task.robot.name,
         algorithm=algorithm.name,
         network=algorithm.network.name,
-        reward=task.reward.name,
+        reward=task.reward.in_short,
         unreadable=experiment.unreadable,
         state=experiment.state,
         states=sorted({run.state for run in runs}),

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
 from sim.envs.render import render_robot
-from sim.kernels.bundles import REWARD_TERMS
 from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.observations import observation_layout
+from sim.rewards import term_names
 from sim.world import Restart, World
 
 Floats = NDArray[np.float32]
@@ -133,7 +133,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """(N, numbers) last observation of the episodes that ended in this step; meaningless elsewhere."""
         self.reward_terms = robots.terms
         """(N, terms) of this step's reward, named by `reward_term_names`."""
-        self.reward_term_names = REWARD_TERMS
+        self.reward_term_names = term_names(self.task.reward)
         records = robots.records
         self.attempt_steps: NDArray[np.int32] = records["steps"]
         """(N,) steps of the attempt that ended in this step, elsewhere of the one that goes on."""

@@ -87,7 +87,8 @@ class Robots(NamedTuple):
         observations: (N, numbers), after the step and after a reset that it caused; stacked frames newest first.
         final_observations: (N, numbers), the last ones of the episodes that ended in this step.
         rewards: (N,) of this step.
-        terms: (N, 4) the reward's terms, in the order of `REWARD_TERMS`.
+        terms: (N, terms) the reward's terms, in the configuration's order.
+        quantities: (Q, N) what formulas read of this step, see `sim.config.expression.QUANTITIES`; (0, N) without formulas.
         terminations, truncations: (N,) bool.
         outcomes: (N,) how the attempt that ended in this step ended; 0 where none did.
         drawn: (N, 10) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
@@ -108,6 +109,7 @@ class Robots(NamedTuple):
     final_observations: Floats
     rewards: Floats
     terms: Floats
+    quantities: Floats
     terminations: NDArray[np.bool_]
     truncations: NDArray[np.bool_]
     outcomes: NDArray[np.uint8]
@@ -119,7 +121,3 @@ class Robots(NamedTuple):
     pending: Floats
     held_ranges: Floats
     scan_ages: Integers
-
-
-REWARD_TERMS = ("arrival", "collision", "progress", "penalty")
-"""Columns of `Robots.terms`; their sum is the reward."""

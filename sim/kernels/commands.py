@@ -71,6 +71,8 @@ def write_commands(actions, robots, state, command, parameters):
         linear = min(max(linear, records[i].linear - change), records[i].linear + change)
         change = _largest_change(p.max_angular_acceleration, max_angular, p.period)
         angular = min(max(angular, records[i].angular - change), records[i].angular + change)
+        records[i].last_linear = records[i].linear
+        records[i].last_angular = records[i].angular
         records[i].linear = linear
         records[i].angular = angular
         turn = max_angular * angular

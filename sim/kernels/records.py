@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from sim.config import MAX_TERMS
+
 CELL = 0.1
 """Edge of a cell of free space (`sim.arenas.freespace`), metres."""
 
@@ -14,8 +16,36 @@ NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 PAPER, IMPROVED = 0, 1
 """Observation layouts, see `sim.observations`."""
 
-BASIC, CLEARANCE, ALIGNMENT = 0, 1, 2
-"""Rewards, see `sim.config.RewardConfig`."""
+TERM_KINDS = (
+    "arrival",
+    "collision",
+    "timeout",
+    "progress",
+    "time",
+    "clearance",
+    "proximity",
+    "alignment",
+    "smoothness",
+    "speed",
+    "people",
+    "formula",
+)
+"""Kinds of reward terms, see `sim.config.RewardTerm`; a kind's place here is its number."""
+
+(
+    ARRIVAL_TERM,
+    COLLISION_TERM,
+    TIMEOUT_TERM,
+    PROGRESS_TERM,
+    TIME_TERM,
+    CLEARANCE_TERM,
+    PROXIMITY_TERM,
+    ALIGNMENT_TERM,
+    SMOOTHNESS_TERM,
+    SPEED_TERM,
+    PEOPLE_TERM,
+    FORMULA_TERM,
+) = range(len(TERM_KINDS))
 
 QUANTITIES = (
     "range",
@@ -52,11 +82,11 @@ PARAMETERS = np.dtype(
         ("observation", "i4"),
         ("frames", "i4"),  # observations that are stacked
         ("near", "f4"),  # m, see `sim.observations.near_distance`
-        ("reward", "i4"),
-        ("arrival_reward", "f4"),
-        ("collision_reward", "f4"),
-        ("progress", "f4"),  # reward per metre
-        ("penalty", "f4"),  # reward, the advanced ones' c_p
+        ("terms", "i4"),  # of the reward
+        ("term_kinds", "i4", (MAX_TERMS,)),
+        ("term_weights", "f4", (MAX_TERMS,)),
+        ("term_options", "f4", (MAX_TERMS,)),  # a margin, m; of progress 1 where it is exponential
+        ("tabulates", "i4"),  # 1 where a formula reads `Robots.quantities`
         ("arrival_distance", "f4"),  # m
         ("collision_distance", "f4"),  # m
         ("step_limit", "i4"),
@@ -84,6 +114,8 @@ ROBOT = np.dtype(
         ("min_clearance", "f4"),  # m, body to anything else, smallest of this attempt
         ("linear", "f4"),  # velocities of the last step, as fractions of the limits
         ("angular", "f4"),
+        ("last_linear", "f4"),  # those of the step before
+        ("last_angular", "f4"),
         ("parked", "i4"),  # 1 when the robot neither senses nor acts any more
     ],
     align=True,

@@ -6,21 +6,19 @@ import numpy as np
 
 from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
 from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
-from sim.kernels.observing import bearing_of, observe, observe_first
+from sim.kernels.observing import observe, observe_first
 from sim.kernels.options import kernel
 from sim.kernels.random import uniform
 from sim.kernels.records import (
-    ALIGNMENT,
     ARRIVAL,
-    BASIC,
     CELL,
-    CLEARANCE,
     COLLISION,
     MAX_ANGULAR,
     MAX_LINEAR,
     NONE,
     TIMEOUT,
 )
+from sim.kernels.rewards import reward, tabulate
 from sim.kernels.sensing import FAST, clearance_at, disc_clearance, nearest_of, sense, sense_discs, swept_clearance
 
 ZERO = np.float32(0.0)
@@ -33,9 +31,6 @@ MIN_TARGET_DISTANCE = np.float32(0.5)
 
 ARRIVAL_MARGIN = 0.1
 """And this far beyond the distance that counts as arrived, metres: nobody arrives without driving."""
-
-MAX_RATIO = np.float32(8.0)
-"""Cap of d_{t-1}/d_t in the advanced reward, which would overflow when a robot stands on its target."""
 
 MOVER_ROOM = np.float32(1.1)
 """Metres that a robot's centre starts away from every mover's surface."""
@@ -116,6 +111,8 @@ def _place(i, x, y, heading, robots, geometry, p, state):
     state[i, 2] = heading
     robots.records[i].linear = ZERO
     robots.records[i].angular = ZERO
+    robots.records[i].last_linear = ZERO
+    robots.records[i].last_angular = ZERO
 
 
 @kernel()
@@ -230,37 +227,6 @@ def _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry
     return clearance
 
 
-@kernel(fastmath=FAST, inline="always")
-def _reward(i, outcome, before, robots, p):
-    """Write robot i's reward and its terms for a step that began `before` metres from the target."""
-    terms = robots.terms
-    for k in range(terms.shape[1]):
-        terms[i, k] = ZERO
-    if outcome == ARRIVAL:
-        terms[i, 0] = p.arrival_reward
-    elif outcome == COLLISION:
-        terms[i, 1] = p.collision_reward
-    else:
-        now = robots.records[i].distance
-        gained = p.progress * (before - now)
-        if p.reward == BASIC:
-            terms[i, 2] = gained
-        else:
-            ratio = MAX_RATIO if now * MAX_RATIO <= before else before / now
-            terms[i, 2] = gained * np.float32(2.0**ratio)
-            safety = ZERO
-            if p.reward == CLEARANCE:
-                own = _scanner_of(i, robots)
-                safety = nearest_of(robots.ranges, i, robots.ahead[own, 0], robots.ahead[own, 1]) / p.range
-            elif p.reward == ALIGNMENT:
-                dx = robots.targets[i, 0] - robots.poses[i, 0]
-                dy = robots.targets[i, 1] - robots.poses[i, 1]
-                safety = ONE - abs(bearing_of(dx, dy, robots.poses[i, 2])) / PI
-            terms[i, 3] = -p.penalty * (ONE - safety)
-    robots.rewards[i] = terms[i, 0] + terms[i, 1] + terms[i, 2] + terms[i, 3]
-    robots.records[i].attempt_reward += robots.rewards[i]
-
-
 @kernel(fastmath=FAST)
 def step_robots(state, placed, robots, geometry, parameters):
     """Everything that follows the physics of a step.
@@ -334,7 +300,9 @@ def step_robots(state, placed, robots, geometry, parameters):
         ended = outcome in (COLLISION, TIMEOUT) or (outcome == ARRIVAL and p.arrival_ends)
         robots.terminations[i] = ended and outcome != TIMEOUT
         robots.truncations[i] = outcome == TIMEOUT
-        _reward(i, outcome, before, robots, p)
+        reward(i, outcome, before, clearance, tile, robots, geometry, p)
+        if p.tabulates:
+            tabulate(i, outcome, before, clearance, nearest, tile, robots, geometry, p)
 
         # Outcomes and rewards are of the world as it is; the robot gets to see less.
         if p.perceives:

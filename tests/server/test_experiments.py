@@ -114,11 +114,15 @@ def test_a_minibatch_that_does_not_fit_is_answered_with_what_does(client: TestCl
 
 
 def test_infinite_and_missing_numbers_are_refused(client: TestClient) -> None:
-    body = '{"training": {"task": {"reward": {"arrival": Infinity, "collision": NaN}}}}'
+    terms = '{"name": "arrival", "weight": Infinity}, {"name": "collision", "weight": NaN}'
+    body = f'{{"training": {{"task": {{"reward": {{"terms": [{terms}]}}}}}}}}'
     response = client.post("/api/experiments", content=body, headers={"Content-Type": "application/json"})
 
     assert response.status_code == 422
-    assert [problem["loc"][-1] for problem in response.json()["detail"]] == ["arrival", "collision"]
+    assert [problem["loc"][-2:] for problem in response.json()["detail"][:2]] == [
+        ["arrival", "weight"],
+        ["collision", "weight"],
+    ]
 
 
 def test_the_form_can_be_sent_as_it_comes(client: TestClient) -> None:

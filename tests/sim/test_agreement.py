@@ -1,6 +1,7 @@
 """The compiled world against the same task written plainly over pymunk, step by step."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -8,13 +9,48 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from sim.arenas import Arena, free_distance
-from sim.config import ObservationName, RandomisationConfig, RewardConfig, TaskConfig
+from sim.config import (
+    AlignmentTerm,
+    FormulaTerm,
+    ObservationName,
+    PeopleTerm,
+    ProximityTerm,
+    RandomisationConfig,
+    RewardConfig,
+    RewardPreset,
+    SmoothnessTerm,
+    SpeedTerm,
+    TaskConfig,
+    TimeoutTerm,
+    TimeTerm,
+    preset_terms,
+)
 from sim.errors import ArenaError
 from sim.kernels.records import ARRIVAL, COLLISION, NONE, TIMEOUT
 from sim.plain import ReferenceWorld, exact_arc
 from sim.world import World
 from tests.sim.scenes import arenas
 
+REWARDS = {
+    **{name: RewardConfig.preset(name) for name in get_args(RewardPreset)},
+    "all": RewardConfig(
+        terms=(
+            *preset_terms("clearance"),
+            TimeoutTerm(),
+            TimeTerm(),
+            ProximityTerm(margin=0.5),
+            AlignmentTerm(),
+            SmoothnessTerm(),
+            SpeedTerm(),
+            PeopleTerm(),
+            FormulaTerm(label="slow_near", formula="min(0, clearance - 0.3) * speed / max_speed - 0.1 * abs(turning_rate)"),
+            FormulaTerm(
+                label="ends", formula="3 * arrived - 4 * collided + (previous_distance - distance if steps > 5 else 0)"
+            ),
+            FormulaTerm(label="jerk", formula="-(speed - last_speed) ** 2 - cos(bearing) * exp(-nearest)"),
+        )
+    ),
+}
 OUTCOMES = {NONE: "none", ARRIVAL: "arrival", COLLISION: "collision", TIMEOUT: "timeout"}
 
 
@@ -23,7 +59,7 @@ OUTCOMES = {NONE: "none", ARRIVAL: "arrival", COLLISION: "collision", TIMEOUT: "
     arenas,
     st.integers(0, 2**32 - 1),
     st.sampled_from(["paper", "improved"]),
-    st.sampled_from(["basic", "clearance", "alignment"]),
+    st.sampled_from(sorted(REWARDS)),
     st.sampled_from([(), (120.0, 240.0)]),
 )
 def test_observations_rewards_and_outcomes_agree(
@@ -32,7 +68,7 @@ def test_observations_rewards_and_outcomes_agree(
     rng = np.random.default_rng(seed)
     task = TaskConfig(
         observation=observation,
-        reward=RewardConfig.model_validate({"name": reward}),
+        reward=REWARDS[reward],
         step_limit=int(rng.integers(10, 60)),
         collision_distance=float(rng.choice([0.0, 0.2])),
         randomisation=RandomisationConfig(field_of_view=fields_of_view),
@@ -59,9 +95,10 @@ def test_observations_rewards_and_outcomes_agree(
         assert OUTCOMES[robots.outcomes[0]] == expected.outcome
         # A bearing of half a turn may round to either side, and so may everything made of it.
         if abs(abs(plain.bearing()) - math.pi) > 1e-4 and abs(abs(pose[2]) - math.pi) > 1e-4:
-            tolerance = 2e-3 * abs(task.reward.progress) * 1e-3 + 1e-2
+            tolerance = 2e-3 * abs(task.reward.weight("progress")) * 1e-3 + 1e-2
+            assert robots.terms[0] == pytest.approx(expected.terms, abs=tolerance)
             assert robots.rewards[0] == pytest.approx(expected.reward, abs=tolerance)
-        assert robots.terms[0].sum() == robots.rewards[0]
+        assert robots.terms[0].sum() == pytest.approx(robots.rewards[0], rel=1e-6)
         if expected.outcome in ("collision", "timeout"):
             assert_observations_equal(robots.final_observations[0], expected.observation, task)
             return

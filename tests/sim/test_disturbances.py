@@ -234,7 +234,7 @@ def test_what_is_drawn_is_what_a_robot_has() -> None:
 
 
 def test_a_field_of_view_that_is_always_the_same_is_that_of_such_a_scanner() -> None:
-    reward = RewardConfig(name="clearance")
+    reward = RewardConfig.preset("clearance")
     drawn = TaskConfig(arena=COMPLEX, reward=reward, randomisation=RandomisationConfig(field_of_view=(90.0, 90.0)))
     narrow = TaskConfig(arena=COMPLEX, reward=reward, lidar=LidarConfig(field_of_view=90.0))
     ours, theirs = (NavigationVectorEnv(task, 100, seed=2) for task in (drawn, narrow))

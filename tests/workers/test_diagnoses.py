@@ -112,7 +112,7 @@ def test_healthy_default_trainings_are_left_alone(seed: int, tmp_path: Path) -> 
             {
                 "algorithm": {
                     **SMALL_DDPG,
-                    "critic_learning_rate": 0.03,
+                    "critic_learning_rate": 0.1,
                     "gamma": 0.99,
                     "tau": 1.0,
                     "network": {"name": "resblock"},

@@ -20,7 +20,7 @@ from workers.training.evaluation import evaluation_metrics
 from workers.training.metrics import TrainingMetrics
 from workers.training.trainer import Training, train
 
-REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress", "reward/penalty"}
+REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress"}
 METRICS = {
     *REWARD_TERMS,
     *("train/reward", "loss/policy", "loss/value", "policy/kl", "policy/entropy", "policy/clip_fraction"),

@@ -89,7 +89,9 @@ def reward_hacked(history: History) -> Diagnosis | None:
     if min(map(len, (early, late, arrived, arrives))) < MIN_POINTS:
         return None
     rise, gain = float(np.median(late) - np.median(early)), float(arrives.mean() - arrived.mean())
-    worth = max(abs(history.training.task.reward.arrival), float(np.std(early)), 0.2 * abs(float(np.median(early))))
+    worth = max(
+        abs(history.training.task.reward.weight("arrival")), float(np.std(early)), 0.2 * abs(float(np.median(early)))
+    )
     if rise <= worth or gain > 0.02:
         return None
     return Diagnosis(

@@ -157,16 +157,28 @@ def _value_diagnosis(history: History, explanation: str, evidence: tuple[Evidenc
 def largest_value(training: TrainingConfig) -> float | None:
     """Largest size that a discounted return of off-policy learning can have, in scaled rewards; None for PPO.
 
-    The largest reward of a step, at every step for ever: r / (1 - gamma).
+    The largest reward of a step, at every step for ever: r / (1 - gamma). None, too, where a formula of one's own may be of
+    any size.
     """
     algorithm, task = training.algorithm, training.task
     if isinstance(algorithm, PpoConfig):
         return None
-    reward = task.reward
-    progress = abs(reward.progress) * task.robot.max_linear_speed * task.control_period
-    if reward.name != "basic":
-        progress = progress * _ADVANCED_FACTOR + reward.penalty
-    largest = max(abs(reward.arrival), abs(reward.collision), progress)
+    robot, terms = task.robot, {term.name: term for term in task.reward.terms}
+    if "formula" in terms:
+        return None
+    at_end = max(abs(task.reward.weight(name)) for name in ("arrival", "collision", "timeout"))
+    on_the_way = {
+        "progress": robot.max_linear_speed * task.control_period,
+        "time": task.control_period,
+        "smoothness": 5.0,  # from full stop to full speed, and from one full turn to the other
+        "speed": robot.max_linear_speed,
+    }
+    largest = sum(
+        abs(term.weight) * on_the_way.get(name, 1.0) * (_ADVANCED_FACTOR if getattr(term, "exponential", False) else 1.0)
+        for name, term in terms.items()
+        if name not in ("arrival", "collision", "timeout")
+    )
+    largest = max(at_end, largest)
     return largest * algorithm.reward_scale / (1.0 - algorithm.gamma)
 
 

@@ -68,7 +68,7 @@ RECIPES: tuple[Recipe, ...] = (
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="mixed", difficulty=0.8, maps=256, seed=0),
                 lidar=LidarConfig(rays=120, batches=60, field_of_view=360.0),
-                reward=RewardConfig(collision=-1000.0),
+                reward=RewardConfig.preset("basic", collision=-1000.0),
             ),
             algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128))),
             steps=4_000_000,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from sim.config import ArenaConfig, Frozen, RewardConfig, TaskConfig
+from sim.config import ArenaConfig, Frozen, RewardConfig, RewardPreset, TaskConfig
 from workers.config import (
     Algorithm,
     EvaluationConfig,
@@ -51,12 +51,12 @@ _VANILLA = paper_ppo(MlpNetwork(hidden_sizes=(64, 64)))
 _DDPG = paper_ddpg()
 
 
-def _training(arena: str, reward: str, algorithm: Algorithm) -> TrainingConfig:
+def _training(arena: str, reward: RewardPreset, algorithm: Algorithm) -> TrainingConfig:
     return TrainingConfig(
         task=TaskConfig(
             arena=ArenaConfig.model_validate({"name": arena}),
             observation="paper",
-            reward=RewardConfig.model_validate({"name": reward}),
+            reward=RewardConfig.preset(reward),
         ),
         algorithm=algorithm,
         steps=STEPS,

@@ -822,6 +822,40 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * AlignmentTerm
+         * @description Facing away from the target: |bearing of the target| / pi.
+         */
+        "AlignmentTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "alignment";
+            /**
+             * Weight
+             * @description Reward per step facing away, none facing the target.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
+         * AlignmentTerm
+         * @description Facing away from the target: |bearing of the target| / pi.
+         */
+        "AlignmentTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "alignment";
+            /**
+             * Weight
+             * @description Reward per step facing away, none facing the target.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
          * ArenaConfig
          * @description The place in which the robots drive.
          */
@@ -1030,6 +1064,40 @@ export interface components {
              * @description Experiments that use this imported arena; only one that none uses may be deleted.
              */
             trainings: number;
+        };
+        /**
+         * ArrivalTerm
+         * @description The target is reached.
+         */
+        "ArrivalTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "arrival";
+            /**
+             * Weight
+             * @description Reward on arrival.
+             * @default 120
+             */
+            weight: number;
+        };
+        /**
+         * ArrivalTerm
+         * @description The target is reached.
+         */
+        "ArrivalTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "arrival";
+            /**
+             * Weight
+             * @description Reward on arrival.
+             * @default 120
+             */
+            weight: number;
         };
         /**
          * Box
@@ -1336,6 +1404,74 @@ export interface components {
             x: number;
             /** Y */
             y: number;
+        };
+        /**
+         * ClearanceTerm
+         * @description Too little room ahead: 1 - free distance within 30 degrees of the heading / range of the LiDAR.
+         */
+        "ClearanceTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "clearance";
+            /**
+             * Weight
+             * @description Reward per step with no room ahead at all, less with more.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
+         * ClearanceTerm
+         * @description Too little room ahead: 1 - free distance within 30 degrees of the heading / range of the LiDAR.
+         */
+        "ClearanceTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "clearance";
+            /**
+             * Weight
+             * @description Reward per step with no room ahead at all, less with more.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
+         * CollisionTerm
+         * @description The robot collides.
+         */
+        "CollisionTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "collision";
+            /**
+             * Weight
+             * @description Reward on a collision.
+             * @default -100
+             */
+            weight: number;
+        };
+        /**
+         * CollisionTerm
+         * @description The robot collides.
+         */
+        "CollisionTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "collision";
+            /**
+             * Weight
+             * @description Reward on a collision.
+             * @default -100
+             */
+            weight: number;
         };
         /**
          * ComparedExperiment
@@ -2060,6 +2196,64 @@ export interface components {
             seeds: number;
             /** Sentence */
             sentence: string;
+        };
+        /**
+         * FormulaTerm
+         * @description A formula of one's own, paid in every step; see docs/rewards.md for what it may read.
+         */
+        "FormulaTerm-Input": {
+            /**
+             * Formula
+             * @description Of distance, previous_distance, bearing, speed, turning_rate, clearance, ahead, nearest, mover, steps, arrived, collided, timed_out and more.
+             * @default min(0, clearance - 0.3) * speed
+             */
+            formula: string;
+            /**
+             * Name
+             * @description Under which it is logged: small letters, digits and _.
+             * @default mine
+             */
+            label: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "formula";
+            /**
+             * Weight
+             * @description Reward per unit of the formula.
+             * @default 1
+             */
+            weight: number;
+        };
+        /**
+         * FormulaTerm
+         * @description A formula of one's own, paid in every step; see docs/rewards.md for what it may read.
+         */
+        "FormulaTerm-Output": {
+            /**
+             * Formula
+             * @description Of distance, previous_distance, bearing, speed, turning_rate, clearance, ahead, nearest, mover, steps, arrived, collided, timed_out and more.
+             * @default min(0, clearance - 0.3) * speed
+             */
+            formula: string;
+            /**
+             * Name
+             * @description Under which it is logged: small letters, digits and _.
+             * @default mine
+             */
+            label: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "formula";
+            /**
+             * Weight
+             * @description Reward per unit of the formula.
+             * @default 1
+             */
+            weight: number;
         };
         /**
          * GeneratedArenaConfig
@@ -2859,6 +3053,52 @@ export interface components {
             speed: number;
         };
         /**
+         * PeopleTerm
+         * @description Passing movers too near: max(0, 1 - distance from the body to the nearest / margin).
+         */
+        "PeopleTerm-Input": {
+            /**
+             * Margin
+             * @description Distance from which on nothing is paid, metres.
+             * @default 0.5
+             */
+            margin: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "people";
+            /**
+             * Weight
+             * @description Reward per step in touch, less with more distance.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
+         * PeopleTerm
+         * @description Passing movers too near: max(0, 1 - distance from the body to the nearest / margin).
+         */
+        "PeopleTerm-Output": {
+            /**
+             * Margin
+             * @description Distance from which on nothing is paid, metres.
+             * @default 0.5
+             */
+            margin: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "people";
+            /**
+             * Weight
+             * @description Reward per step in touch, less with more distance.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
          * PolicyEpisodes
          * @description Every episode of a reference policy on a suite, in the suite's order.
          */
@@ -3067,6 +3307,98 @@ export interface components {
             /** Title */
             title: string;
             training: components["schemas"]["TrainingConfig-Output"];
+        };
+        /**
+         * ProgressTerm
+         * @description Metres by which the target came nearer: d before - d now.
+         */
+        "ProgressTerm-Input": {
+            /**
+             * Exponential
+             * @description Times 2^(d before / d now), as in the paper's advanced reward; the ratio is cut at 8.
+             * @default false
+             */
+            exponential: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "progress";
+            /**
+             * Weight
+             * @description Reward per metre gained.
+             * @default 500
+             */
+            weight: number;
+        };
+        /**
+         * ProgressTerm
+         * @description Metres by which the target came nearer: d before - d now.
+         */
+        "ProgressTerm-Output": {
+            /**
+             * Exponential
+             * @description Times 2^(d before / d now), as in the paper's advanced reward; the ratio is cut at 8.
+             * @default false
+             */
+            exponential: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "progress";
+            /**
+             * Weight
+             * @description Reward per metre gained.
+             * @default 500
+             */
+            weight: number;
+        };
+        /**
+         * ProximityTerm
+         * @description Near to anything: max(0, 1 - distance from the body / margin).
+         */
+        "ProximityTerm-Input": {
+            /**
+             * Margin
+             * @description Distance from which on nothing is paid, metres.
+             * @default 0.3
+             */
+            margin: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "proximity";
+            /**
+             * Weight
+             * @description Reward per step in touch, less with more distance.
+             * @default -5
+             */
+            weight: number;
+        };
+        /**
+         * ProximityTerm
+         * @description Near to anything: max(0, 1 - distance from the body / margin).
+         */
+        "ProximityTerm-Output": {
+            /**
+             * Margin
+             * @description Distance from which on nothing is paid, metres.
+             * @default 0.3
+             */
+            margin: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "proximity";
+            /**
+             * Weight
+             * @description Reward per step in touch, less with more distance.
+             * @default -5
+             */
+            weight: number;
         };
         /**
          * RandomisationConfig
@@ -3428,81 +3760,25 @@ export interface components {
         };
         /**
          * RewardConfig
-         * @description The paper's rewards: on arrival, on collision, and in between progress c_r * (d_before - d_after).
-         *
-         *     The advanced ones multiply the progress by 2^(d_before / d_after) and subtract penalty * (1 - hd). The paper leaves hd
-         *     open; here it is the free distance ahead over the LiDAR's range (`clearance`) or 1 - |bearing of the target| / pi
-         *     (`alignment`).
+         * @description The terms whose sum is the reward of a step.
          */
         "RewardConfig-Input": {
             /**
-             * Arrival reward
-             * @default 120
+             * Terms
+             * @description Their sum is the reward of a step; each is logged by itself.
              */
-            arrival: number;
-            /**
-             * Collision reward
-             * @default -100
-             */
-            collision: number;
-            /**
-             * Reward
-             * @description Basic: arrival, collision, progress. Clearance and alignment are readings of the advanced reward: exponential progress, less a penalty for little room ahead or for facing away from the target.
-             * @default basic
-             * @enum {string}
-             */
-            name: "basic" | "clearance" | "alignment";
-            /**
-             * Penalty coefficient
-             * @description Largest penalty per step; the basic reward has none.
-             * @default 5
-             */
-            penalty: number;
-            /**
-             * Progress coefficient
-             * @description Reward per metre gained.
-             * @default 500
-             */
-            progress: number;
+            terms?: (components["schemas"]["ArrivalTerm-Input"] | components["schemas"]["CollisionTerm-Input"] | components["schemas"]["TimeoutTerm-Input"] | components["schemas"]["ProgressTerm-Input"] | components["schemas"]["TimeTerm-Input"] | components["schemas"]["ClearanceTerm-Input"] | components["schemas"]["ProximityTerm-Input"] | components["schemas"]["AlignmentTerm-Input"] | components["schemas"]["SmoothnessTerm-Input"] | components["schemas"]["SpeedTerm-Input"] | components["schemas"]["PeopleTerm-Input"] | components["schemas"]["FormulaTerm-Input"])[];
         };
         /**
          * RewardConfig
-         * @description The paper's rewards: on arrival, on collision, and in between progress c_r * (d_before - d_after).
-         *
-         *     The advanced ones multiply the progress by 2^(d_before / d_after) and subtract penalty * (1 - hd). The paper leaves hd
-         *     open; here it is the free distance ahead over the LiDAR's range (`clearance`) or 1 - |bearing of the target| / pi
-         *     (`alignment`).
+         * @description The terms whose sum is the reward of a step.
          */
         "RewardConfig-Output": {
             /**
-             * Arrival reward
-             * @default 120
+             * Terms
+             * @description Their sum is the reward of a step; each is logged by itself.
              */
-            arrival: number;
-            /**
-             * Collision reward
-             * @default -100
-             */
-            collision: number;
-            /**
-             * Reward
-             * @description Basic: arrival, collision, progress. Clearance and alignment are readings of the advanced reward: exponential progress, less a penalty for little room ahead or for facing away from the target.
-             * @default basic
-             * @enum {string}
-             */
-            name: "basic" | "clearance" | "alignment";
-            /**
-             * Penalty coefficient
-             * @description Largest penalty per step; the basic reward has none.
-             * @default 5
-             */
-            penalty: number;
-            /**
-             * Progress coefficient
-             * @description Reward per metre gained.
-             * @default 500
-             */
-            progress: number;
+            terms: (components["schemas"]["ArrivalTerm-Output"] | components["schemas"]["CollisionTerm-Output"] | components["schemas"]["TimeoutTerm-Output"] | components["schemas"]["ProgressTerm-Output"] | components["schemas"]["TimeTerm-Output"] | components["schemas"]["ClearanceTerm-Output"] | components["schemas"]["ProximityTerm-Output"] | components["schemas"]["AlignmentTerm-Output"] | components["schemas"]["SmoothnessTerm-Output"] | components["schemas"]["SpeedTerm-Output"] | components["schemas"]["PeopleTerm-Output"] | components["schemas"]["FormulaTerm-Output"])[];
         };
         /**
          * RoundConfig
@@ -3971,6 +4247,74 @@ export interface components {
             steps: number[];
             /** Values */
             values: (number | null)[];
+        };
+        /**
+         * SmoothnessTerm
+         * @description Changes of the command: (change of linear)² + (change of angular velocity)², both as fractions of their limits.
+         */
+        "SmoothnessTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "smoothness";
+            /**
+             * Weight
+             * @description Reward per unit.
+             * @default -1
+             */
+            weight: number;
+        };
+        /**
+         * SmoothnessTerm
+         * @description Changes of the command: (change of linear)² + (change of angular velocity)², both as fractions of their limits.
+         */
+        "SmoothnessTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "smoothness";
+            /**
+             * Weight
+             * @description Reward per unit.
+             * @default -1
+             */
+            weight: number;
+        };
+        /**
+         * SpeedTerm
+         * @description Linear speed, metres per second.
+         */
+        "SpeedTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "speed";
+            /**
+             * Weight
+             * @description Reward per step at 1 m/s.
+             * @default 1
+             */
+            weight: number;
+        };
+        /**
+         * SpeedTerm
+         * @description Linear speed, metres per second.
+         */
+        "SpeedTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "speed";
+            /**
+             * Weight
+             * @description Reward per step at 1 m/s.
+             * @default 1
+             */
+            weight: number;
         };
         /**
          * Spread
@@ -4531,6 +4875,74 @@ export interface components {
              * @default 0.25
              */
             radius: number;
+        };
+        /**
+         * TimeoutTerm
+         * @description The attempt ends at its limit of steps.
+         */
+        "TimeoutTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "timeout";
+            /**
+             * Weight
+             * @description Reward at the step limit.
+             * @default -50
+             */
+            weight: number;
+        };
+        /**
+         * TimeoutTerm
+         * @description The attempt ends at its limit of steps.
+         */
+        "TimeoutTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "timeout";
+            /**
+             * Weight
+             * @description Reward at the step limit.
+             * @default -50
+             */
+            weight: number;
+        };
+        /**
+         * TimeTerm
+         * @description Seconds that pass.
+         */
+        "TimeTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "time";
+            /**
+             * Weight
+             * @description Reward per second.
+             * @default -1
+             */
+            weight: number;
+        };
+        /**
+         * TimeTerm
+         * @description Seconds that pass.
+         */
+        "TimeTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "time";
+            /**
+             * Weight
+             * @description Reward per second.
+             * @default -1
+             */
+            weight: number;
         };
         /**
          * TrainingConfig

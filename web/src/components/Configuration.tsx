@@ -15,7 +15,18 @@ export function settingText(value: unknown): string {
   if (typeof value === 'boolean') return value ? 'yes' : 'no'
   if (typeof value === 'string') return words(value)
   if (Array.isArray(value)) return value.map(settingText).join(', ') || 'none'
-  return JSON.stringify(value)
+  return termText(value as Record<string, unknown>)
+}
+
+/** A term of a list in a few words: "Progress 500", "Proximity −5 (margin 0.3)". */
+function termText({ name, label, weight, ...rest }: Record<string, unknown>): string {
+  const more = Object.entries(rest)
+    .filter(([, value]) => value !== false)
+    .map(([key, value]) => (key === 'formula' ? String(value) : `${key} ${settingText(value)}`))
+  const head = [words(String(label ?? name)), weight !== undefined && settingText(weight)]
+    .filter(Boolean)
+    .join(' ')
+  return more.length > 0 ? `${head} (${more.join(', ')})` : head
 }
 
 export function Configuration({ training }: { training: TrainingConfig }) {

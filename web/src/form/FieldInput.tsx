@@ -6,6 +6,7 @@ import classes from './form.module.css'
 import { type Field, initialOf } from './layout'
 import { problemOf } from './problems'
 import { type Json, range, type Schema } from './schema'
+import { TermsInput } from './TermsInput'
 import type { Form } from './useForm'
 import { sameValue, valueAt } from './values'
 
@@ -86,6 +87,8 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
       )
     case 'numbers':
       return <NumbersInput {...common} value={value} placeholder={listed(fresh)} onChange={set} />
+    case 'terms':
+      return <TermsInput field={field} form={form} root={root} />
     case 'text':
       return (
         <TextInput

@@ -18,9 +18,22 @@ export function labelsOf(schema: Schema, path: readonly string[]): string[] {
     const [first] = found
     const isKind = key === 'name' && labels.length > 0
     if (!isKind) labels.push(first?.title ?? words(key))
-    candidates = found.flatMap((one) =>
-      one.discriminator ? branches(one, schema).map((branch) => branch.schema) : [one],
-    )
+    candidates = found.flatMap((one) => {
+      const items = one.items && resolve(one.items, schema)
+      // A list's objects go by their kinds: "reward.terms.progress.weight".
+      if (items?.discriminator)
+        return [
+          {
+            properties: Object.fromEntries(
+              branches(items, schema).map(({ tag, label, schema: branch }) => [
+                tag,
+                { ...branch, title: label },
+              ]),
+            ),
+          },
+        ]
+      return one.discriminator ? branches(one, schema).map((branch) => branch.schema) : [one]
+    })
   }
   return labels
 }

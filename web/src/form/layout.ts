@@ -17,6 +17,8 @@ type FieldKind =
   | { kind: 'choice'; options: Option[] }
   /** A discriminated union: choosing swaps the object at `path` for another branch's. */
   | { kind: 'union'; options: Option[]; tag: string }
+  /** A list of objects of several kinds; presets are whole lists, by title. */
+  | { kind: 'terms'; item: Schema; presets: Record<string, Json> }
 
 /** One field; `path` is where its value lies. */
 export type Field = FieldKind & {
@@ -86,8 +88,12 @@ function fieldsAt(unresolved: Schema, root: Schema, values: Json, place: Place, 
     case 'integer':
     case 'number':
       return field({ kind: 'number', integer: schema.type === 'integer' })
-    case 'array':
-      return field({ kind: 'numbers' })
+    case 'array': {
+      const item = resolve(schema.items ?? {}, root)
+      return item.discriminator
+        ? field({ kind: 'terms', item, presets: schema['x-presets'] ?? {} })
+        : field({ kind: 'numbers' })
+    }
     default:
       return field({ kind: 'text' })
   }

@@ -27,6 +27,8 @@ export interface Schema {
   'x-advanced'?: boolean
   /** Not for the form: a program fills it in. */
   'x-hidden'?: boolean
+  /** Lists to start from, by title. */
+  'x-presets'?: Record<string, Json>
 }
 
 /** Values of a form: what JSON can hold. */

@@ -1,6 +1,6 @@
 /** What lists and headings say about an experiment. */
 import type { ListedExperiment, TrainingConfig } from '../api/types'
-import { words } from './format'
+import { plural, words } from './format'
 
 /** What nobody needs to be told: the robot that everybody starts with. */
 const USUAL_ROBOT = 'burger'
@@ -19,7 +19,7 @@ export function inShort({ task, algorithm }: TrainingConfig): Trained {
     robot: task.robot.name,
     algorithm: algorithm.name,
     network: algorithm.network.name,
-    reward: task.reward.name,
+    reward: rewardName(task.reward),
   }
 }
 
@@ -30,8 +30,18 @@ export function summaryOf(trained: Trained): string {
     movers > 0 ? `${words(arena)}, ${movers} moving` : words(arena),
     ...(robot === USUAL_ROBOT ? [] : [words(robot)]),
     algorithmOf(trained),
-    `${words(reward)} reward`,
+    /^\d/.test(reward) ? `Reward of ${reward}` : `${words(reward)} reward`,
   ].join(' · ')
+}
+
+/** Which of the paper's rewards it is by its terms, whatever their weights, or how many terms it has. */
+export function rewardName({ terms }: TrainingConfig['task']['reward']): string {
+  const [progress, more, ...others] = terms.filter(({ name }) => name !== 'arrival' && name !== 'collision')
+  if (progress?.name === 'progress' && others.length === 0) {
+    if (!more && !progress.exponential) return 'basic'
+    if (progress.exponential && (more?.name === 'clearance' || more?.name === 'alignment')) return more.name
+  }
+  return plural(terms.length, 'term')
 }
 
 /** "PPO, ResBlock". */

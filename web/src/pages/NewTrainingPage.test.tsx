@@ -166,3 +166,44 @@ test('a policy that is not there cannot be started from', async () => {
   open('/new?policy=nobody')
   expect(await screen.findByText('There is no such policy')).toBeInTheDocument()
 })
+
+test('a reward is a list of terms: one is added, changed, removed, and another list chosen', async () => {
+  const server = start()
+  const { user } = open('/new')
+  const terms = await screen.findByRole('region', { name: 'Terms' })
+  expect(within(terms).getByRole('combobox', { name: 'Reward' })).toHaveValue('Basic')
+  await user.click(within(terms).getByRole('button', { name: 'Remove Arrival' }))
+  expect(within(terms).getByRole('combobox', { name: 'Reward' })).toHaveValue('Terms of your own')
+  const progress = within(terms).getByRole('listitem', { name: 'Progress' })
+  expect(within(progress).queryByRole('button', { name: 'Remove Progress' })).toBeDisabled()
+  const weight = within(progress).getByRole('textbox', { name: 'Weight' })
+  await user.clear(weight)
+  await user.type(weight, '250')
+  await user.click(within(progress).getByRole('switch', { name: 'Exponential' }))
+  await user.click(within(terms).getByRole('button', { name: 'Add a term' }))
+  await user.click(await screen.findByRole('menuitem', { name: /Arrival/ }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server).training.task.reward).toEqual({
+    terms: [
+      { name: 'progress', weight: 250, exponential: true },
+      { name: 'arrival', weight: 120 },
+    ],
+  })
+})
+
+test('what the server refuses of a term stands in its row', async () => {
+  start({
+    'POST /api/experiments': refusal(422, [
+      {
+        loc: ['body', 'training', 'task', 'reward', 'terms', 1, 'progress', 'weight'],
+        msg: 'too much',
+        type: 'less_than',
+      },
+    ]),
+  })
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: 'Launch' }))
+  const progress = await screen.findByRole('listitem', { name: 'Progress' })
+  expect(await within(progress).findByText('Too much')).toBeInTheDocument()
+})

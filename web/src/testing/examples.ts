@@ -58,7 +58,12 @@ export const training = {
     robot: { name: 'burger' },
     arena: { name: 'simple', movers: { count: 0, kind: 'pedestrian', speed: 1, radius: 0.25 } },
     observation: 'improved',
-    reward: { name: 'basic', arrival: 120 },
+    reward: {
+      terms: [
+        { name: 'arrival', weight: 120 },
+        { name: 'progress', weight: 500, exponential: false },
+      ],
+    },
   },
   algorithm: { name: 'ppo', network, learning_rate: 0.001, robots: 256 },
   steps: 300_000,
@@ -401,8 +406,46 @@ export const form = {
         type: 'object',
         title: 'RewardConfig',
         properties: {
-          name: { type: 'string', const: 'basic', title: 'Reward', default: 'basic' },
-          arrival: { type: 'number', title: 'Arrival reward', default: 120, ...ADVANCED },
+          terms: {
+            type: 'array',
+            title: 'Terms',
+            minItems: 1,
+            items: {
+              oneOf: [{ $ref: '#/$defs/Arrival' }, { $ref: '#/$defs/Progress' }],
+              discriminator: {
+                propertyName: 'name',
+                mapping: { arrival: '#/$defs/Arrival', progress: '#/$defs/Progress' },
+              },
+            },
+            default: [
+              { name: 'arrival', weight: 120 },
+              { name: 'progress', weight: 500, exponential: false },
+            ],
+            'x-presets': {
+              Basic: [
+                { name: 'arrival', weight: 120 },
+                { name: 'progress', weight: 500, exponential: false },
+              ],
+              Sparse: [{ name: 'arrival', weight: 1 }],
+            },
+          },
+        },
+      },
+      Arrival: {
+        type: 'object',
+        description: 'The target is reached.',
+        properties: {
+          name: { type: 'string', const: 'arrival', title: 'Arrival', default: 'arrival' },
+          weight: { type: 'number', title: 'Weight', default: 120, ...ADVANCED },
+        },
+      },
+      Progress: {
+        type: 'object',
+        description: 'Metres by which the target came nearer.',
+        properties: {
+          name: { type: 'string', const: 'progress', title: 'Progress', default: 'progress' },
+          weight: { type: 'number', title: 'Weight', default: 500, ...ADVANCED },
+          exponential: { type: 'boolean', title: 'Exponential', default: false, ...ADVANCED },
         },
       },
       Network: {

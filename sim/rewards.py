@@ -1,0 +1,169 @@
+"""A reward as the kernels read it: the kinds and weights of its terms, and the programs of its formulas."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.config import MAX_TERMS, FormulaTerm, ProgressTerm, RewardConfig, SmoothnessTerm, TaskConfig, term_key
+from sim.config.expression import FUNCTIONS, OPERATIONS, QUANTITIES, Step, depth, operands, parse
+from sim.errors import FormulaError
+from sim.kernels import rewards as kernels
+from sim.kernels.bundles import Robots
+from sim.kernels.records import FORMULA_TERM, TERM_KINDS
+
+assert OPERATIONS.index("clip") == kernels.CLIP
+assert len(OPERATIONS) == kernels.CLIP + 1
+
+
+def term_names(reward: RewardConfig) -> tuple[str, ...]:
+    """The names under which the terms are logged, in order: the columns of `Robots.terms`."""
+    return tuple(term_key(term) for term in reward.terms)
+
+
+def pack_terms(reward: RewardConfig) -> dict[str, object]:
+    """Those fields of `sim.kernels.records.PARAMETERS` that say what a step is worth."""
+    kinds = [TERM_KINDS.index(term.name) for term in reward.terms]
+    weights = [term.weight for term in reward.terms]
+    options = [
+        float(term.exponential) if isinstance(term, ProgressTerm) else getattr(term, "margin", 0.0) for term in reward.terms
+    ]
+    values: dict[str, object] = {"terms": len(kinds), "tabulates": FORMULA_TERM in kinds}
+    for name, column in (("term_kinds", kinds), ("term_weights", weights), ("term_options", options)):
+        values[name] = np.pad(np.array(column, np.float64), (0, MAX_TERMS - len(column)))
+    return values
+
+
+def constants(task: TaskConfig) -> dict[str, float]:
+    """What formulas may read of a task, see `sim.config.expression.CONSTANTS`."""
+    return {
+        "period": task.control_period,
+        "lidar_range": task.lidar.range,
+        "arrival_distance": task.arrival_distance,
+        "collision_distance": task.collision_distance,
+        "step_limit": float(task.step_limit),
+        "max_speed": task.robot.max_linear_speed,
+        "max_turning_rate": task.robot.max_angular_speed,
+        "pi": float(np.pi),
+    }
+
+
+def reads_changes(reward: RewardConfig) -> bool:
+    """Whether a reward depends on the velocities of the step before."""
+    return any(isinstance(term, SmoothnessTerm | FormulaTerm) for term in reward.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class _Formula:
+    """One compiled formula: its term's name, weight and column, and its program."""
+
+    label: str
+    text: str
+    weight: np.float32
+    column: int
+    codes: NDArray[np.int32]
+    numbers: NDArray[np.float32]
+    stack: NDArray[np.float32]
+
+
+class Formulas:
+    """The formulas of a task's reward, for so many robots."""
+
+    def __init__(self, task: TaskConfig, robots: int) -> None:
+        known = constants(task)
+        rows = list(QUANTITIES)
+        self._formulas: list[_Formula] = []
+        for column, term in enumerate(task.reward.terms):
+            if not isinstance(term, FormulaTerm):
+                continue
+            steps = parse(term.formula)
+            codes = [OPERATIONS.index("number" if step.operation == "constant" else step.operation) for step in steps]
+            numbers = [_operand(step, known, rows) for step in steps]
+            self._formulas.append(
+                _Formula(
+                    label=term.label,
+                    text=term.formula,
+                    weight=np.float32(term.weight),
+                    column=column,
+                    codes=np.array(codes, np.int32),
+                    numbers=np.array(numbers, np.float32),
+                    stack=np.zeros((depth(steps), robots), np.float32),
+                )
+            )
+
+    def __len__(self) -> int:
+        return len(self._formulas)
+
+    def add(self, robots: Robots) -> None:
+        """Add the formulas of the step that was just driven to its rewards.
+
+        Raises:
+            FormulaError: one of them is not a finite number for a robot.
+        """
+        for formula in self._formulas:
+            failed = kernels.add_formula(
+                formula.codes, formula.numbers, formula.stack, formula.weight, formula.column, robots
+            )
+            if failed >= 0:
+                seen = dict(zip(QUANTITIES, robots.quantities[:, failed].tolist(), strict=True))
+                read = {step.name for step in parse(formula.text) if step.operation == "quantity"}
+                values = ", ".join(f"{name} = {seen[name]:.6g}" for name in QUANTITIES if name in read)
+                raise FormulaError(
+                    f"the reward's formula {formula.label!r}, {formula.text}, is not a finite number where "
+                    f"{values or 'it is'}: "
+                    "guard divisions, roots and logarithms with max(), min() or 'a if b else c'"
+                )
+
+
+def _operand(step: Step, known: dict[str, float], rows: list[str]) -> float:
+    if step.operation == "quantity":
+        return float(rows.index(step.name))
+    return known[step.name] if step.operation == "constant" else step.number
+
+
+_PLAIN: dict[str, Callable[..., float]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "**": lambda a, b: a**b,
+    "<": lambda a, b: float(a < b),
+    "<=": lambda a, b: float(a <= b),
+    ">": lambda a, b: float(a > b),
+    ">=": lambda a, b: float(a >= b),
+    "negative": lambda a: -a,
+    "if": lambda a, b, c: b if a else c,
+    "abs": abs,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tanh": np.tanh,
+    "min": min,
+    "max": max,
+    "clip": lambda a, b, c: min(max(a, b), c),
+}
+assert _PLAIN.keys() >= FUNCTIONS.keys()
+
+
+def evaluate(text: str, values: dict[str, float]) -> float:
+    """A formula for one robot, written plainly: what the compiled one must agree with.
+
+    Args:
+        text: the formula.
+        values: of all quantities and constants.
+    """
+    waiting: list[float] = []
+    for step in parse(text):
+        if step.operation == "number":
+            waiting.append(step.number)
+        elif step.operation in ("quantity", "constant"):
+            waiting.append(values[step.name])
+        else:
+            count = operands(step.operation)
+            taken = waiting[-count:]
+            del waiting[-count:]
+            waiting.append(float(_PLAIN[step.operation](*taken)))
+    return waiting[0]
