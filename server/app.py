@@ -27,7 +27,7 @@ from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
 from server.policies import endpoints as policies
-from server.problems import ANYWHERE, install_error_handlers
+from server.problems import UNAUTHORIZED, install_error_handlers
 from server.replays import endpoints as replays
 from server.replays.recordings import RecordingStore
 from server.reproduction import endpoints as reproduction
@@ -148,7 +148,7 @@ def describe(
         # Swagger's pages load scripts from elsewhere, which the content security policy forbids.
         docs_url=None,
         redoc_url=None,
-        responses=ANYWHERE,
+        responses=UNAUTHORIZED,
         max_body_size=max_body_size,
     )
     install_error_handlers(app)

@@ -9,6 +9,7 @@ ServiceError                        500
 │   └── (server.runs.states.TransitionError)
 ├── TooLargeError                   413  a body over its cap
 ├── UnusableArenaError              422  an arena's files are refused, or it is not there to train on
+├── RefusedFieldError               422  a field of a form, told as FastAPI tells its own
 ├── CorruptUploadError              422  the bytes are not what their checksum says
 ├── TooManyAttemptsError            429  too many wrong tokens
 ├── ExportFailedError               500  a policy could not be exported faithfully
@@ -89,6 +90,21 @@ class UnusableArenaError(ServiceError):
     """An arena's files are refused, or it is not there to train on."""
 
     status = 422
+
+
+class RefusedFieldError(ServiceError):
+    """One field of a form is refused for what this installation can do.
+
+    Args:
+        location: of the field, as FastAPI names it: "body", then the names that lead to it.
+        message: what is wrong with it, and what would be right.
+    """
+
+    status = 422
+
+    def __init__(self, location: tuple[str, ...], message: str) -> None:
+        super().__init__(message)
+        self.location = location
 
 
 class CorruptUploadError(ServiceError):

@@ -7,31 +7,11 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 
-from server.errors import ErrorBody, ServiceError
+from server.errors import ErrorBody, RefusedFieldError, ServiceError
 
 Responses = dict[int | str, dict[str, Any]]
 
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
-ANYWHERE: Responses = UNAUTHORIZED | {
-    400: {"model": ErrorBody, "description": "No request that can be read: its body, its address or its Host"},
-    403: {"model": ErrorBody, "description": "From another site's page, or with a token that does not open this"},
-    408: {"model": ErrorBody, "description": "The request took too long to arrive"},
-    413: {"model": ErrorBody, "description": "The body is too large"},
-    503: {"model": ErrorBody, "description": "Busy: Retry-After says when to come again"},
-}
-"""How any request may be refused, before or whatever it asks for."""
-UNUSABLE: Responses = {
-    422: {
-        "description": "Fields that are refused, each with its place; or in one sentence what is wrong with the whole",
-        "content": {
-            "application/json": {
-                "schema": {
-                    "anyOf": [{"$ref": f"#/components/schemas/{name}"} for name in ("HTTPValidationError", "ErrorBody")]
-                }
-            }
-        },
-    }
-}
 NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}
 CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
 EXPORT_FAILED: Responses = {
@@ -58,6 +38,11 @@ def install_error_handlers(app: FastAPI) -> None:
     @app.exception_handler(ServiceError)
     async def _refuse(_request: Request, error: ServiceError) -> JSONResponse:
         return error_response(error)
+
+    @app.exception_handler(RefusedFieldError)
+    async def _refuse_field(_request: Request, error: RefusedFieldError) -> JSONResponse:
+        problem = {"loc": error.location, "msg": error.message, "type": "value_error"}
+        return JSONResponse({"detail": [problem]}, status_code=error.status)
 
     @app.exception_handler(RequestValidationError)
     async def _refuse_fields(_request: Request, error: RequestValidationError) -> JSONResponse:

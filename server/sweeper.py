@@ -19,7 +19,7 @@ from server.worker_api.ingest import Ingest
 from server.worker_api.leases import Attempt
 from server.worker_api.links import OpenLinks
 from server.worker_api.service import WorkerService
-from workers.protocol import queue_of
+from workers.protocol import queues_of
 
 logger = logging.getLogger(__name__)
 
@@ -74,12 +74,12 @@ class Sweeper:
         quiet_since = {(run.id, run.attempt): self._quiet_since.get((run.id, run.attempt), now) for run in waiting}
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
-            queue = queue_of(training_of(run.experiment))
-            overdue = now - quiet_since[run.id, run.attempt] >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)
-            if everybody or overdue:
-                quiet_since[run.id, run.attempt] = now
-                self._services.doorbell.ring(run.id, run.attempt, queue)
-                rung[queue] += 1
+            quiet = now - quiet_since[run.id, run.attempt]
+            for queue in queues_of(training_of(run.experiment), run.device):
+                if everybody or (quiet >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)):
+                    quiet_since[run.id, run.attempt] = now
+                    self._services.doorbell.ring(run.id, run.attempt, queue)
+                    rung[queue] += 1
         self._quiet_since = quiet_since
 
 

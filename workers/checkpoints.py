@@ -38,7 +38,9 @@ from workers.policy import Policy
 Arrays = Mapping[str, NDArray[np.generic]]
 
 # Far above what any configuration makes, far below what hurts.
-_SIZE_LIMITS = {MANIFEST: 2**20, POLICY: 2**26, STATE_ARRAYS: 2**31, STATE_COUNTERS: 2**16}
+MAX_STATE_BYTES = 2**31
+"""What only a resume needs, a replay memory above all, at most."""
+_SIZE_LIMITS = {MANIFEST: 2**20, POLICY: 2**26, STATE_ARRAYS: MAX_STATE_BYTES, STATE_COUNTERS: 2**16}
 
 _BLOCK = 256 * 1024
 

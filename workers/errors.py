@@ -2,7 +2,8 @@
 
 WorkerError
 ├── TrainingError          a training cannot go on
-│   └── NonFiniteError     its weights are no longer numbers
+│   ├── NonFiniteError     its weights are no longer numbers
+│   └── MemoryTooLargeError    its checkpoints would be larger than anybody takes
 ├── CampaignError          the paper's reproduction does not go on here and now
 │   ├── InterruptedCampaignError  it was asked to stop, or a process was killed: it can be continued
 │   └── OtherTrainingError        its directory is that of another campaign
@@ -10,6 +11,7 @@ WorkerError
 ├── UnknownPolicyError     there is no such reference policy
 ├── EpisodesTooLongError   episodes do not fit into memory to be replayed
 ├── LocalError             something is wrong with this worker or its machine, not with the run
+│   ├── NoDeviceError          it does not have the device that the training asks for
 │   ├── UnfitError             it cannot take up a run now: no space, or no trainer starts
 │   └── SpoolDamagedError      what a training reported is no longer what was written to disk
 ├── ArchiveError           a checkpoint archive is refused
@@ -34,6 +36,10 @@ class TrainingError(WorkerError):
 
 class NonFiniteError(TrainingError):
     """The weights of a training are no longer finite numbers."""
+
+
+class MemoryTooLargeError(TrainingError):
+    """The replay memory of a training makes checkpoints that nobody could take or read."""
 
 
 class CampaignError(WorkerError):
@@ -66,6 +72,10 @@ class LocalError(WorkerError):
 
 class UnfitError(LocalError):
     """This worker cannot take up a run now."""
+
+
+class NoDeviceError(LocalError):
+    """This machine does not have the device that a training asks for."""
 
 
 class SpoolDamagedError(LocalError):

@@ -72,9 +72,22 @@ damaged: the checkpoint that it should have gone on from cannot be read; an olde
 """
 
 
-def queue_of(training: TrainingConfig) -> Queue:
-    """The queue whose workers can run this training."""
-    return "gpu" if training.device == "cuda" else "cpu"
+def device_of(queue: Queue) -> Literal["cpu", "cuda"]:
+    """What a worker of this queue trains on, where the training leaves that open."""
+    return "cuda" if queue == "gpu" else "cpu"
+
+
+def queues_of(training: TrainingConfig, began_on: str | None = None) -> tuple[Queue, ...]:
+    """The queues whose workers can run this training.
+
+    Args:
+        training: the training.
+        began_on: the device that "auto" became when it was first claimed: its random numbers go on on that one only.
+    """
+    device = began_on if training.device == "auto" else training.device
+    if device is None:
+        return "cpu", "gpu"
+    return ("gpu",) if device == "cuda" else ("cpu",)
 
 
 class ClaimRequest(Frozen):
@@ -85,11 +98,13 @@ class ClaimRequest(Frozen):
         published_attempt: the attempt that the message which woke it was published for.
         claim_id: chosen by the worker, new for each run that it takes up: asked again under the same id, because the answer
             got lost, the server grants the same attempt once more. None claims anew each time.
+        queue: that it works for, which says on what it trains.
     """
 
     worker: WorkerName
     published_attempt: int = Field(ge=0)
     claim_id: str | None = Field(None, pattern="^[0-9a-f]{32}$")
+    queue: Queue = "cpu"
 
 
 class CheckpointReference(Frozen):
@@ -105,6 +120,7 @@ class Claim(Frozen):
 
     Attributes:
         attempt: the fencing token of everything that follows.
+        training: with the device that it is trained on, never "auto".
         last_seq: the number of the last item that the server has; the next one has the next number.
         checkpoint: what to go on from; None for a fresh start.
         lease_seconds: a worker not heard of for this long loses the run.
@@ -123,11 +139,23 @@ class Heartbeat(Frozen):
 
     Attributes:
         trouble: why it takes up no run now; None while it does.
+        first: since it was started; what was asked of an earlier worker of its name is not asked of it.
     """
 
     worker: WorkerName
     queue: Queue
     trouble: str | None = Field(None, max_length=10_000)
+    first: bool = False
+
+
+class HeartbeatAnswer(Frozen):
+    """What the server wants of a worker.
+
+    Attributes:
+        drain: finish the runs under way, take up no more, and end.
+    """
+
+    drain: bool = False
 
 
 class MetricItem(Frozen):

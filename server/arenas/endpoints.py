@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Query, status
 
 from server.arenas.schemas import MAX_UPLOAD_BYTES, ArenaSummary, ArenaUpload, ArenaView
 from server.arenas.service import ArenaService
-from server.problems import CONFLICT, NOT_FOUND, UNUSABLE
+from server.problems import CONFLICT, NOT_FOUND
 from server.services import ServicesDep
 from sim.config import ArenaConfig, ArenaName, FamilyName, GeneratedArenaConfig
 
@@ -49,7 +49,7 @@ def get_imported_arena(sha256: str, service: ArenaServiceDep) -> ArenaView:
     return service.imported(sha256)
 
 
-@router.post("/imported", responses=CONFLICT | UNUSABLE, max_body_size=MAX_UPLOAD_BYTES)
+@router.post("/imported", responses=CONFLICT, max_body_size=MAX_UPLOAD_BYTES)
 def upload_arena(upload: ArenaUpload, service: ArenaServiceDep) -> ArenaView:
     """Look at an arena's files, or import them."""
     return service.upload(upload)

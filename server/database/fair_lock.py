@@ -45,9 +45,7 @@ class FairLock:
                 # Handed over at this very moment, it is no longer in the queue, and ours.
                 if turn in self._waiting:
                     self._waiting.remove(turn)
-                    raise DatabaseBusyError(
-                        "The database is busy with other writers: try again in a moment.", retry_after=1.0
-                    )
+                    raise DatabaseBusyError("The database is busy with other writers: try again in a moment.")
         self._owner = me
 
     def _release(self) -> None:

@@ -51,6 +51,8 @@ class Run(Base):
     worker: Mapped[str | None] = mapped_column(String(120))
     # Chosen by the worker that has it: asked again under the same one, its claim is the same.
     claim_id: Mapped[str | None] = mapped_column(String(32))
+    # Where the training's device is "auto": the one that it began on, and goes on on.
+    device: Mapped[str | None] = mapped_column(String(8))
     # Attempts lost since the last new checkpoint, and how many of them by each worker.
     losses: Mapped[int] = mapped_column(Integer, default=0)
     lost_by: Mapped[dict[str, int] | None] = mapped_column(JSON)
@@ -184,3 +186,5 @@ class Worker(Base):
     last_seen: Mapped[float] = mapped_column(Float)
     # Why it takes up no run, in its own words; null while it does.
     trouble: Mapped[str | None] = mapped_column(Text)
+    # When it was asked to finish its runs and take up no more; null unless it was.
+    drained_at: Mapped[float | None] = mapped_column(Float)

@@ -15,7 +15,7 @@ from server.experiments.schemas import (
 )
 from server.experiments.service import ExperimentService
 from server.paging import WindowDep
-from server.problems import CONFLICT, NOT_FOUND, UNUSABLE
+from server.problems import CONFLICT, NOT_FOUND
 from server.schemas import Page
 from server.services import ServicesDep
 from workers.presets import PRESETS
@@ -36,7 +36,7 @@ def get_training_form() -> TrainingForm:
     return TrainingForm(schema=form_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
 
 
-@router.post("/api/experiments", status_code=status.HTTP_201_CREATED, responses=UNUSABLE)
+@router.post("/api/experiments", status_code=status.HTTP_201_CREATED)
 def create_experiment(request: ExperimentCreate, service: ExperimentServiceDep) -> Experiment:
     """Launch: one run a seed."""
     return service.create(request)

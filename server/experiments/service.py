@@ -9,7 +9,7 @@ from server.checkpoints.archives import LooseArchives, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.database import tables
-from server.errors import ConflictError
+from server.errors import ConflictError, RefusedFieldError
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.experiments.schemas import (
@@ -28,7 +28,9 @@ from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
 from server.schemas import Page
 from server.services import Services
-from workers.protocol import queue_of
+from workers.archive_size import refuse_too_large
+from workers.errors import MemoryTooLargeError
+from workers.protocol import queues_of
 
 
 class ExperimentService:
@@ -43,14 +45,22 @@ class ExperimentService:
 
         Raises:
             UnusableArenaError: it trains on an imported arena that is not here.
+            RefusedFieldError: its checkpoints would be larger than this installation takes.
         """
+        try:
+            refuse_too_large(request.training, self._services.settings.max_checkpoint_bytes)
+        except MemoryTooLargeError as error:
+            raise RefusedFieldError(
+                ("body", "training", "algorithm", request.training.algorithm.name, "replay_size"), str(error)
+            ) from error
         training = without_geometry(request.training, self._services.arenas)
         experiment = tables.Experiment(id=new_id(), name=request.name, training=training.model_dump(mode="json"))
         experiment.runs = [tables.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
         with self._services.database.write() as session:
             ExperimentRepository(session).add(experiment)
         for run in experiment.runs:
-            self._services.doorbell.ring(run.id, run.attempt, queue_of(request.training))
+            for queue in queues_of(request.training):
+                self._services.doorbell.ring(run.id, run.attempt, queue)
         self._publish(experiment.id, "experiment")
         return self.get(experiment.id)
 

@@ -18,7 +18,7 @@ from server.monitoring.repository import MonitoringRepository
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.service import workers_lately
-from workers.protocol import Queue, queue_of
+from workers.protocol import Queue, queues_of
 
 # An experiment's queue never changes, and finding it reads its whole configuration.
 _REMEMBERED = 4096
@@ -106,7 +106,8 @@ class StateCollector(Collector):
 
     def _look_up_queue(self, experiment_id: str) -> Queue:
         with self._services.database.read() as session:
-            return queue_of(training_of(ExperimentRepository(session).get(experiment_id)))
+            # One that any worker may take is counted once.
+            return queues_of(training_of(ExperimentRepository(session).get(experiment_id)))[0]
 
     def _look_up_sizes(self, repository: MonitoringRepository) -> dict[str, int]:
         now = time.monotonic()

@@ -23,7 +23,7 @@ from server.runs.states import Occasion
 from server.runs.views import EVAL_SUCCESS
 from server.services import Services
 from server.system.service import workers_lately
-from workers.protocol import queue_of
+from workers.protocol import queues_of
 from workers.reproduction.rows import ROWS, Row, scaled, title
 from workers.reproduction.table import METRICS
 
@@ -77,10 +77,11 @@ class ReproductionService:
             for experiment in experiments:
                 repository.add(experiment)
         # Seed by seed: the first intervals can be looked at early.
-        queues = [queue_of(row.training) for row in ROWS]
+        queues = [queues_of(row.training) for row in ROWS]
         for runs in zip(*(experiment.runs for experiment in experiments), strict=True):
-            for run, queue in zip(runs, queues, strict=True):
-                self._services.doorbell.ring(run.id, run.attempt, queue)
+            for run, its in zip(runs, queues, strict=True):
+                for queue in its:
+                    self._services.doorbell.ring(run.id, run.attempt, queue)
         for experiment in experiments:
             self._services.bus.publish(Change(experiment_id=experiment.id, run_id=None, kind="experiment"))
         return self.get(campaign)

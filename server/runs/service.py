@@ -11,7 +11,7 @@ from server.runs import states, views
 from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail, RunEvent
 from server.services import Services
-from workers.protocol import queue_of
+from workers.protocol import queues_of
 
 
 class RunService:
@@ -78,8 +78,8 @@ class RunService:
 
     def announce_queued(self, run: tables.Run) -> None:
         """After the commit of a run that waits for a worker: wake one, and tell whoever looks on."""
-        queue = queue_of(training_of(run.experiment))
-        self._services.doorbell.ring(run.id, run.attempt, queue)
+        for queue in queues_of(training_of(run.experiment), run.device):
+            self._services.doorbell.ring(run.id, run.attempt, queue)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
 
 

@@ -4,10 +4,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response, status
 
+from server.problems import NOT_FOUND
 from server.services import ServicesDep
 from server.system import service
 from server.system.readiness import ReadinessProbe
-from server.system.schemas import Readiness, Status, Version
+from server.system.schemas import DrainRequest, Readiness, Status, Version
 
 router = APIRouter(tags=["system"])
 
@@ -30,6 +31,12 @@ def get_version() -> Version:
 def get_status(services: ServicesDep) -> Status:
     """Workers heard of lately, and how many runs wait and go on."""
     return service.status(services)
+
+
+@router.post("/api/workers/drain", responses=NOT_FOUND)
+def drain_worker(request: DrainRequest, services: ServicesDep) -> Status:
+    """Let a worker finish its runs, take up no more, and end."""
+    return service.drain(services, request.worker)
 
 
 @router.api_route("/healthz", methods=["GET", "HEAD"], include_in_schema=False)

@@ -1,8 +1,8 @@
 """Workers that have been heard of, in SQL."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
-from sqlalchemy import ColumnElement, func, select
+from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -28,10 +28,19 @@ class WorkerRepository:
         """Note that a worker of this queue has just been heard of, and why it takes up no run where it does not."""
         self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment, trouble=trouble))
 
-    def fit(self, queue: Queue, since: float, until: float) -> Sequence[str]:
-        """The workers of a queue that were heard of between these moments and take up runs."""
+    def drain(self, names: Collection[str], moment: float | None) -> None:
+        """Ask workers to finish their runs and take up no more; None takes it back."""
+        self._session.execute(update(tables.Worker).where(tables.Worker.name.in_(names)).values(drained_at=moment))
+
+    def is_drained(self, name: str) -> bool:
+        """Whether this worker was asked to take up no more."""
+        query = select(tables.Worker.drained_at).where(tables.Worker.name == name)
+        return self._session.scalar(query) is not None
+
+    def fit(self, queues: Collection[Queue], since: float, until: float) -> Sequence[str]:
+        """The workers of these queues that were heard of between these moments and take up runs."""
         return self._session.scalars(
-            select(tables.Worker.name).where(tables.Worker.queue == queue, *_there(since, until))
+            select(tables.Worker.name).where(tables.Worker.queue.in_(queues), *_there(since, until))
         ).all()
 
     def idle_by_queue(self, since: float, until: float) -> dict[Queue, int]:
@@ -49,4 +58,4 @@ class WorkerRepository:
 
 
 def _there(since: float, until: float) -> tuple[ColumnElement[bool], ...]:
-    return tables.Worker.last_seen.between(since, until), tables.Worker.trouble.is_(None)
+    return tables.Worker.last_seen.between(since, until), tables.Worker.trouble.is_(None), tables.Worker.drained_at.is_(None)

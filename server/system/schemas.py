@@ -18,6 +18,7 @@ class WorkerStatus(Schema):
     name: str
     last_seen: float
     run_id: str | None = Field(description="The run that it trains now.")
+    draining: bool = Field(description="It was asked to finish its runs and take up no more.")
     trouble: str | None = Field(description="Why it takes up no run, a full disk say; null while it does.")
 
 
@@ -26,6 +27,12 @@ class Readiness(Schema):
 
     ready: bool
     checks: dict[str, str] = Field(description="Of each part `ok`, or what is wrong.")
+
+
+class DrainRequest(Schema):
+    """Which worker should finish its runs, take up no more, and end."""
+
+    worker: str = Field(min_length=1, max_length=120, description='Its name, "worker@host" for all of its processes.')
 
 
 class Status(Version):

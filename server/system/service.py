@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from sqlalchemy.orm import Session
 
 from server.database import tables
+from server.errors import NotFoundError
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
@@ -26,6 +27,20 @@ def workers_lately(session: Session) -> Sequence[tables.Worker]:
     return WorkerRepository(session).seen_since(time.time() - _LATELY_SECONDS)
 
 
+def drain(services: Services, worker: str) -> Status:
+    """Ask a worker, all of its processes, to finish its runs, take up no more, and end.
+
+    Raises:
+        NotFoundError: no such worker was heard of lately.
+    """
+    with services.database.write() as session:
+        names = [known.name for known in workers_lately(session) if known.name.partition("/")[0] == worker.partition("/")[0]]
+        if not names:
+            raise NotFoundError.of("worker", worker)
+        WorkerRepository(session).drain(names, time.time())
+    return status(services)
+
+
 def status(services: Services) -> Status:
     """Workers heard of lately, and how many runs wait and go on."""
     with services.database.read() as session:
@@ -41,6 +56,7 @@ def status(services: Services) -> Status:
                 name=worker.name,
                 last_seen=worker.last_seen,
                 run_id=trained.get(worker.name),
+                draining=worker.drained_at is not None,
                 trouble=worker.trouble,
             )
             for worker in workers

@@ -30,6 +30,7 @@ from workers.protocol import (
     Claim,
     ClaimRequest,
     Heartbeat,
+    HeartbeatAnswer,
 )
 
 # Pages have no business here, so the routes stay out of the OpenAPI description that their types are made from.
@@ -45,10 +46,10 @@ AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
 StepPath = Annotated[int, Path(ge=0, le=MAX_INTEGER)]
 
 
-@router.post("/heartbeat", status_code=204)
-async def heartbeat(body: Heartbeat, service: WorkerServiceDep, services: ServicesDep) -> None:
-    """A worker is there."""
-    await services.lanes.workers.run(service.heartbeat, body)
+@router.post("/heartbeat")
+async def heartbeat(body: Heartbeat, service: WorkerServiceDep, services: ServicesDep) -> HeartbeatAnswer:
+    """A worker is there, and hears what it should do."""
+    return await services.lanes.workers.run(service.heartbeat, body)
 
 
 @router.post("/runs/{run_id}/claim")

@@ -36,9 +36,11 @@ from workers.protocol import (
     EventItem,
     Final,
     Heartbeat,
+    HeartbeatAnswer,
     MetricItem,
     Orders,
-    queue_of,
+    device_of,
+    queues_of,
 )
 
 logger = logging.getLogger(__name__)
@@ -53,10 +55,14 @@ class WorkerService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def heartbeat(self, heartbeat: Heartbeat) -> None:
-        """Note that a worker is there."""
+    def heartbeat(self, heartbeat: Heartbeat) -> HeartbeatAnswer:
+        """Note that a worker is there; what it should do."""
         with self._services.database.write() as session:
-            WorkerRepository(session).seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble)
+            workers = WorkerRepository(session)
+            workers.seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble)
+            if heartbeat.first:
+                workers.drain([heartbeat.worker], None)
+            return HeartbeatAnswer(drain=workers.is_drained(heartbeat.worker))
 
     def claim(self, run_id: str, request: ClaimRequest) -> Claim:
         """Give a run to a worker, if it is still to be had.
@@ -69,8 +75,8 @@ class WorkerService:
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
             stored = read_training(run.experiment.training)
-            checkpoint = attempts.begin(session, run, request, _takers(session, stored.training))
-            training = stored.training
+            training = _on_device(run, stored.training, request)
+            checkpoint = attempts.begin(session, run, request, _takers(session, run, stored.training))
             if stored.unreadable:
                 problem = f"This version can't read {', '.join(stored.unreadable)}: launch the training anew."
             try:
@@ -89,7 +95,7 @@ class WorkerService:
                 else None,
                 lease_seconds=self._services.settings.lease_seconds,
             )
-        self._services.instruments.claims.labels(queue_of(training)).inc()
+        self._services.instruments.claims.labels(request.queue).inc()
         self._services.leases.renew(run_id, claim.attempt)
         self._publish(run, "run")
         if problem is not None:
@@ -137,7 +143,7 @@ class WorkerService:
                 self._store(session, run, batch.items)
                 if batch.final is not None:
                     damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
-                    attempts.end(session, run, batch.final, _takers(session, training_of(run.experiment)), damaged)
+                    attempts.end(session, run, batch.final, _takers(session, run, training_of(run.experiment)), damaged)
                     ended.append(run)
                     lost += batch.final.outcome == "lost"
                 outcomes.append(
@@ -220,7 +226,7 @@ class WorkerService:
             ]
             for run in runs:
                 reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
-                attempts.lose(session, run, reason, _takers(session, training_of(run.experiment)))
+                attempts.lose(session, run, reason, _takers(session, run, training_of(run.experiment)))
         self._services.instruments.losses.inc(len(runs))
         for run in runs:
             self._services.links.cut(run.id)
@@ -267,7 +273,25 @@ class WorkerService:
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))
 
 
-def _takers(session: Session, training: TrainingConfig) -> Sequence[str]:
-    """The workers that would take up a training now."""
+def _on_device(run: tables.Run, training: TrainingConfig, request: ClaimRequest) -> TrainingConfig:
+    """The training with the device that it is trained on, which the first claim decides where that is open.
+
+    Raises:
+        ConflictError: the worker is of a queue that trains on another device.
+    """
+    queues = queues_of(training, run.device)
+    if request.queue not in queues:
+        raise ConflictError(
+            f"Run {run.id} is trained on {device_of(queues[0])}: a worker of the queue {queues[0]} takes it up, and "
+            f"{request.worker} is of {request.queue}."
+        )
+    if training.device != "auto":
+        return training
+    run.device = device_of(request.queue)
+    return training.model_copy(update={"device": run.device})
+
+
+def _takers(session: Session, run: tables.Run, training: TrainingConfig) -> Sequence[str]:
+    """The workers that would take up a run now."""
     now = time.time()
-    return WorkerRepository(session).fit(queue_of(training), now - SILENCE_SECONDS, now)
+    return WorkerRepository(session).fit(queues_of(training, run.device), now - SILENCE_SECONDS, now)

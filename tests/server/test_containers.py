@@ -1,6 +1,9 @@
 """docker-compose.yml and the Dockerfile name only what exists, and hold no secret."""
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -97,3 +100,22 @@ def test_the_image_runs_without_rights_on_files_that_exist() -> None:
         for source in copied.split():
             assert (ROOT / source).exists()
             assert f"!{source}" in ignored
+
+
+@pytest.mark.parametrize("unit", ["server", "worker"])
+def test_the_units_for_systemd_name_only_what_exists(unit: str, tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "systemd" / f"mapless-{unit}.service").read_text()
+    settings = Settings.model_fields if unit == "server" else WorkerSettings.model_fields
+    names = {name.lower() for name in re.findall(r"MAPLESS_([A-Z_]+)", text)}
+    assert names <= set(settings)
+    if (analyze := shutil.which("systemd-analyze")) is None:
+        return
+    # Where the project is in this checkout, and no file of secrets.
+    here = text.replace("/opt/mapless/.venv/bin/", f"{Path(sys.executable).parent}/").replace(
+        "EnvironmentFile=", "EnvironmentFile=-"
+    )
+    (tmp_path / f"mapless-{unit}.service").write_text(here)
+    verified = subprocess.run(
+        [analyze, "verify", tmp_path / f"mapless-{unit}.service"], capture_output=True, text=True, check=False
+    )
+    assert (verified.returncode, verified.stderr) == (0, "")

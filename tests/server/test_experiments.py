@@ -317,3 +317,14 @@ def test_whoever_looks_on_is_told(client: TestClient, services: Services, report
         (experiment["id"], experiment["runs"][0]["id"], "run"),
         (experiment["id"], None, "deleted"),
     ]
+
+
+def test_a_memory_that_makes_checkpoints_larger_than_the_service_takes_is_refused_at_its_field(client: TestClient) -> None:
+    algorithm = {"name": "sac", "replay_size": 200_000}
+    task = {"lidar": {"rays": 360, "batches": 120}, "frames": 8}
+    response = client.post("/api/experiments", json={"name": "wide", "training": {"task": task, "algorithm": algorithm}})
+    assert response.status_code == 422
+    (problem,) = response.json()["detail"]
+    assert problem["loc"] == ["body", "training", "algorithm", "sac", "replay_size"]
+    assert "keep at most 104,000 transitions" in problem["msg"]
+    assert client.get("/api/experiments").json()["items"] == []

@@ -384,7 +384,7 @@ def test_heartbeats_make_a_worker_visible_with_the_run_that_it_trains(
     client: TestClient, worker: TestClient, run_id: str
 ) -> None:
     for name in ("w", "idle"):
-        assert worker.post("/api/worker/heartbeat", json={"worker": name, "queue": "cpu"}).status_code == 204
+        assert worker.post("/api/worker/heartbeat", json={"worker": name, "queue": "cpu"}).json() == {"drain": False}
     claim(worker, run_id, name="w")
     workers = {entry["name"]: entry["run_id"] for entry in client.get("/api/status").json()["workers"]}
     assert workers == {"w": run_id, "idle": None}

@@ -225,3 +225,60 @@ def test_a_worker_that_cannot_read_a_whole_checkpoint_loses_the_attempt_and_the_
     assert again.checkpoint is not None
     assert again.checkpoint.id == two_checkpoints[1]
     assert steps_of(services, run_id) == [100, 200, 300, 400]
+
+
+# -- drain ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_worker_is_drained_with_all_its_processes_until_it_is_started_again(
+    client: TestClient, worker: TestClient, run_id: str
+) -> None:
+    def beat(name: str, *, first: bool = False) -> bool:
+        body = Heartbeat(worker=name, queue="cpu", first=first).model_dump()
+        return bool(worker.post("/api/worker/heartbeat", json=body).json()["drain"])
+
+    assert [beat(name, first=True) for name in ("w@a/0", "w@a/1", "w@b/0")] == [False, False, False]
+    answer = client.post("/api/workers/drain", json={"worker": "w@a"})
+    assert {entry["name"]: entry["draining"] for entry in answer.json()["workers"]} == {
+        "w@a/0": True,
+        "w@a/1": True,
+        "w@b/0": False,
+    }
+    assert [beat(name) for name in ("w@a/0", "w@a/1", "w@b/0")] == [True, True, False]
+    assert beat("w@a/0", first=True) is False
+    assert client.post("/api/workers/drain", json={"worker": "nobody"}).status_code == 404
+
+
+# -- devices --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_training_on_any_device_rings_both_queues_and_stays_where_it_began(
+    client: TestClient, worker: TestClient, bell: Bell
+) -> None:
+    launched = client.post("/api/experiments", json={"name": "anywhere", "seeds": [1], "training": {"device": "auto"}})
+    run = launched.json()["runs"][0]["id"]
+    assert bell.rings == [(run, 0, "cpu"), (run, 0, "gpu")]
+    body = {"worker": "w@a/0", "published_attempt": 0, "queue": "gpu"}
+    first = worker.post(f"/api/worker/runs/{run}/claim", json=body)
+    assert first.json()["training"]["device"] == "cuda"
+    bell.rings.clear()
+    end(worker, run, 1, "released")
+    assert bell.rings == [(run, 1, "gpu")]
+    refused = worker.post(f"/api/worker/runs/{run}/claim", json={**body, "published_attempt": 1, "queue": "cpu"})
+    assert refused.status_code == 409
+    assert "is trained on cuda: a worker of the queue gpu takes it up" in refused.json()["detail"]
+    again = worker.post(f"/api/worker/runs/{run}/claim", json={**body, "published_attempt": 1})
+    assert again.json()["training"]["device"] == "cuda"
+    # What was launched stays what was launched.
+    assert client.get(f"/api/runs/{run}").json()["training"]["device"] == "auto"
+
+
+@pytest.mark.parametrize(("device", "queue"), [("cpu", "gpu"), ("cuda", "cpu")])
+def test_a_worker_for_another_device_does_not_get_a_run(
+    client: TestClient, worker: TestClient, bell: Bell, device: str, queue: str
+) -> None:
+    launched = client.post("/api/experiments", json={"name": "here", "seeds": [1], "training": {"device": device}})
+    run = launched.json()["runs"][0]["id"]
+    body = {"worker": "w@a/0", "published_attempt": 0, "queue": queue}
+    assert worker.post(f"/api/worker/runs/{run}/claim", json=body).status_code == 409
+    assert client.get(f"/api/runs/{run}").json()["state"] == "queued"

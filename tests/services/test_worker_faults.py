@@ -1,13 +1,14 @@
-"""Whatever a worker's disk does to what a training reports, the run comes to the same end as if nothing had happened."""
+"""What befalls a worker and its machine: damaged disks, machines that are taken away, and work that comes to an end."""
 
 import signal
+import time
 from pathlib import Path
 
 import httpx
 import numpy as np
 
-from tests.services.stack import ROLLOUT, Service, assert_one_unbroken_curve, until
-from tests.services.test_lifecycle import until_checkpoint
+from tests.services.stack import PATIENCE, ROLLOUT, Service, assert_one_unbroken_curve, tree, until
+from tests.services.test_lifecycle import ENDLESS, until_checkpoint, until_resumed
 from workers.checkpoints import read_checkpoint
 
 STEPS, SAVE_EVERY = 24 * ROLLOUT, 4 * ROLLOUT
@@ -61,3 +62,49 @@ def test_a_damaged_spool_line_rewinds_the_run_which_ends_bit_for_bit_as_an_undis
     (undisturbed,) = service.launch(STEPS, save_every=SAVE_EVERY)
     service.until_state(undisturbed, "completed")
     assert final_state(service, disturbed, tmp_path) == final_state(service, undisturbed, tmp_path)
+
+
+def test_a_machine_that_is_taken_away_hands_its_run_back_with_a_checkpoint_within_ten_seconds(service: Service) -> None:
+    """As a cloud or a batch system does it: SIGTERM to every process of the job at once."""
+    service.start_server()
+    worker = service.start_worker()
+    (run_id,) = service.launch(ENDLESS)
+    until_checkpoint(service, run_id)
+    saved = max(service.checkpoints(run_id))
+    started = time.monotonic()
+    for process in tree(worker.pid):
+        process.send_signal(signal.SIGTERM)
+    assert worker.wait(10) == 0
+    handed_back = service.run(run_id)
+    assert time.monotonic() - started < 10
+    assert handed_back["state"] == "queued"
+    assert handed_back["step"] > saved
+    assert service.checkpoints(run_id)[-1] == handed_back["step"] == service.steps(run_id)[-1]
+    assert any("handed the run back" in message for message in service.events(run_id))
+    # Another machine goes on from there.
+    service.start_worker("another")
+    assert until_resumed(service, run_id, attempt=2) == handed_back["step"]
+    service.stop(run_id)
+    assert_one_unbroken_curve(service, run_id)
+
+
+def test_a_drained_worker_finishes_its_run_and_takes_no_more(service: Service) -> None:
+    service.start_server()
+    worker = service.start_worker()
+    (first,) = service.launch(STEPS)
+    until(lambda: service.run(first)["state"] == "running")
+    (second,) = service.launch(STEPS)
+    (name,) = [entry["name"] for entry in service.api.get("/api/status").json()["workers"]]
+    service.api.post("/api/workers/drain", json={"worker": name}).raise_for_status()
+    assert worker.wait(PATIENCE) == 0
+    assert service.run(first)["state"] == "completed"
+    assert (service.run(second)["state"], service.run(second)["attempt"]) == ("queued", 0)
+
+
+def test_a_worker_of_a_batch_job_ends_when_there_was_nothing_to_do_for_a_while(service: Service) -> None:
+    service.environment["MAPLESS_UNTIL_IDLE_SECONDS"] = "6"
+    service.start_server()
+    (run_id,) = service.launch(STEPS)
+    worker = service.start_worker()
+    assert worker.wait(PATIENCE) == 0
+    assert service.run(run_id)["state"] == "completed"

@@ -1,6 +1,7 @@
 """DDPG, TD3 and SAC: targets by hand, a memory that forgets nothing it should keep, and a problem with a known answer."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -219,6 +220,43 @@ def test_memory_keeps_the_newest() -> None:
     assert len(memory) == 6
     drawn = next(memory.sample(1, 200, torch.Generator().manual_seed(0)))
     assert set(drawn.observations.flatten().tolist()) == {1.0, 2.0, 3.0}
+
+
+@pytest.mark.parametrize("before", [2, 5, 13])
+@pytest.mark.parametrize("after", [0, 1, 4, 30])
+def test_a_snapshot_is_the_state_of_its_moment_whatever_is_recorded_afterwards(before: int, after: int) -> None:
+    """Before the memory is full and after, and where all of it was overwritten since."""
+    config = DdpgConfig(network=SMALL, robots=100, replay_size=1000, warmup_steps=500, batch_size=32)
+    algorithm = build_algorithm(config, 3, 0, CPU)
+    assert isinstance(algorithm, OffPolicyAlgorithm)
+    dice = np.random.default_rng(0)
+    record(algorithm, dice, 3)
+    algorithm.snapshot()  # an earlier one does not matter
+    record(algorithm, dice, before)
+    state, snapshot = algorithm.state(), algorithm.snapshot()
+    record(algorithm, dice, after)
+    for name, array in snapshot().items():
+        np.testing.assert_array_equal(array, state[name], err_msg=name)
+
+
+def test_a_snapshot_does_not_copy_the_memory() -> None:
+    config = DdpgConfig(network=SMALL, robots=1_000, replay_size=200_000, warmup_steps=1_000_000)
+    algorithm = build_algorithm(config, 16, 0, CPU)
+    assert isinstance(algorithm, OffPolicyAlgorithm)
+    dice = np.random.default_rng(0)
+    for _ in range(200):
+        algorithm.act(dice.random((1_000, 16), np.float32))
+        nothing = np.zeros(1_000, np.bool_)
+        following = dice.random((1_000, 16), np.float32)
+        algorithm.record(following, np.zeros(1_000, np.float32), nothing, nothing, following)
+    tracemalloc.start()
+    try:
+        algorithm.snapshot()
+        assert tracemalloc.get_traced_memory()[1] < 2**20
+        algorithm.state()
+        assert tracemalloc.get_traced_memory()[1] > 10 * 2**20
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize("steps", [3, 7, 23])

@@ -1,6 +1,7 @@
 """The training loop on the real environment: it learns, tells, saves, stops and resumes exactly."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,9 @@ import torch
 
 from sim.arenas import build_arena, with_maps_of
 from sim.config import ArenaConfig, GeneratedArenaConfig, JackalConfig, MoversConfig, RandomisationConfig, TaskConfig
-from workers.checkpoints import read_checkpoint, read_manifest, read_policy
+from workers.checkpoints import read_checkpoint, read_manifest, read_policy, write_checkpoint
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
-from workers.errors import ArchiveMismatchError, NonFiniteError
+from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.frames import Frame
 from workers.live.viewing import Unwatched
 from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
@@ -305,3 +306,31 @@ def test_seeds_train_on_maps_of_their_own_and_the_view_draws_these(tmp_path: Pat
         assert (first[0].boxes.tolist() == second[0].boxes.tolist()) != own
         drawn = build_arena(with_maps_of(task, 1).arena, 0)
         assert drawn.boxes.tolist() == first[0].boxes.tolist()
+
+
+def retold(whole: Recorder, path: Path, device: str) -> Path:
+    """The last archive of a training on the CPU, as one that says to be of another device."""
+    checkpoint = read_checkpoint(whole.checkpoints[-1][1])
+    training = checkpoint.manifest.training.model_copy(update={"device": device})
+    write_checkpoint(path, replace(checkpoint, manifest=checkpoint.manifest.model_copy(update={"training": training})))
+    return path
+
+
+def test_a_checkpoint_names_the_device_that_it_was_trained_on(tmp_path: Path) -> None:
+    recorder = Recorder()
+    anywhere = TINY.model_copy(update={"device": "auto", "steps": 1_000})
+    train(anywhere, 5, recorder, tmp_path, report_interval=0.0)
+    told = read_manifest(recorder.checkpoints[-1][1]).training.device
+    assert told == ("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def test_a_training_goes_on_where_it_began_and_nowhere_else(whole: Recorder, tmp_path: Path) -> None:
+    elsewhere = retold(whole, tmp_path / "cuda.zip", "cuda")
+    with pytest.raises(ArchiveMismatchError, match="was trained on cuda, whose random numbers cpu does not have"):
+        train(TINY, 5, Recorder(), tmp_path, resume=elsewhere)
+    if not torch.cuda.is_available():
+        with pytest.raises(NoDeviceError, match="This machine has no CUDA device"):
+            train(TINY.model_copy(update={"device": "auto"}), 5, Recorder(), tmp_path, resume=elsewhere)
+    # Earlier versions wrote what was asked for; whose random states an archive holds tells where it was trained.
+    undecided = retold(whole, tmp_path / "auto.zip", "auto")
+    assert train(TINY, 5, Recorder(), tmp_path, resume=undecided) == "completed"

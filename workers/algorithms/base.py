@@ -1,6 +1,6 @@
 """What every algorithm offers the training loop."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -60,6 +60,9 @@ class Algorithm(Protocol):
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Everything that `load_state` needs to continue bit for bit."""
+
+    def snapshot(self) -> Callable[[], dict[str, NDArray[np.generic]]]:
+        """`state` as it is now, for whoever asks later; cheap now, and only the newest one can be asked."""
 
     def load_state(self, state: Arrays) -> None:
         """Continues where `state` was taken."""

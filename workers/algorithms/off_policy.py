@@ -1,6 +1,7 @@
 """What DDPG, TD3 and SAC share: a memory, uniform actions to fill it, several updates a step, slow target networks."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -136,8 +137,16 @@ class OffPolicyAlgorithm(ABC):
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """See `Algorithm.state`."""
+        return {**with_prefix("replay", self._replay.state()), **self._state_but_replay()}
+
+    def snapshot(self) -> Callable[[], dict[str, NDArray[np.generic]]]:
+        """See `Algorithm.snapshot`: the memory, which is nearly all of the state, is not copied."""
+        self._replay.mark()
+        rest = self._state_but_replay()
+        return lambda: {**with_prefix("replay", self._replay.marked_state()), **rest}
+
+    def _state_but_replay(self) -> dict[str, NDArray[np.generic]]:
         state: dict[str, NDArray[np.generic]] = {
-            **with_prefix("replay", self._replay.state()),
             "generator": self._generator.get_state().numpy().copy(),
             "steps": np.array(self._steps),
             "progress": np.array(self._progress),

@@ -7,6 +7,8 @@ critic each), returns scaled (continuous control, 3), state-independent deviatio
 layers (14), orthogonal initialisation (2).
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -151,6 +153,11 @@ class Ppo:
             **with_prefix("scaler", self._scaler.state()),
             "generator": self._generator.get_state().numpy().copy(),
         }
+
+    def snapshot(self) -> Callable[[], dict[str, NDArray[np.generic]]]:
+        """See `Algorithm.snapshot`."""
+        state = self.state()
+        return lambda: state
 
     def load_state(self, state: Arrays) -> None:
         """See `Algorithm.load_state`."""

@@ -15,7 +15,7 @@ from workers.errors import (
     RunRefusedError,
     ServerUnavailableError,
 )
-from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, Queue
+from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, HeartbeatAnswer, Queue
 from workers.reporting import EvaluationResult
 
 _BLOCK = 256 * 1024
@@ -49,14 +49,15 @@ class ServerClient:
         """Close the connections."""
         self._http.close()
 
-    def heartbeat(self, worker: str, queue: Queue, trouble: str | None = None) -> None:
+    def heartbeat(self, worker: str, queue: Queue, trouble: str | None = None, *, first: bool = False) -> HeartbeatAnswer:
         """Tell that this worker is there, and why it takes up no run where it does not."""
-        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble)
-        self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
+        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble, first=first)
+        response = self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
+        return HeartbeatAnswer.model_validate_json(response.content)
 
-    def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str) -> Claim:
+    def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str, queue: Queue = "cpu") -> Claim:
         """Take up a run; asked again with the same `claim_id`, it is the same attempt."""
-        request = ClaimRequest(worker=worker, published_attempt=published_attempt, claim_id=claim_id)
+        request = ClaimRequest(worker=worker, published_attempt=published_attempt, claim_id=claim_id, queue=queue)
         response = self._send("POST", f"/api/worker/runs/{run_id}/claim", content=request.model_dump_json())
         return Claim.model_validate_json(response.content)
 

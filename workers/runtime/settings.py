@@ -40,6 +40,9 @@ class WorkerSettings(BaseSettings):
     min_free_bytes: int = Field(
         256 * 2**20, ge=0, description="Free space in the work folder below which a worker takes up no run."
     )
+    until_idle_seconds: float | None = Field(
+        None, gt=0.0, description="End after so long without work; for ever there if not given."
+    )
     stop_grace_seconds: float = Field(
         20.0, gt=0.0, description="A trainer that was asked to stop is killed after this long."
     )

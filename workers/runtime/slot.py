@@ -7,10 +7,12 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 from workers.errors import ServerError, UnfitError
 from workers.protocol import HEARTBEAT_SECONDS
 from workers.runtime.client import ServerClient
+from workers.runtime.ending import DRAIN_SIGNAL, HEARTBEAT_FILE
 from workers.runtime.fitness import Fitness
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.trainer_handle import TrainerHandle
@@ -47,20 +49,26 @@ class Slot:
         self._parent = os.getppid()
         self._worker_shutting_down = shutting_down
         self._condition = threading.Condition()
+        self._terminated = False
+        self._draining = False
         self._busy = False
         self._wanted = False
         self._closed = threading.Event()
         self._spare: TrainerHandle | None = None
         self._patience = _FIRST_RETRY_SECONDS
         self._no_trainer: str | None = None
-        self._answered = True
+        self._first = self._answered = True
         self._fitness = Fitness(settings.work_dir, settings.min_free_bytes)
         threading.Thread(target=self._keep, name="keeper", daemon=True).start()
         threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
 
     def shutting_down(self) -> bool:
         """Whether a training should be handed back: the worker ends, or has been killed and left this process behind."""
-        return self._worker_shutting_down() or os.getppid() != self._parent
+        return self._worker_shutting_down() or self._terminated or os.getppid() != self._parent
+
+    def on_terminate(self, _signal: int, _frame: FrameType | None) -> None:
+        """A signal handler: this process alone, or all of the worker's, should end."""
+        self._terminated = True
 
     def directory(self, run_id: str, attempt: int) -> Path:
         """Where an attempt keeps its files; named after this process, so that what a killed one leaves behind is found."""
@@ -131,7 +139,7 @@ class Slot:
                     self._no_trainer, self._patience = None, _FIRST_RETRY_SECONDS
                 if self._spare is None and (self._wanted or not (self._busy or died or self.shutting_down())):
                     died = not self._start_spare()
-                if os.getppid() != self._parent and not self._busy:
+                if self._alone() and not self._busy:
                     self._leave()
                 self._condition.wait(self._patience if died else _TICK_SECONDS)
 
@@ -161,8 +169,11 @@ class Slot:
         self._condition.notify_all()
         self._patience = min(2 * self._patience, _LAST_RETRY_SECONDS)
 
+    def _alone(self) -> bool:
+        """Whether the worker was killed and left this process behind, or this process was told to end and the worker not."""
+        return os.getppid() != self._parent or (self._terminated and not self._worker_shutting_down())
+
     def _leave(self) -> None:
-        """The worker was killed and left this idle process behind."""
         if self._spare is not None:
             self._spare.close()
         os._exit(1)
@@ -176,9 +187,13 @@ class Slot:
         trouble = self.trouble
         self._fitness.say(trouble)
         try:
-            self.client.heartbeat(self.name, self.settings.worker_queue, trouble)
+            answer = self.client.heartbeat(self.name, self.settings.worker_queue, trouble, first=self._first)
+            self._first = False
+            if answer.drain and not self._draining:
+                self._draining = True
+                os.kill(self._parent, DRAIN_SIGNAL)
             # For who watches over this worker without asking the server, as a container's health check does.
-            (self.settings.work_dir / "heartbeat").touch()
+            (self.settings.work_dir / HEARTBEAT_FILE).touch()
         except ServerError as error:
             if self._answered:
                 logger.warning("Waiting for the server at %s: %s", self.settings.server_url, error)

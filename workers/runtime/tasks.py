@@ -2,19 +2,21 @@
 
 import logging
 import multiprocessing
+import signal
 import time
 import uuid
 from typing import Any
 
 import billiard
 from celery import shared_task
-from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_shutting_down
+from celery.signals import worker_init, worker_process_init, worker_process_shutdown, worker_ready, worker_shutting_down
 
 from workers.errors import RequestRefusedError, RunRefusedError, ServerUnavailableError, UnfitError
 from workers.logs import process_is_about
 from workers.protocol import Claim
 from workers.runtime.app import TRAIN_TASK
 from workers.runtime.attempt import Attempt
+from workers.runtime.ending import drain_on_signal, leave_when_idle
 from workers.runtime.fitness import make_private
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.slot import Slot, remove_leftovers
@@ -39,6 +41,13 @@ def _prepare_worker(**_: Any) -> None:
     remove_leftovers(settings.work_dir)
 
 
+def _watch_for_the_end(**_: Any) -> None:
+    settings = WorkerSettings()
+    drain_on_signal()
+    if settings.until_idle_seconds is not None:
+        leave_when_idle(settings.work_dir, settings.until_idle_seconds)
+
+
 def _open_slot(**_: Any) -> None:
     global _slot  # one a process, made after the fork
     _slot = Slot(WorkerSettings(), billiard.current_process().index, _shutting_down.is_set)
@@ -54,6 +63,7 @@ def _close_slot(**_: Any) -> None:
 
 
 worker_init.connect(_prepare_worker)
+worker_ready.connect(_watch_for_the_end)
 worker_process_init.connect(_open_slot)
 worker_shutting_down.connect(_announce_shutdown)
 worker_process_shutdown.connect(_close_slot)
@@ -68,6 +78,9 @@ def train(run_id: str, attempt: int) -> None:
 
 def _train(run_id: str, attempt: int) -> None:
     assert _slot is not None
+    # A batch system may tell every process of a job to end; the one that trains hands its run back first. Here and not where
+    # the process begins: Celery puts its own handler in place after that.
+    signal.signal(signal.SIGTERM, _slot.on_terminate)
     try:
         trainer = _slot.take_trainer()
     except UnfitError as error:
@@ -112,7 +125,7 @@ def _claim(slot: Slot, run_id: str, attempt: int) -> Claim | None:
     waited = False
     while time.monotonic() < deadline and not slot.shutting_down():
         try:
-            return slot.client.claim(run_id, slot.name, attempt, claim_id)
+            return slot.client.claim(run_id, slot.name, attempt, claim_id, slot.settings.worker_queue)
         except RunRefusedError as refusal:
             logger.info("run %s is not to be had at attempt %d: %s", run_id, attempt, refusal)
             return None

@@ -17,7 +17,7 @@ from pathlib import Path
 from sim.arenas import with_maps_of
 from sim.errors import SimError
 from workers.config import TrainingConfig
-from workers.errors import ArchiveFormatError, ArchiveIntegrityError, WorkerError
+from workers.errors import ArchiveFormatError, ArchiveIntegrityError, LocalError, WorkerError
 from workers.frames import Frame
 from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
@@ -162,7 +162,7 @@ def main(descriptor: int, parent: int) -> None:
         except (ArchiveFormatError, ArchiveIntegrityError) as error:
             # Whether it is damaged where it is kept as well is for the server to say.
             reporter.end("damaged", str(error))
-        except OSError as error:
+        except (OSError, LocalError) as error:
             reporter.end("unfit", f"{type(error).__name__}: {error}")
         except (WorkerError, SimError, ValueError) as error:
             # Typed, or about a value of the configuration: another attempt would meet it again.

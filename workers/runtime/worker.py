@@ -29,6 +29,12 @@ def worker(
         int | None, typer.Option("--concurrency", "-c", min=1, help="Trainings side by side; one a core if not given.")
     ] = None,
     name: Annotated[str | None, typer.Option(help="Tells workers of one machine apart.")] = None,
+    until_idle: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="End after so long without work, as a batch job should [MAPLESS_UNTIL_IDLE_SECONDS]."
+        ),
+    ] = None,
     work_dir: Annotated[
         Path | None, typer.Option(help="Where runs keep their files until the server has them [MAPLESS_WORK_DIR].")
     ] = None,
@@ -40,6 +46,7 @@ def worker(
         "worker_token": token,
         "worker_queue": queue,
         "work_dir": work_dir,
+        "until_idle_seconds": until_idle,
         "worker_name": name or os.environ.get("MAPLESS_WORKER_NAME") or f"worker{os.getpid()}",
     }
     try:
@@ -59,7 +66,10 @@ def worker(
 
 
 def run_worker(settings: WorkerSettings, concurrency: int) -> None:
-    """Work until SIGTERM or SIGINT; trainings under way are then handed back, with a checkpoint."""
+    """Work until SIGTERM or SIGINT; trainings under way are then handed back, with a checkpoint.
+
+    At SIGUSR1, or the server's word, they are finished first, and no more are taken up.
+    """
     # What runs keep here is their owner's alone.
     os.umask(0o077)
     # The processes that Celery forks read the settings anew.
@@ -114,4 +124,6 @@ def _environment(settings: WorkerSettings) -> dict[str, str]:
         "LOG_FORMAT": settings.log_format,
         "MIN_FREE_BYTES": str(settings.min_free_bytes),
     }
+    if settings.until_idle_seconds is not None:
+        values["UNTIL_IDLE_SECONDS"] = str(settings.until_idle_seconds)
     return {f"MAPLESS_{name}": value for name, value in values.items()}

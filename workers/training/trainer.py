@@ -18,9 +18,10 @@ from sim.observations import observation_layout
 from sim.suites import suite_for
 from workers.algorithms import build_algorithm
 from workers.algorithms.base import with_prefix, without_prefix
-from workers.checkpoints import Checkpoint, read_checkpoint, write_checkpoint
+from workers.archive_size import refuse_too_large
+from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, write_checkpoint
 from workers.config import TrainingConfig
-from workers.errors import ArchiveMismatchError, NonFiniteError
+from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.live.viewing import PolicyFunction, TrainingViewer, Unwatched
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.networks.layout import layout
@@ -36,7 +37,7 @@ TrainingOutcome = Literal["completed", "stopped"]
 REPORT_INTERVAL = 0.2
 """Least wall time between two reports of metrics, in seconds."""
 
-# A failure is repeated within seconds, and a replay memory of millions is copied often enough.
+# A failure is repeated within seconds.
 _REMEMBER_INTERVAL = 5.0
 
 
@@ -68,13 +69,15 @@ def train(
 
     Raises:
         NonFiniteError: the weights are no longer finite numbers.
+        MemoryTooLargeError: its replay memory would not fit into a checkpoint.
+        NoDeviceError: this machine does not have the device that it asks for.
         ArchiveError: `resume` is damaged, or belongs to another training.
     """
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of dead units decay into numbers that the processor handles slowly
     viewer = viewer or Unwatched()
-    training = Training(config, seed, reporter, directory, viewer, report_interval)
     try:
+        training = Training(with_device(config, resume), seed, reporter, directory, viewer, report_interval)
         if resume is not None:
             training.resume(resume)
         return training.run()
@@ -97,9 +100,10 @@ class Training:
     ) -> None:
         self.config, self.seed, self.reporter, self.directory, self.viewer = config, seed, reporter, directory, viewer
         self.report_interval = report_interval
+        refuse_too_large(config)
         self.suite = suite_for(config.task)
         self.observation_layout = observation_layout(config.task)
-        self.algorithm = build_algorithm(config.algorithm, self.observation_layout.size, seed, _device(config.device))
+        self.algorithm = build_algorithm(config.algorithm, self.observation_layout.size, seed, torch.device(config.device))
         self.task = with_maps_of(config.task, seed)
         self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
         self.observations, _ = self.env.reset(seed=seed)
@@ -108,7 +112,7 @@ class Training:
         self.total_updates = math.ceil(config.steps / self.steps_per_update)
         self.step = self.updates = self.evaluations = 0
         self.reported = self.saved = -1
-        self.remembered: Checkpoint | None = None
+        self.remembered: Callable[[], Checkpoint] | None = None
         self.remembered_at = 0.0
 
     def run(self) -> TrainingOutcome:
@@ -168,10 +172,11 @@ class Training:
         self.metrics.update({"policy/finite": 0.0})
         self.report(None)
         assert self.remembered is not None
-        step = self.remembered.counters.step
+        remembered = self.remembered()
+        step = remembered.counters.step
         if step != self.saved:
             archive = self.directory / f"step-{step}.zip"
-            write_checkpoint(archive, self.remembered)
+            write_checkpoint(archive, remembered)
             self.reporter.checkpoint(step, archive, None)
         raise NonFiniteError(
             f"the weights became infinite or NaN in the update at step {self.step}: lower the learning rate or the gradient "
@@ -222,15 +227,21 @@ class Training:
         self.reported = self.step
 
     def remember(self) -> None:
-        """Keeps a copy of the whole state now and then, from which a failure can be repeated."""
+        """Keeps the whole state now and then, from which a failure can be repeated; a replay memory is not copied for it."""
         now = time.monotonic()
-        if self.remembered is None or now - self.remembered_at >= _REMEMBER_INTERVAL:
-            self.remembered, self.remembered_at = self.checkpoint(None), now
+        if self.remembered is not None and now - self.remembered_at < _REMEMBER_INTERVAL:
+            return
+        manifest, weights, counters = self._manifest(None), self.algorithm.policy_weights(), self._counters()
+        algorithm, environment = self.algorithm.snapshot(), self._environment_arrays()
+        self.remembered = lambda: Checkpoint(
+            manifest, weights, {**with_prefix("algorithm", algorithm()), **environment}, counters
+        )
+        self.remembered_at = now
 
     def checkpoint(self, result: EvaluationResult | None) -> Checkpoint:
         """A copy of the whole state; `result` belongs to exactly these weights."""
-        counters = TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
-        return Checkpoint(self._manifest(result), self.algorithm.policy_weights(), self._arrays(), counters)
+        arrays = {**with_prefix("algorithm", self.algorithm.state()), **self._environment_arrays()}
+        return Checkpoint(self._manifest(result), self.algorithm.policy_weights(), arrays, self._counters())
 
     def save(self, result: EvaluationResult | None) -> None:
         """A checkpoint of this step, unless there is one."""
@@ -254,6 +265,11 @@ class Training:
             raise ArchiveMismatchError(
                 f"{archive.name} is of a training with another task, algorithm or seed: resume it with its own configuration"
             )
+        if (device := _trained_on(checkpoint)) != ours.device:
+            raise ArchiveMismatchError(
+                f"{archive.name} was trained on {device}, whose random numbers {ours.device} does not have: "
+                f"resume it with the device {device}"
+            )
         self.algorithm.load_state(without_prefix("algorithm", checkpoint.arrays))
         self.env.set_state(without_prefix("environment", checkpoint.arrays))
         self.observations = np.array(checkpoint.arrays["observations"], np.float32)
@@ -263,9 +279,11 @@ class Training:
         self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots)
         self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
 
-    def _arrays(self) -> dict[str, NDArray[np.generic]]:
+    def _counters(self) -> TrainingCounters:
+        return TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
+
+    def _environment_arrays(self) -> dict[str, NDArray[np.generic]]:
         return {
-            **with_prefix("algorithm", self.algorithm.state()),
             **with_prefix("environment", self.env.get_state()),
             "observations": self.observations.copy(),
         }
@@ -312,10 +330,29 @@ def _summary(result: EvaluationResult | None) -> EvaluationSummary | None:
     )
 
 
-def _device(name: Literal["auto", "cpu", "cuda"]) -> torch.device:
-    if name == "auto":
-        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    return torch.device(name)
+def with_device(config: TrainingConfig, resume: Path | None) -> TrainingConfig:
+    """The configuration with the device that is trained on: `auto` goes on where it began, and begins on CUDA where that is.
+
+    Raises:
+        NoDeviceError: this machine has no CUDA device, and the training needs one.
+        ArchiveError: `resume` is damaged.
+    """
+    device = config.device
+    if device == "auto" and resume is not None:
+        device = read_manifest(resume).training.device
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    if device == "cuda" and not torch.cuda.is_available():
+        raise NoDeviceError("This machine has no CUDA device: train where there is one, or begin anew with the device cpu.")
+    return config.model_copy(update={"device": device})
+
+
+def _trained_on(checkpoint: Checkpoint) -> str:
+    """The device that a checkpoint comes from; earlier versions wrote `auto`, but random states tell."""
+    device = checkpoint.manifest.training.device
+    if device != "auto":
+        return device
+    return "cpu" if checkpoint.arrays["algorithm/generator"].size == torch.Generator().get_state().numel() else "cuda"
 
 
 def _versions() -> dict[str, str]:

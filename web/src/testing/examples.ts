@@ -24,8 +24,8 @@ export const status: Status = {
   version: '0.1.0',
   commit: 'c0ffee1',
   workers: [
-    { name: 'worker-1', last_seen: NOW, run_id: 'run1', trouble: null },
-    { name: 'worker-2', last_seen: NOW, run_id: null, trouble: null },
+    { name: 'worker-1', last_seen: NOW, run_id: 'run1', draining: false, trouble: null },
+    { name: 'worker-2', last_seen: NOW, run_id: null, draining: false, trouble: null },
   ],
   queued: 0,
   running: 1,

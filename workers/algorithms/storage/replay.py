@@ -53,6 +53,9 @@ class ReplayBuffer:
         self._memory = torch.zeros(self._slots, robots, int(bounds[-1]), device=device)
         self._next = 0
         self._filled = 0
+        # As of the mark: next and filled, then the slots that were overwritten since, each as it was.
+        self._marked: tuple[int, int] | None = None
+        self._overwritten: list[tuple[int, Tensor]] = []
 
     def __len__(self) -> int:
         return self._filled * self._robots
@@ -62,6 +65,8 @@ class ReplayBuffer:
     ) -> None:
         """Remembers one step of all robots, over the oldest one when full; see `Transitions` for the meaning."""
         slot = self._memory[self._next]
+        if self._marked is not None and self._next < self._marked[1] and len(self._overwritten) < self._marked[1]:
+            self._overwritten.append((self._next, slot.clone()))
         for column, values in zip(
             self._columns, (observations, actions, rewards, continues, next_observations), strict=True
         ):
@@ -76,16 +81,33 @@ class ReplayBuffer:
         for start in range(0, batches * size, size):
             yield Transitions(*(drawn[start : start + size, column] for column in self._columns))
 
+    def mark(self) -> None:
+        """Remember this moment for `marked_state`, in place of an earlier one; costs what is overwritten from now on."""
+        self._marked = self._next, self._filled
+        self._overwritten.clear()
+
+    def marked_state(self) -> dict[str, NDArray[np.generic]]:
+        """`state` as it was at the last `mark`."""
+        assert self._marked is not None
+        next_slot, filled = self._marked
+        memory = self._memory[:filled].clone()
+        for index, slot in self._overwritten:
+            memory[index] = slot
+        return self._state(memory, next_slot)
+
     def state(self) -> dict[str, NDArray[np.generic]]:
         """For `load_state`; what followed a step is left out where it is the next step's observation anyway."""
-        filled = self._memory[: self._filled].cpu().numpy()
-        before, after = filled[:, :, self._columns[0]], filled[:, :, self._columns[-1]]
-        differs = np.any(after != np.roll(before, -1, axis=0), axis=2)
+        return self._state(self._memory[: self._filled], self._next)
+
+    def _state(self, memory: Tensor, next_slot: int) -> dict[str, NDArray[np.generic]]:
+        filled = memory.cpu().numpy()
+        before, following = filled[:, :, self._columns[0]], filled[:, :, self._columns[-1]]
+        differs = np.any(following != np.roll(before, -1, axis=0), axis=2)
         return {
             "rows": filled[:, :, : self._columns[-1].start].copy(),
             "differs": differs,
-            "following": after[differs],
-            "next": np.array(self._next),
+            "following": following[differs],
+            "next": np.array(next_slot),
         }
 
     def load_state(self, state: Arrays) -> None:
