@@ -13,8 +13,10 @@ Nothing is ever unpickled. Archives come over the network, so that reading one t
 compressed (nothing can inflate), known by name, bounded in size, and compared with the SHA-256 in the manifest.
 """
 
+import errno
 import hashlib
 import os
+import struct
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -183,8 +185,15 @@ def _open(source: Path | IO[bytes], name: str) -> Iterator[zipfile.ZipFile]:
                 if info.file_size > _SIZE_LIMITS[info.filename]:
                     raise ArchiveFormatError(f"{info.filename} has {info.file_size} bytes, more than any checkpoint's")
             yield archive
-    except zipfile.BadZipFile as error:
+    except (zipfile.BadZipFile, RuntimeError, ValueError, EOFError, struct.error) as error:
+        # A damaged directory may say anything: that files are encrypted, begin before the archive or are of a newer zip.
         raise ArchiveFormatError(f"{name} is not a readable archive ({error}): download it again") from error
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+        raise ArchiveFormatError(
+            f"{name} is not a readable archive (its directory is damaged): download it again"
+        ) from error
 
 
 def _manifest(archive: zipfile.ZipFile) -> Manifest:
