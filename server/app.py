@@ -17,6 +17,7 @@ from server.database.engine import Database
 from server.database.migrate import upgrade
 from server.diagnoses import endpoints as diagnoses
 from server.events import endpoints as events
+from server.events.position import PositionMiddleware
 from server.experiments import endpoints as experiments
 from server.exports import endpoints as exports
 from server.files import FileStore
@@ -122,6 +123,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
     app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
+    app.add_middleware(PositionMiddleware, bus=services.bus)
     app.add_middleware(
         AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
     )

@@ -98,6 +98,11 @@ class EventBus:
         """How many streams are open."""
         return len(self._subscriptions)
 
+    @property
+    def position(self) -> str:
+        """Before which everything has been published; from any thread."""
+        return f"{self._epoch}-{self._newest}"
+
     def publish(self, change: Change) -> None:
         """Tell everybody whom it concerns; equal changes that wait are one."""
         with self._lock:
@@ -126,7 +131,7 @@ class EventBus:
         subscription = Subscription(shown)
         with self._lock:
             missed = self._since(since)
-            position = self._position()
+            position = self.position
         subscription.put(_event(position, "opened", "{}"), b"")
         if missed is None:
             subscription.put(self._resync(), b"")
@@ -168,7 +173,7 @@ class EventBus:
             lost = self._forgotten > self._told
             batch = self._after(self._told)
             self._told = self._newest
-            position = self._position()
+            position = self.position
         resync = self._resync()
         texts: dict[Shown | None, bytes] = {}
         for subscription in tuple(self._subscriptions):
@@ -197,11 +202,8 @@ class EventBus:
             found.append(change)
         return found[::-1]
 
-    def _position(self) -> str:
-        return f"{self._epoch}-{self._newest}"
-
     def _resync(self) -> bytes:
-        return _event(self._position(), "resync", "{}")
+        return _event(self.position, "resync", "{}")
 
     def _wake(self) -> None:
         # The loop may have ended before its listeners did, at shutdown; nobody is left to be woken then.

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Coroutine
 from typing import Any
 
 import pytest
+from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -205,6 +206,22 @@ def test_a_silent_stream_says_that_it_is_there() -> None:
             assert await anext(stream) == b": still here\n\n"
 
     run(scenario())
+
+
+def test_an_answer_says_from_when_it_is_so_that_nothing_is_missed_before_one_listens(client: TestClient) -> None:
+    read_at = client.get("/api/experiments").headers["Mapless-Position"]
+    experiment = client.post("/api/experiments", json={"name": "launched meanwhile"}).json()
+    bus: EventBus = client.app.state.services.bus  # type: ignore[attr-defined]
+
+    async def scenario() -> None:
+        with bus.subscribe(shown(reports=True), since=read_at) as subscription:
+            stream = events(subscription)
+            assert (await anext(stream))[1] == "opened"
+            assert (await anext(stream))[2] == [change(None, "experiment", experiment["id"])]
+
+    assert client.portal is not None
+    client.portal.call(scenario)
+    assert client.get("/api/experiments").headers["Mapless-Position"] == bus.position != read_at
 
 
 def test_there_are_only_so_many_streams(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,14 @@ export const api = createFetchClient<paths>({
   fetch: (request) => globalThis.fetch(request),
 })
 
+let firstPosition: string | undefined
+
+/** From when the first answer of this page is: whoever listens from there on misses no change to any of them. */
+export const positionOfFirstAnswer = () => firstPosition
+
 api.use({
   async onResponse({ response }) {
+    firstPosition ??= response.headers.get('Mapless-Position') ?? undefined
     if (!response.ok) throw await errorOf(response)
   },
   onError({ error }) {

@@ -2,6 +2,7 @@
 import type { QueryClient } from '@tanstack/react-query'
 import { useQueryClient } from '@tanstack/react-query'
 import { useEffect } from 'react'
+import { positionOfFirstAnswer } from './client'
 
 export interface Change {
   /** Null for one that this page does not show. */
@@ -156,7 +157,7 @@ export function useServerEvents(enabled: boolean): void {
     let retry: ReturnType<typeof setTimeout> | undefined
     let settling: ReturnType<typeof setTimeout> | undefined
     let failures = 0
-    let position: string | undefined
+    let position = positionOfFirstAnswer()
     let followed = ''
     const open = () => {
       followed = streamPath(client, undefined)
