@@ -15,6 +15,7 @@ from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
+from server.metrics.cache import AnswerCache
 from server.monitoring.instruments import Instruments
 from server.replays.recordings import RecordingStore
 from server.security.limits import GuessLimiter
@@ -41,6 +42,7 @@ class Services:
     drivers: PolicyDrivers = field(init=False)
     leases: Leases = field(init=False)
     instruments: Instruments = field(default_factory=Instruments)
+    curves: AnswerCache = field(default_factory=AnswerCache)
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)
     login_limiter: GuessLimiter = field(init=False)

@@ -11,6 +11,9 @@ from server.metrics.schemas import Metrics, Series
 from server.runs.repository import RunRepository
 from server.services import Services
 
+# Powers of ten that a float64 holds exactly.
+_POWERS = np.array([float(f"1e{power}") for power in range(23)])
+
 
 class MetricService:
     """Reads curves."""
@@ -18,16 +21,23 @@ class MetricService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def of_run(self, run_id: str, names: Collection[str] | None, points: int) -> Metrics:
-        """The run's series, all or those named, each of at most `points` points.
+    def of_run(self, run_id: str, names: Collection[str] | None, points: int) -> bytes:
+        """`Metrics` as JSON: the run's series, all or those named, each of at most `points` points.
 
         Raises:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
-            RunRepository(session).get(run_id)
-            series = MetricRepository(session).curves([run_id], names, points)[run_id]
-        return Metrics(series=[_view(name, buckets) for name, buckets in series.items()])
+            run = RunRepository(session).get(run_id)
+
+            def read() -> bytes:
+                series = MetricRepository(session).curves([run_id], names, points)[run_id]
+                metrics = Metrics(series=[_view(name, buckets) for name, buckets in series.items()])
+                return metrics.model_dump_json().encode()
+
+            # Reports move the last item's number; what cuts a run back moves its step, and its next attempt's number.
+            state = (run_id, run.attempt, run.last_seq, run.step)
+            return self._services.curves.get((*state, frozenset(names or ()), points), read)
 
 
 def _view(name: str, buckets: Buckets) -> Series:
@@ -42,4 +52,13 @@ def _view(name: str, buckets: Buckets) -> Series:
 
 def json_numbers(values: NDArray[np.float64]) -> list[float | None]:
     """The values with the seven digits that float32 has; null for nan."""
-    return [float(f"{value:.7g}") if finite else None for value, finite in zip(values, np.isfinite(values), strict=True)]
+    finite = np.isfinite(values)
+    known = np.where(finite, values, 0.0)
+    # Decimals that leave seven digits; of other sizes, which are rare, each number is written out.
+    places = 6 - np.floor(np.log10(np.abs(np.where(known == 0.0, 1.0, known)))).astype(np.int64)
+    usual = (places >= 0) & (places < _POWERS.size)
+    scale = _POWERS[np.where(usual, places, 0)]
+    numbers: list[float | None] = (np.round(known * scale) / scale).tolist()
+    for index in np.flatnonzero(~(finite & usual)):
+        numbers[index] = float(f"{values[index]:.7g}") if finite[index] else None
+    return numbers

@@ -65,6 +65,11 @@ class Reports:
         with self.services.database.write() as session:
             MetricRepository(session).append_rows(run["id"], rows)
 
+    def cut(self, run: dict[str, Any], step: int) -> None:
+        """Forget what was reported beyond a step."""
+        with self.services.database.write() as session:
+            MetricRepository(session).drop_beyond(run["id"], step)
+
     def state(self, run: dict[str, Any], state: RunState, **columns: Any) -> None:
         """Bring a run where a worker would have brought it."""
         with self.services.database.write() as session:

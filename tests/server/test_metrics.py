@@ -17,6 +17,7 @@ from server.database.migrate import upgrade
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository, ReportedRow
+from server.metrics.service import json_numbers
 from server.services import Services
 
 
@@ -371,6 +372,14 @@ def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None
 def test_curves_of_no_run_and_in_no_width(client: TestClient) -> None:
     assert client.get("/api/runs/nobody/metrics").status_code == 404
     assert client.get(f"/api/runs/{run_of(client)}/metrics", params={"points": 1}).status_code == 422
+
+
+@given(st.lists(st.floats(width=32), max_size=30))
+def test_numbers_are_rounded_as_they_would_be_written(values: list[float]) -> None:
+    written = [float(f"{value:.7g}") if math.isfinite(value) else None for value in values]
+    for number, as_written in zip(json_numbers(np.array(values)), written, strict=True):
+        # Of a number that lies halfway between two, either is right.
+        assert number == as_written or (number is not None and number == pytest.approx(as_written, rel=2e-7))
 
 
 def test_figures_have_the_seven_digits_that_are_kept(client: TestClient, services: Services) -> None:

@@ -83,3 +83,10 @@ test('every metric that a training reports is in some chart', () => {
   ])
     expect(shown).toContain(name)
 })
+
+test('a series whose points were taken together has a band from the smallest to the largest', () => {
+  const spec = { title: 'Loss', metrics: [{ name: 'loss/policy', label: 'loss' }] }
+  const cut = { name: 'loss/policy', steps: [10, 20], values: [2, 3], min: [1, 3], max: [4, 3] }
+  expect(chartOf(spec, [cut]).lines[0]?.band).toEqual({ low: [1, 3], high: [4, 3] })
+  expect(chartOf(spec, [{ ...cut, min: null, max: null }]).lines[0]?.band).toBeUndefined()
+})

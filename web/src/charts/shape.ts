@@ -4,15 +4,29 @@ import { plural } from '../lib/format'
 import type { ChartSpec } from './metrics'
 import { alignSeries, type ChartData, type Line } from './series'
 
-/** The series that a chart shows, on one x; a series without points is left out. */
+/**
+ * The series that a chart shows, on one x; a series without points is left out. Behind one whose points were taken together
+ * lies the band of their smallest and largest values.
+ */
 export function chartOf(spec: ChartSpec, series: readonly Series[]): ChartData {
   const found = spec.metrics.flatMap((metric, color) => {
     const one = series.find((candidate) => candidate.name === metric.name)
     return one && one.steps.length > 0 ? [{ ...metric, color, series: one }] : []
   })
   const { x, values } = alignSeries(found.map((one) => one.series))
+  const edges = (edge: 'min' | 'max') =>
+    alignSeries(found.map(({ series: { steps, ...one } }) => ({ steps, values: one[edge] ?? one.values })))
+      .values
+  const low = edges('min')
+  const high = edges('max')
   const lines = found.map(
-    ({ name, label, color }, index): Line => ({ key: name, label, color, values: values[index] ?? [] }),
+    ({ name, label, color, series: { min } }, index): Line => ({
+      key: name,
+      label,
+      color,
+      values: values[index] ?? [],
+      ...(min === null ? {} : { band: { low: low[index] ?? [], high: high[index] ?? [] } }),
+    }),
   )
   return { x, lines }
 }
