@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from sim.envs.vector import NavigationVectorEnv
-from workers.live.viewing import PolicyFunction
 
 EPISODES = 1_000
 

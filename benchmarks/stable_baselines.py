@@ -14,9 +14,9 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor, nn
 
+from sim.arrays import PolicyFunction
 from sim.envs.vector import NavigationVectorEnv
 from workers.config import DdpgConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
-from workers.live.viewing import PolicyFunction
 from workers.networks.modules import ResBlock
 
 Floats = NDArray[np.float32]

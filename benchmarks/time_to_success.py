@@ -27,9 +27,10 @@ from benchmarks.attempts import first_attempts
 from benchmarks.report import finish, parser
 from benchmarks.stable_baselines import build, policy_of
 from benchmarks.training_throughput import NEVER, Silent
+from sim.arrays import PolicyFunction
 from sim.config import ArenaConfig, TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig
-from workers.live.viewing import PolicyFunction, Unwatched
+from workers.live.viewing import Unwatched
 from workers.policy import torch_policy
 from workers.training.trainer import REPORT_INTERVAL, Training
 

@@ -16,11 +16,11 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from benchmarks.report import finish, parser
+from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.frames import Frame
 from workers.live.viewer import LiveViewer
-from workers.live.viewing import PolicyFunction
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.training.trainer import train
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.arrays import PolicyFunction
 from workers.config import Network, ResBlockNetwork
-from workers.live.viewing import PolicyFunction
 from workers.networks.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 
 

@@ -6,8 +6,8 @@ from server.database.tables import RunState
 from server.experiments.schemas import ExperimentState
 from server.schemas import Schema
 from workers.reproduction.results import RowSpread
-from workers.reproduction.table import TableRow
 from workers.reproduction.verdict import Verdict
+from workers.training.table import TableRow
 
 
 class CampaignCreate(Schema):

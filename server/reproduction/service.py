@@ -25,7 +25,7 @@ from server.services import Services
 from server.system.service import workers_lately
 from workers.protocol import queues_of
 from workers.reproduction.rows import ROWS, Row, scaled, title
-from workers.reproduction.table import METRICS
+from workers.training.table import METRICS
 
 # PostgreSQL would let two launches through that look at the same moment; one server process serves an installation.
 _LAUNCH = Lock()

@@ -19,9 +19,9 @@ from workers.config import TrainingConfig
 from workers.reproduction.pace import Share, seconds_left
 from workers.reproduction.results import SeedResult, learned_at, row_spread
 from workers.reproduction.rows import CURVE, FIGURES, ROW_BY_ID, ROWS, TABLES, Row
-from workers.reproduction.table import TableRow
 from workers.reproduction.verdict import judge_all
 from workers.statistics.differences import LEAST_SEEDS
+from workers.training.table import TableRow
 
 Latest = Mapping[str, Mapping[str, float]]
 """The newest value of each metric, by run and name."""

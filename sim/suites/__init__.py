@@ -1,6 +1,6 @@
 """Suites: frozen scenarios on which policies are compared, and driving them."""
 
-from sim.suites.driving import EpisodeTable, Observer, PolicyFunction, Situation, run_controller, run_suite
+from sim.suites.driving import EpisodeTable, Observer, Situation, run_controller, run_suite
 from sim.suites.places import GeneratedPlace, build_places, content_hash, suite_places
 from sim.suites.suite import Suite, load_suite, suite_for, suite_in, suite_named, suite_names, suite_of
 
@@ -8,7 +8,6 @@ __all__ = [
     "EpisodeTable",
     "GeneratedPlace",
     "Observer",
-    "PolicyFunction",
     "Situation",
     "Suite",
     "build_places",

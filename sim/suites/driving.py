@@ -6,15 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.arrays import Floats, PolicyFunction
 from sim.config import TaskConfig
 from sim.errors import PlacementError, SuiteError
 from sim.suites.scenarios import scenario_world
 from sim.suites.suite import Suite
 from sim.world import World
 
-Floats = NDArray[np.float32]
-PolicyFunction = Callable[[Floats], Floats]
-"""Observations (n, numbers) to actions (n, 2)."""
 Observer = Callable[[NDArray[np.int64], World], None]
 """Told before the first step, and after each one, the scenarios that were under way, and the world as it is now."""
 

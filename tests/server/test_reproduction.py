@@ -13,8 +13,8 @@ from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, Reports
 from workers.protocol import Queue
 from workers.reproduction.rows import ROWS, TABLES
-from workers.reproduction.table import TableRow
 from workers.statistics.intervals import exact_interval
+from workers.training.table import TableRow
 
 
 class RecordingDoorbell:

@@ -18,9 +18,9 @@ from workers.reproduction.drawing import draw_curves
 from workers.reproduction.pace import Share, seconds_left
 from workers.reproduction.results import SeedResult, Trained, learned_at, row_spread
 from workers.reproduction.rows import FIGURES, ROW_BY_ID, ROWS, STEPS, TABLES, scaled
-from workers.reproduction.table import METRICS, TableRow
 from workers.reproduction.verdict import judge, judge_all
 from workers.training.drives import drive
+from workers.training.table import METRICS, TableRow
 
 LEARNED_AT = 100_000
 

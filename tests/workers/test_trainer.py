@@ -16,9 +16,9 @@ from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.frames import Frame
 from workers.live.viewing import Unwatched
 from workers.reporting import EpisodeResult, EvaluationResult, EventLevel, WatchRequest
-from workers.reproduction.table import TableRow
 from workers.training.evaluation import evaluation_metrics
 from workers.training.metrics import TrainingMetrics
+from workers.training.table import TableRow
 from workers.training.trainer import Training, train
 
 REWARD_TERMS = {"reward/arrival", "reward/collision", "reward/progress"}

@@ -7,11 +7,11 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from sim.arrays import PolicyFunction
 from workers.errors import ExportError
 from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, PREVIOUS, RANGES, TARGET, VELOCITY
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
-from workers.live.viewing import PolicyFunction
 from workers.manifest import Manifest
 
 TOLERANCE = 1e-5

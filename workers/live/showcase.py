@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.arrays import PolicyFunction
 from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan
 from workers.frames import Frame
-from workers.live.viewing import PolicyFunction
 
 
 def along_arc(

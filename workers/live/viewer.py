@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from workers.live.clips import ClipRecorder
 from workers.live.showcase import Showcase
-from workers.live.viewing import PolicyFunction
 from workers.reporting import Reporter, WatchRequest
 
 if TYPE_CHECKING:

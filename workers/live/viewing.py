@@ -3,14 +3,10 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from sim.arrays import PolicyFunction
 
 if TYPE_CHECKING:
     from sim.envs.vector import NavigationVectorEnv
-
-PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.float32]]
-"""Observations (n, 16) to actions (n, 2), deterministic; safe to call from another thread."""
 
 
 class TrainingViewer(Protocol):

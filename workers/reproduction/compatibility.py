@@ -10,10 +10,10 @@ from sim.config import Frozen
 from workers.reproduction.claims import Measure
 from workers.reproduction.measures import SCALES, paper_value, values_of
 from workers.reproduction.results import SeedResult
-from workers.reproduction.table import TableRow
 from workers.statistics.differences import Difference, welch_error
 from workers.statistics.intervals import student_t
 from workers.statistics.wording import number
+from workers.training.table import TableRow
 
 
 class Compatibility(Frozen):

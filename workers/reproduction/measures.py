@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from workers.reproduction.claims import Measure
 from workers.reproduction.results import SeedResult
 from workers.reproduction.rows import EVALUATE_EVERY
-from workers.reproduction.table import TableRow
 from workers.statistics.wording import Scale
+from workers.training.table import TableRow
 
 SCALES: Mapping[Measure, Scale] = {
     "success": Scale(unit="points", factor=100.0, decimals=1, margin=0.01, more_is_better=True),

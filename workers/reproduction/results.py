@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 from sim.config import Frozen
 from workers.reproduction.rows import DRIVES
-from workers.reproduction.table import TableRow
 from workers.statistics.intervals import Interval
 from workers.statistics.seeds import FailedSeeds, failed_seeds, mean_interval, success_rate
+from workers.training.table import TableRow
 
 LEARNED = 0.9
 """A training has learned its task once the frozen suite sees this success rate."""

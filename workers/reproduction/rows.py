@@ -11,7 +11,7 @@ from workers.config import (
     TrainingConfig,
 )
 from workers.presets import paper_ddpg, paper_ppo
-from workers.reproduction.table import TableRow
+from workers.training.table import TableRow
 
 STEPS = 600_000
 """Environment steps of every training: the paper does not give its own, so all methods get the same."""

@@ -13,7 +13,7 @@ from workers.errors import ArchiveError, OtherTrainingError
 from workers.reproduction.recorder import Recorder, evaluations, read_records, series
 from workers.reproduction.results import Progress, SeedResult, Trained, learned_at
 from workers.reproduction.rows import CURVE
-from workers.reproduction.table import TableRow
+from workers.training.table import TableRow
 from workers.training.trainer import train
 
 RESULT = "result.json"

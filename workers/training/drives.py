@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from sim.envs.vector import NavigationVectorEnv
-from workers.live.viewing import PolicyFunction
-from workers.reproduction.table import TableRow
+from workers.training.table import TableRow
 
 # Of the drives' own starts and targets, apart from every training's.
 _SEED = 1_000_003

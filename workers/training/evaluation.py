@@ -1,8 +1,8 @@
 """A policy on a frozen suite: one result per scenario."""
 
+from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from sim.suites import EpisodeTable, Suite, run_suite
-from workers.live.viewing import PolicyFunction
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
 
 # As `NavigationVectorEnv.outcomes` counts them, from 1.

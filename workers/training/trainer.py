@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from sim.arenas import with_maps_of
+from sim.arrays import PolicyFunction
 from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout
 from sim.suites import suite_for
@@ -22,7 +23,7 @@ from workers.archive_size import refuse_too_large
 from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, write_checkpoint
 from workers.config import TrainingConfig
 from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
-from workers.live.viewing import PolicyFunction, TrainingViewer, Unwatched
+from workers.live.viewing import TrainingViewer, Unwatched
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.networks.layout import layout
 from workers.policy import Policy, torch_policy
