@@ -2,18 +2,23 @@
 
 import hashlib
 import os
-from collections.abc import AsyncIterable, Iterator
+from collections.abc import AsyncIterable, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO, Any, cast
+from typing import IO, Any, TypeVar, TypeVarTuple, cast
 
 import fsspec
+from anyio import CapacityLimiter, to_thread
 from fsspec.implementations.local import LocalFileSystem
-from starlette.concurrency import run_in_threadpool
 
 from server.errors import CorruptUploadError, NotFoundError, ServiceError, TooLargeError
 from workers.checkpoints import sync_directory
 
+_T = TypeVar("_T")
+_Args = TypeVarTuple("_Args")
+
+# Of uploads: a store that takes its time keeps nobody from reading pages.
+_THREADS = 4
 _BLOCK = 256 * 1024
 _SUFFIX = ".zip"
 _TORN_SUFFIX = ".part"
@@ -51,6 +56,7 @@ class FileStore:
         except (ImportError, ValueError) as error:
             raise UnusableStoreError(f"Checkpoints can't be kept at {url} (MAPLESS_FILES_URL): {error}") from error
         self._max_bytes = max_bytes
+        self._limiter = CapacityLimiter(_THREADS)
         self._local = isinstance(self._filesystem, LocalFileSystem)
         self._filesystem.makedirs(self._root, exist_ok=True)
 
@@ -66,7 +72,7 @@ class FileStore:
         digest = hashlib.sha256()
         size = 0
         try:
-            file = cast("IO[bytes]", await run_in_threadpool(self._filesystem.open, torn, "wb"))
+            file = cast("IO[bytes]", await self._on_thread(self._filesystem.open, torn, "wb"))
             try:
                 async for block in stream:
                     size += len(block)
@@ -75,18 +81,21 @@ class FileStore:
                             f"The file is larger than {self._max_bytes} bytes (MAPLESS_MAX_CHECKPOINT_BYTES)."
                         )
                     digest.update(block)
-                    await run_in_threadpool(file.write, block)
-                await run_in_threadpool(self._sync, file)
+                    await self._on_thread(file.write, block)
+                await self._on_thread(self._sync, file)
             finally:
-                await run_in_threadpool(file.close)
+                await self._on_thread(file.close)
             if sha256 is not None and digest.hexdigest() != sha256.lower():
                 raise CorruptUploadError("What arrived does not have the SHA-256 that was announced: send it again.")
-            await run_in_threadpool(self._filesystem.mv, torn, path)
-            await run_in_threadpool(self._sync_root)
+            await self._on_thread(self._filesystem.mv, torn, path)
+            await self._on_thread(self._sync_root)
         except BaseException:
-            await run_in_threadpool(self._remove, torn)
+            await self._on_thread(self._remove, torn)
             raise
         return StoredFile(identifier, size, digest.hexdigest())
+
+    async def _on_thread(self, work: Callable[[*_Args], _T], *arguments: *_Args) -> _T:
+        return await to_thread.run_sync(work, *arguments, limiter=self._limiter)
 
     def open(self, identifier: str) -> IO[bytes]:
         """The archive as a file to read and seek in; the caller closes it.

@@ -3,10 +3,13 @@
 import asyncio
 import hashlib
 import os
+import threading
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+from starlette.concurrency import run_in_threadpool
 
 from server.errors import CorruptUploadError, NotFoundError, TooLargeError
 from server.files import FileStore, StoredFile, UnusableStoreError
@@ -111,3 +114,19 @@ def test_an_archive_and_its_name_are_on_disk_before_anybody_is_told_of_it(
         ((tmp_path / "abc.zip").stat().st_ino, ["abc.zip.part"]),
         (tmp_path.stat().st_ino, ["abc.zip"]),
     ]
+
+
+def test_a_store_that_takes_its_time_keeps_nobody_from_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = FileStore(str(tmp_path), 1_000)
+    done = threading.Event()
+    monkeypatch.setattr(store, "_sync", lambda file: done.wait(60))
+
+    async def uploads() -> None:
+        # As many as there are threads for readers, and more.
+        writing = [asyncio.create_task(store.write(f"{n:032x}", blocks(b"x"))) for n in range(60)]
+        await asyncio.sleep(0.2)
+        await asyncio.wait_for(run_in_threadpool(time.monotonic), 10)
+        done.set()
+        assert len(await asyncio.gather(*writing)) == 60
+
+    asyncio.run(uploads())
