@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium.spaces import Box, Space
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
@@ -75,7 +75,8 @@ class PointGoalEnv(NavigationEnv):
         return super()._info() | {"is_success": bool(self._world.robots.outcomes[0] == ARRIVAL)}
 
 
-class PointGoalVectorEnv(NavigationVectorEnv):
+# Some tools (skrl 2.1) know a Gymnasium environment by the modules of the classes that it names as its bases itself.
+class PointGoalVectorEnv(NavigationVectorEnv, VectorEnv[Floats, Floats, NDArray[Any]]):
     """Robots that drive to one target in every episode; see `sim.envs.vector.NavigationVectorEnv`.
 
     `infos["is_success"]` (N,) is there in every step, and where episodes ended in `infos["final_info"]` too.
