@@ -49,7 +49,7 @@ def test_every_operation_says_how_it_may_be_refused(document: dict[str, Any]) ->
 
 
 def test_the_workers_part_is_not_the_pages_business(document: dict[str, Any]) -> None:
-    assert [name for name, _ in operations(document) if "/api/worker" in name] == []
+    assert [name for name, _ in operations(document) if "/api/worker/" in name] == []
 
 
 def test_what_is_read_is_complete(document: dict[str, Any]) -> None:
