@@ -10,8 +10,8 @@ from benchmarks.report import finish, parser
 from sim.config import TaskConfig
 from sim.suites import load_suite, suite_names
 from sim.suites.scores import barn_score
-from workers.reference.build import CONTROLLERS
-from workers.reference.figures import figures as figures_of
+from workers.shipped.build import CONTROLLERS
+from workers.shipped.figures import figures as figures_of
 from workers.training.evaluation import to_result
 
 # Least success in percent.

@@ -1,4 +1,4 @@
-"""Reference policies against the dynamic window approach, scenario by scenario: the figures of docs/generalisation.md.
+"""Shipped policies against the dynamic window approach, scenario by scenario: the figures of docs/generalisation.md.
 
 python -m benchmarks.generalisation
 python -m benchmarks.generalisation --also seeds/1/thickets seeds/2/thickets
@@ -22,7 +22,7 @@ from sim.config import GeneratedArenaConfig, LidarConfig, MoversConfig, TaskConf
 from sim.suites import Suite, load_suite, run_controller, run_suite, suite_for, suite_in, suite_places
 from workers.checkpoints import read_policy
 from workers.policy import torch_policy
-from workers.reference.library import FOLDER, ReferencePolicy
+from workers.shipped.library import FOLDER, ShippedPolicy
 
 SUITES = ("clutter-500", "barn-20", "crowd-200")
 THICKETS = TaskConfig(arena=GeneratedArenaConfig(name="thicket", difficulty=0.9, seed=0))
@@ -55,7 +55,7 @@ def large_crowd() -> Suite:
     return suite_in(f"crowd-{CROWD}", suite_places("clutter", 0.3, CROWD, movers, first=FIRST_CROWD_MAP), CROWD)
 
 
-def arrivals(policy: ReferencePolicy, suite: Suite) -> NDArray[np.bool_]:
+def arrivals(policy: ShippedPolicy, suite: Suite) -> NDArray[np.bool_]:
     """Whether a policy arrived in each scenario: as recorded where it was measured on the suite, else driven now."""
     if suite.name in (result.suite for result in policy.card.results):
         return np.array([episode.outcome == "arrival" for episode in policy.evaluation(suite.name).episodes])
@@ -69,9 +69,9 @@ def main() -> None:
     arguments = parser(__doc__)
     arguments.add_argument("--also", nargs="*", type=Path, default=[], help="folders of more policies")
     options = arguments.parse_args()
-    policies = [(name, ReferencePolicy(FOLDER / name)) for name in POLICIES]
+    policies = [(name, ShippedPolicy(FOLDER / name)) for name in POLICIES]
     policies += [
-        (f"{path.name}, seed {policy.card.seed}", policy) for path in options.also for policy in [ReferencePolicy(path)]
+        (f"{path.name}, seed {policy.card.seed}", policy) for path in options.also for policy in [ShippedPolicy(path)]
     ]
     figures: dict[str, object] = {}
     for suite in (*map(load_suite, SUITES), suite_for(THICKETS), large_crowd()):

@@ -26,7 +26,7 @@ from sim.arenas import Arena, Mover
 from sim.config import FormulaTerm, ProximityTerm, RewardConfig, TaskConfig, TimeTerm, preset_terms
 from sim.kernels.commands import write_commands
 from sim.kernels.step import step_robots
-from sim.plain import ReferenceWorld
+from sim.plain import PlainWorld
 from sim.world import World
 
 TASK = TaskConfig()
@@ -104,14 +104,14 @@ def plain() -> Callable[[], None]:
     """One robot, one Space, public queries: `sim.plain`, with a reset when an attempt ends."""
     _, start = ours(1)
     rng = np.random.default_rng(0)
-    world: ReferenceWorld | None = None
+    world: PlainWorld | None = None
 
     def step() -> None:
         nonlocal world
         if world is None:
             start.reset()
             pose, target = start.robots.poses[0].tolist(), start.robots.targets[0].tolist()
-            world = ReferenceWorld(TASK, start.arenas[0], (pose[0], pose[1], pose[2]), (target[0], target[1]))
+            world = PlainWorld(TASK, start.arenas[0], (pose[0], pose[1], pose[2]), (target[0], target[1]))
         if world.step(float(rng.random()), float(rng.uniform(-1.0, 1.0))).outcome != "none":
             world = None
 

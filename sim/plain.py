@@ -52,7 +52,7 @@ class Step:
     outcome: Outcome
 
 
-class ReferenceWorld:
+class PlainWorld:
     """One robot that drives to one target.
 
     Args:

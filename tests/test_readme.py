@@ -10,7 +10,7 @@ import pytest
 
 from workers.checkpoints import Checkpoint, read_policy, write_checkpoint
 from workers.manifest import TrainingCounters
-from workers.reference.library import reference_policy
+from workers.shipped.library import shipped_policy
 
 ROOT = Path(__file__).parents[1]
 # What the arena and the README's lines need; versions are those that are locked.
@@ -32,7 +32,7 @@ def clean_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
     """A policy that was trained well, in an archive as one is written today."""
-    manifest, policy = read_policy(reference_policy("simple").archive)
+    manifest, policy = read_policy(shipped_policy("simple").archive)
     counters = TrainingCounters(step=manifest.step, updates=1, evaluations=1)
     path = tmp_path / "checkpoint.zip"
     write_checkpoint(path, Checkpoint(manifest, dict(policy.weights), {"none": np.zeros(1)}, counters))

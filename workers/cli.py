@@ -17,10 +17,10 @@ from workers.errors import WorkerError
 from workers.export.command import export
 from workers.frames import Frame
 from workers.presets import PRESETS, preset
-from workers.reference.command import app as policies
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.command import reproduce
 from workers.runtime.worker import worker
+from workers.shipped.command import app as policies
 from workers.statistics.seeds import failed_seeds, success_rate
 
 app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)

@@ -8,7 +8,7 @@ WorkerError
 │   ├── InterruptedCampaignError  it was asked to stop, or a process was killed: it can be continued
 │   └── OtherTrainingError        its directory is that of another campaign
 ├── ExportError            a policy cannot be taken to another format
-├── UnknownPolicyError     there is no such reference policy
+├── UnknownPolicyError     there is no such shipped policy
 ├── EpisodesTooLongError   episodes do not fit into memory to be replayed
 ├── LocalError             something is wrong with this worker or its machine, not with the run
 │   ├── NoDeviceError          it does not have the device that the training asks for
@@ -59,7 +59,7 @@ class ExportError(WorkerError):
 
 
 class UnknownPolicyError(WorkerError):
-    """There is no reference policy of that name, or none that was measured on that suite."""
+    """There is no shipped policy of that name, or none that was measured on that suite."""
 
 
 class EpisodesTooLongError(WorkerError):

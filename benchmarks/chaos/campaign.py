@@ -87,7 +87,7 @@ class Campaign:
 
     def run(self) -> Outcome:
         """Train undisturbed, then disturbed, until all faults are injected and all runs have ended."""
-        self._train_references()
+        self._train_recipes()
         while len(self.outcome.injected) < self._faults:
             self._revive()
             self._round(self._draw())
@@ -96,7 +96,7 @@ class Campaign:
 
     # -- runs -------------------------------------------------------------------------------------------------------------
 
-    def _train_references(self) -> None:
+    def _train_recipes(self) -> None:
         for seed in range(self._side_by_side):
             self.outcome.references[seed] = self._stack.launch(self._training, seed)
         self._say(f"{self._side_by_side} undisturbed runs")

@@ -58,13 +58,13 @@ async def change_live(subject: WatchedDep, settings: LiveSettings, services: Ser
 
 @router.get("/api/policies/{name}/live", responses=NOT_FOUND)
 async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep) -> LiveState:
-    """What the live view of a reference policy shows."""
+    """What the live view of a shipped policy shows."""
     return _state(subject, services)
 
 
 @router.put("/api/policies/{name}/live", responses=NOT_FOUND)
 async def change_policy_live(subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
-    """Change what the live view of a reference policy shows, for everyone who watches it."""
+    """Change what the live view of a shipped policy shows, for everyone who watches it."""
     services.live.configure(subject.id, settings)
     return _state(subject, services)
 

@@ -22,7 +22,7 @@ _POLICY = "policy-"
 
 
 def policy_view(name: str) -> str:
-    """Under which the live view of a reference policy goes."""
+    """Under which the live view of a shipped policy goes."""
     return f"{_POLICY}{name}"
 
 

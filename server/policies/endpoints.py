@@ -6,10 +6,10 @@ from fastapi.responses import FileResponse
 from server.exports.response import BundleResponse
 from server.exports.service import bundle_of
 from server.policies import service
-from server.policies.schemas import PolicyEpisodes, ReferencePolicy
+from server.policies.schemas import PolicyEpisodes, ShippedPolicy
 from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
 from server.services import ServicesDep
-from workers.reference.library import reference_policies
+from workers.shipped.library import shipped_policies
 
 router = APIRouter(prefix="/api/policies", tags=["policies"])
 
@@ -17,13 +17,13 @@ _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "str
 
 
 @router.get("")
-def list_policies() -> list[ReferencePolicy]:
+def list_policies() -> list[ShippedPolicy]:
     """Trained policies that ship with the project, to watch, to drive and to compare with."""
-    return [service.view(policy) for policy in reference_policies()]
+    return [service.view(policy) for policy in shipped_policies()]
 
 
 @router.get("/{name}", responses=NOT_FOUND)
-def get_policy(name: str) -> ReferencePolicy:
+def get_policy(name: str) -> ShippedPolicy:
     """One of them."""
     return service.view(service.find(name))
 

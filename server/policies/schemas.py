@@ -1,4 +1,4 @@
-"""Reference policies in JSON."""
+"""Shipped policies in JSON."""
 
 from pydantic import Field
 
@@ -27,7 +27,7 @@ class SuiteResult(Schema):
     baselines: list[SuiteRow]
 
 
-class ReferencePolicy(Schema):
+class ShippedPolicy(Schema):
     """A trained policy that ships with the project."""
 
     name: str = Field(description="In addresses and on the command line.")
@@ -42,7 +42,7 @@ class ReferencePolicy(Schema):
 
 
 class PolicyEpisodes(Schema):
-    """Every episode of a reference policy on a suite, in the suite's order."""
+    """Every episode of a shipped policy on a suite, in the suite's order."""
 
     suite: str
     suite_hash: str

@@ -2,28 +2,28 @@
 
 from server.errors import NotFoundError
 from server.estimates import success_estimate
-from server.policies.schemas import PolicyEpisodes, ReferencePolicy, SuiteResult, SuiteRow
+from server.policies.schemas import PolicyEpisodes, ShippedPolicy, SuiteResult, SuiteRow
 from workers.errors import UnknownPolicyError
-from workers.reference import library
-from workers.reference.figures import Figures
+from workers.shipped import library
+from workers.shipped.figures import Figures
 
 
-def find(name: str) -> library.ReferencePolicy:
+def find(name: str) -> library.ShippedPolicy:
     """The policy of that name.
 
     Raises:
         NotFoundError: there is none.
     """
     try:
-        return library.reference_policy(name)
+        return library.shipped_policy(name)
     except UnknownPolicyError as error:
-        raise NotFoundError.of("reference policy", name) from error
+        raise NotFoundError.of("shipped policy", name) from error
 
 
-def view(policy: library.ReferencePolicy) -> ReferencePolicy:
+def view(policy: library.ShippedPolicy) -> ShippedPolicy:
     """A policy in JSON, with the baselines on its suites."""
     card = policy.card
-    return ReferencePolicy(
+    return ShippedPolicy(
         name=card.name,
         title=card.title,
         description=card.description,

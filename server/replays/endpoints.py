@@ -65,7 +65,7 @@ async def replay_checkpoint(
 async def replay_policy(
     name: str, suite: str, subject: PolicyDep, episode: int, service: ReplayServiceDep, services: ServicesDep
 ) -> Replay:
-    """Drive an episode of a reference policy again: a few seconds for the first one, then at once."""
+    """Drive an episode of a shipped policy again: a few seconds for the first one, then at once."""
     page = f"/replays/policies/{name}/{suite}/{episode}/"
     return await services.lanes.replays.run(service.prepare, subject, episode, page)
 
@@ -80,5 +80,5 @@ async def play_checkpoint(
 
 @router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False)
 async def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, player: PlayerDep) -> Response:
-    """The player of an episode of a reference policy."""
+    """The player of an episode of a shipped policy."""
     return await player(request, subject, episode, theme)

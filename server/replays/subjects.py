@@ -1,4 +1,4 @@
-"""Finds whose episodes are to be replayed: a checkpoint's or a reference policy's."""
+"""Finds whose episodes are to be replayed: a checkpoint's or a shipped policy's."""
 
 import hashlib
 from pathlib import Path
@@ -32,7 +32,7 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
 
 
 def policy_subject(name: str, suite: str) -> Subject:
-    """A reference policy on one of its suites.
+    """A shipped policy on one of its suites.
 
     Raises:
         NotFoundError: there is no such policy, or it was not measured on that suite.

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.browser
 
 # Milliseconds: two busy cores, and rendering in software.
 SOON = 90_000
-# An episode of a reference policy: nothing has to be trained.
+# An episode of a shipped policy: nothing has to be trained.
 EPISODE = "policies/complex/complex-200/7"
 
 

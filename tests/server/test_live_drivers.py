@@ -17,10 +17,10 @@ from server.live.view import LiveView
 from server.services import Services
 from tests.server.harness import Reports
 from tests.server.test_live import Asked, connect, make_frame, receive_until, refused
-from workers.reference.library import reference_policy
 from workers.reporting import EvaluationResult
+from workers.shipped.library import shipped_policy
 
-POLICY = reference_policy("complex")
+POLICY = shipped_policy("complex")
 RECORDED = POLICY.evaluation("complex-200")
 
 

@@ -6,15 +6,15 @@ import zipfile
 import pytest
 from fastapi.testclient import TestClient
 
-from workers.reference.library import reference_policies, reference_policy
+from workers.shipped.library import shipped_policies, shipped_policy
 
 
 def test_every_policy_stands_beside_the_baselines_of_its_suites(client: TestClient) -> None:
     policies = {policy["name"]: policy for policy in client.get("/api/policies").json()}
-    assert policies.keys() == {policy.card.name for policy in reference_policies()}
+    assert policies.keys() == {policy.card.name for policy in shipped_policies()}
     for name, policy in policies.items():
         assert client.get(f"/api/policies/{name}").json() == policy
-        card = reference_policy(name).card
+        card = shipped_policy(name).card
         assert [result["suite"] for result in policy["results"]] == [result.suite for result in card.results]
         for result, recorded in zip(policy["results"], card.results, strict=True):
             assert result["policy"]["success"]["value"] == recorded.figures.success
@@ -34,7 +34,7 @@ def test_every_figure_leads_to_its_episodes(client: TestClient) -> None:
 
 def test_a_policy_is_taken_away_as_a_checkpoint_and_as_a_bundle(client: TestClient) -> None:
     archive = client.get("/api/policies/simple/download")
-    assert archive.content == reference_policy("simple").archive.read_bytes()
+    assert archive.content == shipped_policy("simple").archive.read_bytes()
     assert archive.headers["content-disposition"] == 'attachment; filename="mapless-simple.zip"'
     bundle = client.get("/api/policies/simple/bundle")
     assert 'filename="mapless-simple-bundle.zip"' in bundle.headers["content-disposition"]

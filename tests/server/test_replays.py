@@ -22,10 +22,10 @@ from server.replays.subjects import policy_subject
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN
-from workers.reference.library import reference_policy
 from workers.reporting import EpisodeResult, EvaluationResult
+from workers.shipped.library import shipped_policy
 
-POLICY = reference_policy("complex")
+POLICY = shipped_policy("complex")
 RECORDED = POLICY.evaluation("complex-200")
 
 
@@ -105,7 +105,7 @@ def test_all_episodes_after_the_first_come_at_once(client: TestClient, checkpoin
     assert {path: path.stat().st_ino for path in kept.iterdir()} == files
 
 
-def test_a_reference_policy_is_replayed_too(client: TestClient) -> None:
+def test_a_shipped_policy_is_replayed_too(client: TestClient) -> None:
     replay = client.get("/api/policies/complex/suites/complex-200/replays/199").json()
     assert replay["suite"] == "complex-200"
     assert replay["steps"] == RECORDED.episodes[199].steps

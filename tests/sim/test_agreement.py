@@ -27,7 +27,7 @@ from sim.config import (
 )
 from sim.errors import ArenaError
 from sim.kernels.records import ARRIVAL, COLLISION, NONE, TIMEOUT
-from sim.plain import ReferenceWorld, exact_arc
+from sim.plain import PlainWorld, exact_arc
 from sim.world import World
 from tests.sim.scenes import arenas
 
@@ -79,7 +79,7 @@ def test_observations_rewards_and_outcomes_agree(
         assume(False)
     world.reset()
     pose, target = world.robots.poses[0].astype(float), world.robots.targets[0].astype(float)
-    plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]), world.fields_of_view[0])
+    plain = PlainWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]), world.fields_of_view[0])
     actions = np.repeat(rng.uniform([0.3, -1.0], 1.0, (10, 2)), 6, axis=0).astype(np.float32)
     for linear, angular in actions.tolist():
         expected = plain.step(linear, angular)
@@ -164,7 +164,7 @@ def test_collision_flags_are_those_of_chipmunk(arena: Arena, seed: int) -> None:
     world.reset(poses=poses)
     world.step(np.tile(np.array([[1.0, 0.0]], dtype=np.float32), (len(poses), 1)))
     for i, pose in enumerate(poses.astype(np.float32).astype(float).tolist()):
-        plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (0.0, 0.0))
+        plain = PlainWorld(task, arena, (pose[0], pose[1], pose[2]), (0.0, 0.0))
         plain.step(1.0, 0.0)
         touching = bool(plain.space.shape_query(plain.shape))
         if abs(plain.clearance()) > 1e-4 and world.robots.outcomes[i] != ARRIVAL:

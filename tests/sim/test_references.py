@@ -15,7 +15,7 @@ from sim.config import TaskConfig
 from sim.envs.point_goal import PointGoalVectorEnv
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.records import ARRIVAL
-from sim.plain import ReferenceWorld
+from sim.plain import PlainWorld
 from tests.references import check, digest
 
 FILE = Path(__file__).parent / "references.json"
@@ -126,7 +126,7 @@ def test_a_point_goals_steps_are_those_that_were_recorded() -> None:
 
 
 def hold_against_the_plain_twin(task: TaskConfig) -> None:
-    """Robots of the task without movers, disturbances and frames, each beside its `ReferenceWorld`, to their first end."""
+    """Robots of the task without movers, disturbances and frames, each beside its `PlainWorld`, to their first end."""
     plain_task = TaskConfig.model_validate(
         {
             "arena": COMPLEX,
@@ -140,9 +140,7 @@ def hold_against_the_plain_twin(task: TaskConfig) -> None:
     envs.reset(seed=11)
     arena = build_task_arenas(plain_task)[0]
     poses, targets = envs.poses.astype(float).tolist(), envs.targets.astype(float).tolist()
-    twins = [
-        ReferenceWorld(plain_task, arena, tuple(pose), tuple(target)) for pose, target in zip(poses, targets, strict=True)
-    ]
+    twins = [PlainWorld(plain_task, arena, tuple(pose), tuple(target)) for pose, target in zip(poses, targets, strict=True)]
     going = set(range(ROBOTS))
     for drawn in actions(7):
         action = steered(envs, drawn)

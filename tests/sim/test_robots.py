@@ -24,7 +24,7 @@ from sim.envs.render import render_robot
 from sim.errors import PlacementError, SuiteError
 from sim.footprint import rectangle_clearance
 from sim.physics import add_arena, robot_body
-from sim.plain import ReferenceWorld
+from sim.plain import PlainWorld
 from sim.scan import body_clearances, clearances
 from sim.suites import load_suite, run_suite, suite_for
 from sim.world import World
@@ -91,7 +91,7 @@ def test_collisions_of_a_driving_rectangle_are_those_of_chipmunk(arena: Arena, s
     world.reset(poses=poses)
     world.step(np.tile(np.array([[1.0, 0.5]], dtype=np.float32), (len(poses), 1)))
     for i, pose in enumerate(poses.astype(np.float32).astype(float).tolist()):
-        plain = ReferenceWorld(task, arena, (pose[0], pose[1], pose[2]), (0.0, 0.0))
+        plain = PlainWorld(task, arena, (pose[0], pose[1], pose[2]), (0.0, 0.0))
         plain.step(1.0, 0.5)
         if abs(plain.clearance()) > TOLERANCE and world.robots.outcomes[i] != 1:
             touching = bool(plain.space.shape_query(plain.shape))

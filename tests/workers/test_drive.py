@@ -10,11 +10,11 @@ import pytest
 
 from workers.frames import Frame
 from workers.live.drive import LENGTH_BYTES
-from workers.reference.library import reference_policy
 from workers.reporting import WatchRequest
+from workers.shipped.library import shipped_policy
 
 ROOT = Path(__file__).parents[2]
-POLICY = reference_policy("complex")
+POLICY = shipped_policy("complex")
 
 
 class Driver:

@@ -10,13 +10,13 @@ from sim.suites import load_suite
 from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
 from workers.policy import torch_policy
-from workers.reference.library import reference_policy
 from workers.replays import record as recorder
 from workers.replays.record import record
 from workers.replays.recording import Recording
+from workers.shipped.library import shipped_policy
 from workers.training.evaluation import evaluate
 
-POLICY = reference_policy("complex")
+POLICY = shipped_policy("complex")
 SUITE = load_suite("complex-200")
 
 

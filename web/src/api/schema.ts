@@ -454,12 +454,12 @@ export interface paths {
         };
         /**
          * Get Policy Live
-         * @description What the live view of a reference policy shows.
+         * @description What the live view of a shipped policy shows.
          */
         get: operations["get_policy_live_api_policies__name__live_get"];
         /**
          * Change Policy Live
-         * @description Change what the live view of a reference policy shows, for everyone who watches it.
+         * @description Change what the live view of a shipped policy shows, for everyone who watches it.
          */
         put: operations["change_policy_live_api_policies__name__live_put"];
         post?: never;
@@ -498,7 +498,7 @@ export interface paths {
         };
         /**
          * Replay Policy
-         * @description Drive an episode of a reference policy again: a few seconds for the first one, then at once.
+         * @description Drive an episode of a shipped policy again: a few seconds for the first one, then at once.
          */
         get: operations["replay_policy_api_policies__name__suites__suite__replays__episode__get"];
         put?: never;
@@ -3131,7 +3131,7 @@ export interface components {
         };
         /**
          * PolicyEpisodes
-         * @description Every episode of a reference policy on a suite, in the suite's order.
+         * @description Every episode of a shipped policy on a suite, in the suite's order.
          */
         PolicyEpisodes: {
             /** Episodes */
@@ -3660,41 +3660,6 @@ export interface components {
              * @default 0.4
              */
             width: number;
-        };
-        /**
-         * ReferencePolicy
-         * @description A trained policy that ships with the project.
-         */
-        ReferencePolicy: {
-            /**
-             * Command
-             * @description What made it.
-             */
-            command: string;
-            /** Description */
-            description: string;
-            /**
-             * Name
-             * @description In addresses and on the command line.
-             */
-            name: string;
-            /** Results */
-            results: components["schemas"]["SuiteResult"][];
-            /** Seed */
-            seed: number;
-            /**
-             * Size
-             * @description Bytes of its archive.
-             */
-            size: number;
-            /**
-             * Step
-             * @description Environment steps after which it was kept: the best on the first of its suites.
-             */
-            step: number;
-            /** Title */
-            title: string;
-            training: components["schemas"]["TrainingConfig-Output"];
         };
         /**
          * Replay
@@ -4278,6 +4243,41 @@ export interface components {
             steps: number[];
             /** Values */
             values: (number | null)[];
+        };
+        /**
+         * ShippedPolicy
+         * @description A trained policy that ships with the project.
+         */
+        ShippedPolicy: {
+            /**
+             * Command
+             * @description What made it.
+             */
+            command: string;
+            /** Description */
+            description: string;
+            /**
+             * Name
+             * @description In addresses and on the command line.
+             */
+            name: string;
+            /** Results */
+            results: components["schemas"]["SuiteResult"][];
+            /** Seed */
+            seed: number;
+            /**
+             * Size
+             * @description Bytes of its archive.
+             */
+            size: number;
+            /**
+             * Step
+             * @description Environment steps after which it was kept: the best on the first of its suites.
+             */
+            step: number;
+            /** Title */
+            title: string;
+            training: components["schemas"]["TrainingConfig-Output"];
         };
         /**
          * SmoothnessTerm
@@ -6372,7 +6372,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ReferencePolicy"][];
+                    "application/json": components["schemas"]["ShippedPolicy"][];
                 };
             };
             /** @description No valid login */
@@ -6403,7 +6403,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ReferencePolicy"];
+                    "application/json": components["schemas"]["ShippedPolicy"];
                 };
             };
             /** @description No valid login */

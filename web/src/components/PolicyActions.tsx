@@ -1,12 +1,12 @@
 /** What can be done with a shipped policy: take it away, or train one like it. */
 import { Button, Menu } from '@mantine/core'
 import { Link } from 'react-router'
-import type { ReferencePolicy } from '../api/types'
+import type { ShippedPolicy } from '../api/types'
 import { fileSize } from '../lib/format'
 import { IconCopy, IconDownload } from './icons'
 
 interface PolicyActionsProps {
-  policy: ReferencePolicy
+  policy: ShippedPolicy
   size?: 'xs' | 'sm'
 }
 

@@ -2,7 +2,7 @@
 import { SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { $api } from '../api/client'
-import type { ReferencePolicy } from '../api/types'
+import type { ShippedPolicy } from '../api/types'
 import { byInterest } from '../lib/episodes'
 import { useNumberInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
@@ -11,7 +11,7 @@ import { Panel } from './ui'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
 
-export function PolicyEpisodes({ policy }: { policy: ReferencePolicy }) {
+export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
   const suites = policy.results.map((result) => result.suite)
   const [suite, setSuite] = useState(suites[0] ?? '')
   const [episode, setEpisode] = useNumberInAddress('episode')

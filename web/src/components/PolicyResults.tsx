@@ -1,13 +1,13 @@
 /** A shipped policy on its suites, beside what needs no training. */
 import { Table } from '@mantine/core'
-import type { ReferencePolicy } from '../api/types'
+import type { ShippedPolicy } from '../api/types'
 import { percent, significant, words } from '../lib/format'
 import table from './ExperimentTable.module.css'
 import { SuccessEstimate } from './MeasuredEstimate'
 import ui from './ui.module.css'
 
 interface PolicyResultsProps {
-  results: ReferencePolicy['results']
+  results: ShippedPolicy['results']
 }
 
 export function PolicyResults({ results }: PolicyResultsProps) {

@@ -5,7 +5,7 @@ import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
-import type { Experiment, Preset, ReferencePolicy } from '../api/types'
+import type { Experiment, Preset, ShippedPolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
@@ -92,7 +92,7 @@ function withArena(defaults: unknown, chosen: string | null): Json | undefined {
 }
 
 /** The training that made a shipped policy. */
-function likePolicy(policy: ReferencePolicy | undefined): Json | undefined {
+function likePolicy(policy: ShippedPolicy | undefined): Json | undefined {
   if (!policy) return undefined
   const { title, seed, training } = policy
   return { name: `Like “${title}”`, seeds: [seed], training: training as unknown as Json }

@@ -52,7 +52,7 @@ test('a policy drives at once, beside how it was made', async () => {
   const server = startServer({ ...routes, 'PUT /api/policies/crowd/live': live })
   const { user } = open('/policies/crowd')
   expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/policy-crowd/')
-  expect(screen.getByText('python -m workers.reference.build crowd')).toBeInTheDocument()
+  expect(screen.getByText('python -m workers.shipped.build crowd')).toBeInTheDocument()
   expect(screen.getByText(/Step 250\s000 of 300\s000, the best on simple-200/)).toBeInTheDocument()
   const controls = screen.getByRole('group', { name: 'Live view' })
   await waitFor(() => expect(within(controls).getByRole('radio', { name: '5×' })).toBeEnabled())

@@ -2,7 +2,7 @@
 import { Button, Skeleton, Text } from '@mantine/core'
 import { Link } from 'react-router'
 import { $api } from '../api/client'
-import type { ReferencePolicy } from '../api/types'
+import type { ShippedPolicy } from '../api/types'
 import { ArenaPicture } from '../components/ArenaPicture'
 import { IconPlayerPlay } from '../components/icons'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
@@ -43,7 +43,7 @@ export function PoliciesPage() {
   )
 }
 
-function PolicyCard({ policy }: { policy: ReferencePolicy }) {
+function PolicyCard({ policy }: { policy: ShippedPolicy }) {
   const page = `/policies/${policy.name}`
   return (
     <li className={classes.card} data-testid="policy">
@@ -80,7 +80,7 @@ function PolicyCard({ policy }: { policy: ReferencePolicy }) {
   )
 }
 
-type Row = ReferencePolicy['results'][number]['policy']
+type Row = ShippedPolicy['results'][number]['policy']
 
 /** A suite's line: the policy, and the best of what needs no training. */
 function Result({ suite, row, baseline }: { suite: string; row: Row; baseline: Row | undefined }) {

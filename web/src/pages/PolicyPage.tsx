@@ -2,7 +2,7 @@
 import { Anchor, Group, Skeleton, Stack, Text } from '@mantine/core'
 import { Link, useParams } from 'react-router'
 import { $api } from '../api/client'
-import type { ReferencePolicy } from '../api/types'
+import type { ShippedPolicy } from '../api/types'
 import { Configuration } from '../components/Configuration'
 import { PolicyLiveView } from '../components/LiveView'
 import { PolicyActions } from '../components/PolicyActions'
@@ -36,7 +36,7 @@ export function PolicyPage() {
   )
 }
 
-function LoadedPolicy({ policy }: { policy: ReferencePolicy }) {
+function LoadedPolicy({ policy }: { policy: ShippedPolicy }) {
   const [episode] = useNumberInAddress('episode')
   return (
     <Page

@@ -10,11 +10,11 @@ import type {
   Experiment,
   ListedExperiment,
   LiveState,
-  ReferencePolicy,
   Replay,
   Reproduction,
   Run,
   RunDetail,
+  ShippedPolicy,
   Status,
 } from '../api/types'
 
@@ -232,11 +232,11 @@ const row = (name: string, value: number, episodes = 200) => ({
   steps: 92.4,
 })
 
-export const policy: ReferencePolicy = {
+export const policy: ShippedPolicy = {
   name: 'crowd',
   title: 'Crowd',
   description: 'Drives between 17 obstacles.',
-  command: 'python -m workers.reference.build crowd',
+  command: 'python -m workers.shipped.build crowd',
   training,
   seed: 7,
   step: 250_000,

@@ -14,14 +14,14 @@ from workers.config import PpoConfig, TrainingConfig
 from workers.errors import ArchiveIntegrityError
 from workers.export.bundle import export_checkpoint
 from workers.policy import torch_policy
-from workers.reference.build import BestCheckpoint, build, main
-from workers.reference.figures import figures
-from workers.reference.library import FOLDER, ReferencePolicy, baselines, reference_policies, reference_policy
-from workers.reference.recipes import RECIPES, Recipe, recipe
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
+from workers.shipped.build import BestCheckpoint, build, main
+from workers.shipped.figures import figures
+from workers.shipped.library import FOLDER, ShippedPolicy, baselines, shipped_policies, shipped_policy
+from workers.shipped.recipes import RECIPES, Recipe, recipe
 from workers.training.evaluation import evaluate, evaluation_metrics
 
-POLICIES = [pytest.param(policy, id=policy.card.name) for policy in reference_policies()]
+POLICIES = [pytest.param(policy, id=policy.card.name) for policy in shipped_policies()]
 # Another processor rounds otherwise, and an episode on the edge may end otherwise.
 ODD_EPISODES = 0.02
 
@@ -33,13 +33,13 @@ def episode(outcome: Outcome, steps: int = 10, path: float = 2.0, shortest: floa
 
 
 def test_every_recipe_ships_with_its_policy() -> None:
-    assert [policy.card.name for policy in reference_policies()] == [each.name for each in RECIPES]
+    assert [policy.card.name for policy in shipped_policies()] == [each.name for each in RECIPES]
     assert {path.name for path in FOLDER.iterdir()} == {each.name for each in RECIPES}
     assert sum(file.stat().st_size for file in FOLDER.rglob("*") if file.is_file()) < 2**20
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_a_card_tells_what_was_trained_and_how(policy: ReferencePolicy) -> None:
+def test_a_card_tells_what_was_trained_and_how(policy: ShippedPolicy) -> None:
     card, manifest, made_from = policy.card, read_manifest(policy.archive), recipe(policy.card.name)
     assert (card.training, card.seed, card.step) == (manifest.training, manifest.seed, manifest.step)
     assert (card.title, card.description, card.training, card.seed) == (
@@ -48,13 +48,13 @@ def test_a_card_tells_what_was_trained_and_how(policy: ReferencePolicy) -> None:
         made_from.training,
         made_from.seed,
     )
-    assert card.command == f"python -m workers.reference.build {card.name}"
+    assert card.command == f"python -m workers.shipped.build {card.name}"
     assert tuple(result.suite for result in card.results) == made_from.suites
     assert made_from.suites[0] == suite_for(made_from.training.task).name
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_figures_are_those_of_the_episodes_on_the_suite_of_today(policy: ReferencePolicy) -> None:
+def test_figures_are_those_of_the_episodes_on_the_suite_of_today(policy: ShippedPolicy) -> None:
     for result in policy.card.results:
         evaluation = policy.evaluation(result.suite)
         assert evaluation.suite_hash == result.suite_hash == suite_named(result.suite, policy.card.training.task).hash
@@ -62,7 +62,7 @@ def test_figures_are_those_of_the_episodes_on_the_suite_of_today(policy: Referen
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_evaluating_a_policy_again_gives_its_recorded_result(policy: ReferencePolicy) -> None:
+def test_evaluating_a_policy_again_gives_its_recorded_result(policy: ShippedPolicy) -> None:
     manifest, numpy_policy = read_policy(policy.archive)
     act = torch_policy(numpy_policy.network, numpy_policy.weights)
     name = policy.card.results[0].suite
@@ -73,7 +73,7 @@ def test_evaluating_a_policy_again_gives_its_recorded_result(policy: ReferencePo
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_a_policy_leaves_the_house_as_it_was_trained(policy: ReferencePolicy) -> None:
+def test_a_policy_leaves_the_house_as_it_was_trained(policy: ShippedPolicy) -> None:
     report = export_checkpoint(policy.archive).report
     assert report.rows == 1000
     assert report.policy_difference <= 1e-5
@@ -81,12 +81,12 @@ def test_a_policy_leaves_the_house_as_it_was_trained(policy: ReferencePolicy) ->
 
 def test_a_policy_is_not_for_resuming() -> None:
     with pytest.raises(ArchiveIntegrityError, match="cannot be resumed"):
-        read_checkpoint(reference_policy("simple").archive)
+        read_checkpoint(shipped_policy("simple").archive)
 
 
 def test_baselines_are_those_of_the_suites_of_today() -> None:
     hashes = {name: load_suite(name).hash for name in suite_names()}
-    hashes |= {result.suite: result.suite_hash for policy in reference_policies() for result in policy.card.results}
+    hashes |= {result.suite: result.suite_hash for policy in shipped_policies() for result in policy.card.results}
     for baseline in baselines().baselines:
         assert {result.suite: result.suite_hash for result in baseline.results} == hashes
     task, suite = TaskConfig(), load_suite("complex-200")
@@ -169,13 +169,13 @@ def test_what_to_build_has_to_be_named(arguments: list[str], answer: str, capsys
 def test_the_command_lists_and_copies(tmp_path: Path) -> None:
     listed = CliRunner().invoke(app, ["policies", "list"])
     assert listed.exit_code == 0
-    for policy in reference_policies():
+    for policy in shipped_policies():
         assert f"{policy.card.name}: {policy.card.description}" in listed.output
         for result in policy.card.results:
             assert f"{result.suite}: {result.figures.success:.1%} success" in listed.output
     copied = CliRunner().invoke(app, ["policies", "export", "simple", "--out", str(tmp_path / "mine.zip")])
     assert copied.exit_code == 0
-    assert (tmp_path / "mine.zip").read_bytes() == reference_policy("simple").archive.read_bytes()
+    assert (tmp_path / "mine.zip").read_bytes() == shipped_policy("simple").archive.read_bytes()
     unknown = CliRunner().invoke(app, ["policies", "export", "nobody"])
     assert unknown.exit_code == 1
     assert "choose one of" in unknown.output

@@ -1,8 +1,8 @@
-"""Trains reference policies from their recipes, measures them, and writes the files that ship.
+"""Trains shipped policies from their recipes, measures them, and writes the files that ship.
 
-    python -m workers.reference.build NAME ...     # these policies
-    python -m workers.reference.build --baselines  # what they are compared with
-    python -m workers.reference.build NAME --seed 1 --folder elsewhere  # what another seed would have made
+    python -m workers.shipped.build NAME ...     # these policies
+    python -m workers.shipped.build --baselines  # what they are compared with
+    python -m workers.shipped.build NAME --seed 1 --folder elsewhere  # what another seed would have made
 
 The same recipe gives the same files on the same machine; another processor rounds otherwise, and trains another policy.
 """
@@ -23,8 +23,9 @@ from sim.suites import EpisodeTable, Suite, load_suite, run_controller, run_suit
 from workers.checkpoints import copy_policy, read_policy
 from workers.frames import Frame
 from workers.policy import torch_policy
-from workers.reference.figures import figures
-from workers.reference.library import (
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.shipped.figures import figures
+from workers.shipped.library import (
     ARCHIVE,
     BASELINES,
     CARD,
@@ -34,8 +35,7 @@ from workers.reference.library import (
     Card,
     SuiteFigures,
 )
-from workers.reference.recipes import RECIPES, Recipe, recipe
-from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+from workers.shipped.recipes import RECIPES, Recipe, recipe
 from workers.training.evaluation import evaluate, to_result
 from workers.training.trainer import train
 
@@ -47,7 +47,7 @@ CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {
 }
 """The baselines, of the default task: what each does in a suite."""
 
-_COMMAND = "python -m workers.reference.build"
+_COMMAND = "python -m workers.shipped.build"
 _DECIMALS = 4  # of lengths and rewards in the files: tenths of a millimetre
 
 
@@ -165,7 +165,7 @@ def _write(path: Path, content: BaseModel, indent: int | None = None) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     known = ", ".join(each.name for each in RECIPES)
-    parser = argparse.ArgumentParser(prog=_COMMAND, description="Train, measure and write reference policies.")
+    parser = argparse.ArgumentParser(prog=_COMMAND, description="Train, measure and write shipped policies.")
     # No `choices`: Python 3.11 would look for the empty list among them.
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"Which policies: {known}.")
     parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with.")

@@ -7,7 +7,7 @@ import typer
 
 from workers.errors import WorkerError
 from workers.export.command import ExportFormat, export
-from workers.reference.library import ReferencePolicy, reference_policies, reference_policy
+from workers.shipped.library import ShippedPolicy, shipped_policies, shipped_policy
 
 app = typer.Typer(help="The trained policies that ship with Mapless.", no_args_is_help=True)
 
@@ -15,7 +15,7 @@ app = typer.Typer(help="The trained policies that ship with Mapless.", no_args_i
 @app.command(name="list")
 def list_policies() -> None:
     """Show them, and how they did on frozen suites."""
-    for policy in reference_policies():
+    for policy in shipped_policies():
         card = policy.card
         typer.echo(f"{card.name}: {card.description}\n  {policy.archive}\n  made by: {card.command}")
         for result in card.results:
@@ -45,9 +45,9 @@ def export_policy(
     typer.echo(str(path))
 
 
-def _named(name: str) -> ReferencePolicy:
+def _named(name: str) -> ShippedPolicy:
     try:
-        return reference_policy(name)
+        return shipped_policy(name)
     except WorkerError as error:
         typer.echo(f"mapless: {error}", err=True)
         raise typer.Exit(1) from None

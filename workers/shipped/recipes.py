@@ -1,4 +1,4 @@
-"""What each reference policy is trained from: the one table to change (pydantic only)."""
+"""What each shipped policy is trained from: the one table to change (pydantic only)."""
 
 from sim.config import Frozen, GeneratedArenaConfig, LidarConfig, MoversConfig, RewardConfig, TaskConfig
 from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
@@ -108,4 +108,4 @@ def recipe(name: str) -> Recipe:
     for candidate in RECIPES:
         if candidate.name == name:
             return candidate
-    raise KeyError(f"no reference policy {name!r}: choose one of {', '.join(each.name for each in RECIPES)}")
+    raise KeyError(f"no shipped policy {name!r}: choose one of {', '.join(each.name for each in RECIPES)}")

@@ -1,4 +1,4 @@
-"""The reference policies as files: what there is, and where (pydantic only: the server lists them)."""
+"""The shipped policies as files: what there is, and where (pydantic only: the server lists them)."""
 
 from functools import cache
 from pathlib import Path
@@ -6,9 +6,9 @@ from pathlib import Path
 from sim.config import Frozen
 from workers.config import TrainingConfig
 from workers.errors import UnknownPolicyError
-from workers.reference.figures import Figures
-from workers.reference.recipes import RECIPES
 from workers.reporting import EvaluationResult
+from workers.shipped.figures import Figures
+from workers.shipped.recipes import RECIPES
 
 FOLDER = Path(__file__).parent / "policies"
 BASELINES = Path(__file__).parent / "baselines.json"
@@ -25,7 +25,7 @@ class SuiteFigures(Frozen):
 
 
 class Card(Frozen):
-    """`card.json`: a reference policy in short.
+    """`card.json`: a shipped policy in short.
 
     Attributes:
         name, title, description, training, seed: of its recipe.
@@ -58,8 +58,8 @@ class Baselines(Frozen):
     baselines: tuple[Baseline, ...]
 
 
-class ReferencePolicy:
-    """The files of one reference policy.
+class ShippedPolicy:
+    """The files of one shipped policy.
 
     | file         | content |
     |--------------|---------|
@@ -89,22 +89,22 @@ class ReferencePolicy:
 
 
 @cache
-def reference_policies() -> tuple[ReferencePolicy, ...]:
+def shipped_policies() -> tuple[ShippedPolicy, ...]:
     """All that have been made, in the order of their recipes."""
-    return tuple(ReferencePolicy(FOLDER / each.name) for each in RECIPES if (FOLDER / each.name / CARD).is_file())
+    return tuple(ShippedPolicy(FOLDER / each.name) for each in RECIPES if (FOLDER / each.name / CARD).is_file())
 
 
-def reference_policy(name: str) -> ReferencePolicy:
+def shipped_policy(name: str) -> ShippedPolicy:
     """The policy of that name.
 
     Raises:
         UnknownPolicyError: there is none; the message names those that exist.
     """
-    for policy in reference_policies():
+    for policy in shipped_policies():
         if policy.card.name == name:
             return policy
-    names = ", ".join(policy.card.name for policy in reference_policies())
-    raise UnknownPolicyError(f"there is no reference policy {name!r}: choose one of {names}")
+    names = ", ".join(policy.card.name for policy in shipped_policies())
+    raise UnknownPolicyError(f"there is no shipped policy {name!r}: choose one of {names}")
 
 
 @cache
