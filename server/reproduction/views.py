@@ -1,6 +1,7 @@
 """A campaign's rows and runs as JSON shows them, beside the paper's."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 from server.database import tables
 from server.experiments.repository import UNFINISHED, aggregate_state
@@ -17,9 +18,9 @@ from server.reproduction.schemas import (
 )
 from workers.config import TrainingConfig
 from workers.reproduction.pace import Share, seconds_left
-from workers.reproduction.results import SeedResult, learned_at, row_spread
+from workers.reproduction.results import RowSpread, SeedResult, learned_at, row_spread
 from workers.reproduction.rows import CURVE, FIGURES, ROW_BY_ID, ROWS, TABLES, Row
-from workers.reproduction.verdict import judge_all
+from workers.reproduction.verdict import Verdict, judge_all
 from workers.statistics.differences import LEAST_SEEDS
 from workers.training.table import TableRow
 
@@ -58,8 +59,20 @@ def reproduction_view(
         ],
         figures=[PaperFigure(id=figure.id, title=figure.title, rows=list(figure.rows)) for figure in FIGURES],
         rows=[_row_view(row, by_row.get(row.id), latest, results[row.id]) for row in ROWS],
-        claims=list(judge_all(results)),
+        claims=list(_judged(tuple((row, tuple(seeds)) for row, seeds in results.items()))),
     )
+
+
+@lru_cache(maxsize=8)
+def _judged(results: tuple[tuple[str, tuple[SeedResult, ...]], ...]) -> tuple[Verdict, ...]:
+    """The claims; intervals take a second, and what is done stays as it is."""
+    return judge_all(dict(results))
+
+
+@lru_cache(maxsize=128)
+def _spread_of(seeds: tuple[SeedResult, ...]) -> RowSpread | None:
+    """A row's figures over its seeds, likewise."""
+    return row_spread(seeds)
 
 
 def expected_seconds(workers: int) -> float:
@@ -148,7 +161,7 @@ def _row_view(row: Row, experiment: tables.Experiment | None, latest: Latest, re
         id=row.id,
         method=row.method,
         paper=row.paper,
-        ours=row_spread(results),
+        ours=_spread_of(tuple(results)),
         experiment_id=experiment.id if experiment else None,
         runs=[
             CampaignRun(

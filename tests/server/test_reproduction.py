@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 from server.app import create_app
 from server.database import tables
 from server.metrics.repository import MetricRepository, ReportedRow
+from server.reproduction.views import _judged
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, Reports
@@ -149,7 +150,10 @@ def test_the_finished_campaign_is_judged(client: TestClient, services: Services,
     assert words["simple-converges-ddpg"] == "does not hold"
     assert words["adapts"] == "can't be told"
 
-    # Another server on the same data says the same.
+    # Looked at once more nothing is computed anew; another server on the same data says the same.
+    computed = _judged.cache_info().misses
+    assert client.get("/api/reproduction").json() == judged
+    assert _judged.cache_info().misses == computed
     with TestClient(create_app(settings), base_url=BASE_URL, headers={"Authorization": f"Bearer {TOKEN}"}) as again:
         assert again.get("/api/reproduction").json() == judged
 
