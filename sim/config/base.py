@@ -10,6 +10,11 @@ HIDDEN: JsonDict = {"x-hidden": True}
 """Keeps a field out of the launch form: a program fills it in."""
 
 
+def needs(field: str) -> JsonDict:
+    """Leaves a field out of the launch form while the number beside it called `field` is 0: it would change nothing."""
+    return {"x-needs": field}
+
+
 class Frozen(BaseModel):
     """Base of every configuration model: immutable, and an unknown key is an error rather than ignored."""
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sim.config.base import ADVANCED, Frozen
+from sim.config.base import ADVANCED, Frozen, needs
 
 MoverKind = Literal["patrol", "walker", "pedestrian"]
 
@@ -29,6 +29,7 @@ class MoversConfig(Frozen):
         title="Movement",
         description="Pedestrians walk between places and avoid one another; walkers go straight on until something is in "
         "the way; patrols go to and fro on a line.",
+        json_schema_extra=needs("count"),
     )
-    speed: MoverSpeed = Field(1.0, title="Speed", description="Top speed, metres per second.", json_schema_extra=ADVANCED)
-    radius: MoverRadius = Field(0.25, title="Radius", description="Metres.", json_schema_extra=ADVANCED)
+    speed: MoverSpeed = Field(1.0, title="Speed", description="Top speed, metres per second.", json_schema_extra=ADVANCED | needs("count"))
+    radius: MoverRadius = Field(0.25, title="Radius", description="Metres.", json_schema_extra=ADVANCED | needs("count"))

@@ -1,7 +1,7 @@
 /** The fields of a form in two parts: what most people set, and everything else under *Advanced*. */
-import { Accordion, Anchor, Input, Text, Title } from '@mantine/core'
+import { Accordion, Anchor, Input, Text, TextInput, Title } from '@mantine/core'
 import { useEffect, useRef, useState } from 'react'
-import { IconAdjustmentsHorizontal } from '../components/icons'
+import { IconAdjustmentsHorizontal, IconSearch } from '../components/icons'
 import { Notice } from '../components/ui'
 import { FieldInput, fieldId } from './FieldInput'
 import classes from './form.module.css'
@@ -33,15 +33,19 @@ export function FieldGrid({ fields, ...rest }: FieldGridProps) {
 export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
   const { form, initial } = rest
   const [open, setOpen] = useState<string | null>(null)
+  const [search, setSearch] = useState('')
   const troubled = fields.some((field) =>
     Object.keys(form.problems).some((path) => isAt(field, path) || path === parentOf(field)),
   )
   useEffect(() => {
-    if (troubled) setOpen('advanced')
+    if (!troubled) return
+    setOpen('advanced')
+    setSearch('')
   }, [troubled])
   const changed = fields.filter(
     (field) => !sameValue(valueAt(form.values, field.path), initialOf(field, form.values, initial)),
   ).length
+  const found = fields.filter((field) => isCalled(field, search))
   return (
     <Accordion variant="contained" className={classes.advanced} value={open} onChange={setOpen}>
       <Accordion.Item value="advanced">
@@ -52,7 +56,20 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
           </Text>
         </Accordion.Control>
         <Accordion.Panel>
-          {grouped(fields).map(([heading, some]) => (
+          <TextInput
+            aria-label="Search these settings"
+            placeholder="Search these settings"
+            leftSection={<IconSearch size={16} stroke={1.6} />}
+            mb="lg"
+            value={search}
+            onChange={(event) => setSearch(event.currentTarget.value)}
+          />
+          {found.length === 0 && (
+            <Text size="sm" c="dimmed">
+              None of these settings is called so.
+            </Text>
+          )}
+          {grouped(found).map(([heading, some]) => (
             <section key={heading} className={classes.group}>
               <Title order={3} className={classes.heading}>
                 {heading}
@@ -65,6 +82,15 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
       </Accordion.Item>
     </Accordion>
   )
+}
+
+/** Whether every word of a search is in a field's label, headings or description. */
+function isCalled({ label, trail, schema }: Field, search: string): boolean {
+  const text = [label, ...trail, schema.description].join(' ').toLocaleLowerCase()
+  return search
+    .toLocaleLowerCase()
+    .split(/\s+/)
+    .every((word) => text.includes(word))
 }
 
 /** What is wrong with the fields of a group together, such as two that don't fit each other. */

@@ -110,11 +110,15 @@ function properties(
   // The form itself is no heading of its fields.
   const trail = place.path.length === 0 ? place.trail : [...place.trail, heading]
   return Object.entries(schema.properties ?? {})
-    .filter(([key, one]) => key !== skip && !one['x-hidden'])
+    .filter(([key, one]) => key !== skip && !one['x-hidden'] && isOfUse(one, values, place.path))
     .flatMap(([key, one]) =>
       fieldsAt(one, root, values, { ...place, path: [...place.path, key], trail }, key),
     )
 }
+
+/** Whether a field changes anything: the number that it needs is not 0. */
+const isOfUse = (schema: Schema, values: Json, path: Path): boolean =>
+  schema['x-needs'] === undefined || valueAt(values, [...path, schema['x-needs']]) !== 0
 
 /**
  * What a field holds in a fresh form: of another kind of object than the fresh form has (another robot, another algorithm) its

@@ -76,3 +76,15 @@ test('a field of another kind than the fresh form has goes back to its own defau
   expect(fresh('small')).toEqual(['', initial.robot, 0.3])
   expect(fresh('large')).toEqual(['', initial.robot, 2])
 })
+
+test('what changes nothing without its neighbour is no field while that is 0', () => {
+  const form: Schema = {
+    properties: {
+      count: { type: 'integer', default: 0 },
+      speed: { type: 'number', default: 1, 'x-needs': 'count' },
+    },
+  }
+  const keys = (count: number) => fieldsOf(form, form, { count, speed: 1 }).map(({ key }) => key)
+  expect(keys(0)).toEqual(['count'])
+  expect(keys(2)).toEqual(['count', 'speed'])
+})

@@ -27,6 +27,8 @@ export interface Schema {
   'x-advanced'?: boolean
   /** Not for the form: a program fills it in. */
   'x-hidden'?: boolean
+  /** The number beside it without which it changes nothing. */
+  'x-needs'?: string
   /** Lists to start from, by title. */
   'x-presets'?: Record<string, Json>
 }

@@ -1,6 +1,6 @@
 /** The launch form, rendered from the schema that the server derives from its own configuration models. */
-import { Button, Group, Input, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
-import { useState } from 'react'
+import { Anchor, Button, Group, Input, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
+import { useEffect, useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
@@ -73,6 +73,7 @@ export function NewTrainingPage() {
       ) : (
         <LaunchForm
           key={from ?? like ?? chosen ?? ''}
+          draft={`mapless-draft:${from ?? like ?? chosen ?? ''}`}
           schema={form.data.schema as Schema}
           defaults={form.data.defaults as unknown as Json}
           initial={initial}
@@ -112,18 +113,39 @@ function useCopy(original: Experiment | undefined): Json | undefined {
   return copy
 }
 
+/** What was typed here before, where it can be read. */
+function readDraft(key: string): Json | undefined {
+  try {
+    const draft: unknown = JSON.parse(sessionStorage.getItem(key) ?? 'null')
+    return draft !== null && typeof draft === 'object' ? (draft as Json) : undefined
+  } catch {
+    return undefined
+  }
+}
+
 interface LaunchFormProps {
+  /** Under which what was typed is kept until it is launched, or this tab is closed. */
+  draft: string
   schema: Schema
   defaults: Json
   initial: Json
   presets: readonly Preset[]
 }
 
-function LaunchForm({ schema, defaults, initial, presets }: LaunchFormProps) {
+function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormProps) {
   const navigate = useNavigate()
-  const form = useForm(initial)
+  const [kept] = useState(() => readDraft(draft))
+  const form = useForm(kept ?? initial)
+  const changed = !sameValue(form.values, initial)
+  useEffect(() => {
+    if (changed) sessionStorage.setItem(draft, JSON.stringify(form.values))
+    else sessionStorage.removeItem(draft)
+  }, [draft, changed, form.values])
   const launch = $api.useMutation('post', '/api/experiments', {
-    onSuccess: (experiment) => navigate(landing(experiment)),
+    onSuccess: (experiment) => {
+      sessionStorage.removeItem(draft)
+      return navigate(landing(experiment))
+    },
     onError: (error) => {
       if (error instanceof ApiError) form.refuse(error.problems)
     },
@@ -151,6 +173,14 @@ function LaunchForm({ schema, defaults, initial, presets }: LaunchFormProps) {
       }}
     >
       <Stack gap="md" className={classes.fields}>
+        {kept && changed && (
+          <Text size="sm" c="dimmed">
+            As you left it.{' '}
+            <Anchor component="button" type="button" inherit onClick={() => form.replace(initial)}>
+              Start over
+            </Anchor>
+          </Text>
+        )}
         <ProblemSummary fields={fields} problems={form.problems} root={schema} />
         <Panel>
           <Stack gap="lg">

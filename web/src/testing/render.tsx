@@ -12,12 +12,12 @@ export function open(address: string) {
   const router = createMemoryRouter(routes, { initialEntries: [address] })
   const client = createQueryClient()
   client.setDefaultOptions({ queries: { ...client.getDefaultOptions().queries, retry: false } })
-  render(
+  const { unmount } = render(
     <QueryClientProvider client={client}>
       <Providers still>
         <RouterProvider router={router} />
       </Providers>
     </QueryClientProvider>,
   )
-  return { router, user: userEvent.setup({ delay: null }) }
+  return { router, unmount, user: userEvent.setup({ delay: null }) }
 }
