@@ -80,7 +80,9 @@ class ListedExperiment(Schema):
     states: list[RunState] = Field(description="That its runs are in, each once.")
     runs: int
     progress: float = Field(description="Steps done by all runs over the steps that they were given, 0 to 1.")
-    seconds_left: float | None = Field(description="Until its slowest running run is through; null where that is not known.")
+    seconds_left: float | None = Field(
+        description="Until its last run is through, those that wait included; null where that is not known."
+    )
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
     success: Estimate | None = Field(
         description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."

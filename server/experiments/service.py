@@ -11,6 +11,7 @@ from server.checkpoints.views import success_over_runs
 from server.database import tables
 from server.errors import ConflictError, RefusedFieldError
 from server.events.changes import Change
+from server.experiments.pace import seconds_left
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.experiments.schemas import (
     Experiment,
@@ -166,7 +167,6 @@ class ExperimentService:
 
 def _listed(experiment: Experiment) -> ListedExperiment:
     task, algorithm, runs = experiment.training.task, experiment.training.algorithm, experiment.runs
-    left = [run.seconds_left for run in runs if run.seconds_left is not None]
     return ListedExperiment(
         id=experiment.id,
         name=experiment.name,
@@ -182,7 +182,7 @@ def _listed(experiment: Experiment) -> ListedExperiment:
         states=sorted({run.state for run in runs}),
         runs=len(runs),
         progress=min(1.0, sum(run.step for run in runs) / max(1, sum(run.total_steps for run in runs))),
-        seconds_left=max(left, default=None),
+        seconds_left=seconds_left(runs),
         campaign=experiment.campaign,
         success=experiment.success,
     )

@@ -31,5 +31,12 @@ class MoversConfig(Frozen):
         "the way; patrols go to and fro on a line.",
         json_schema_extra=needs("count"),
     )
-    speed: MoverSpeed = Field(1.0, title="Speed", description="Top speed, metres per second.", json_schema_extra=ADVANCED | needs("count"))
-    radius: MoverRadius = Field(0.25, title="Radius", description="Metres.", json_schema_extra=ADVANCED | needs("count"))
+    speed: MoverSpeed = Field(
+        1.0,
+        title="Speed",
+        description="Top speed, metres per second.",
+        json_schema_extra=ADVANCED | needs("count"),
+    )
+    radius: MoverRadius = Field(
+        0.25, title="Radius", description="Metres.", json_schema_extra=ADVANCED | needs("count")
+    )  # fmt: skip

@@ -169,9 +169,22 @@ def test_the_list_says_in_short_what_is_trained_and_how_far_it_is(client: TestCl
     assert (listed["arena"], listed["movers"], listed["robot"]) == ("simple", 0, "burger")
     assert (listed["algorithm"], listed["network"], listed["reward"]) == ("ppo", "mlp", "basic")
     assert (listed["state"], listed["states"], listed["runs"]) == ("running", ["completed", "queued", "running"], 3)
-    assert (listed["progress"], listed["seconds_left"]) == (0.5, 10.0)
+    # 5,240 steps at 524 a second, and then 10,000 of the one that waits.
+    assert (listed["progress"], listed["seconds_left"]) == (0.5, pytest.approx(10.0 + 10_000 / 524))
     # A thousand configurations would be megabytes.
     assert len(json.dumps(listed)) < 600
+
+
+def test_time_left_counts_those_that_wait_as_many_at_a_time_as_run(client: TestClient, reports: Reports) -> None:
+    first, second, *_ = reports.experiment("Five", seeds=(0, 1, 2, 3, 4), steps=10_000)["runs"]
+    for run, step in ((first, 9_000), (second, 5_000)):
+        reports.state(run, "running", step=step)
+        reports.metrics(run, "time/steps_per_second", {step: 100.0})
+
+    (listed,) = client.get("/api/experiments").json()["items"]
+
+    # 10 and 50 s are left, 3 x 100 s wait: 360 s of work for two.
+    assert listed["seconds_left"] == pytest.approx(180.0)
 
 
 @pytest.mark.parametrize("parameters", [{"limit": 0}, {"limit": 201}, {"offset": -1}, {"state": "happy"}])

@@ -47,8 +47,8 @@ class History:
 
     @property
     def progress(self) -> float:
-        """Part of the configured steps that is done."""
-        return self.step / self.training.steps
+        """Part of the configured steps that is done; the last update may have gone beyond them."""
+        return min(1.0, self.step / self.training.steps)
 
     def recent(self, name: str) -> float | None:
         """Median of the curve over the last quarter of what was trained; None where that is too little."""

@@ -2662,7 +2662,7 @@ export interface components {
             runs: number;
             /**
              * Seconds Left
-             * @description Until its slowest running run is through; null where that is not known.
+             * @description Until its last run is through, those that wait included; null where that is not known.
              */
             seconds_left: number | null;
             /**
