@@ -32,7 +32,8 @@ const sans =
 
 export const theme = createTheme({
   primaryColor: 'petrol',
-  primaryShade: { light: 8, dark: 5 },
+  // White on the dark shade: 4.7 to 1; the shade on dark panels: 3.7 to 1.
+  primaryShade: { light: 8, dark: 7 },
   autoContrast: true,
   colors: { petrol, dark },
   fontFamily: sans,
