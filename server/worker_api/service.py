@@ -74,6 +74,9 @@ class WorkerService:
         problem: str | None = None
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
+            # At once, not from the worker's next heartbeat on; a claim whose answer got lost is asked for once more.
+            if WorkerRepository(session).is_drained(request.worker) and run.claim_id != (request.claim_id or ""):
+                raise ConflictError("This worker was asked to take up no more runs.")
             stored = read_training(run.experiment.training)
             training = _on_device(run, stored.training, request)
             checkpoint = attempts.begin(session, run, request, _takers(session, run, stored.training))

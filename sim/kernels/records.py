@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from sim.config import MAX_TERMS
-
 CELL = 0.1
 """Edge of a cell of free space (`sim.arenas.freespace`), metres."""
 
@@ -15,6 +13,9 @@ NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 
 PAPER, IMPROVED = 0, 1
 """Observation layouts, see `sim.observations`."""
+
+ROOM_FOR_TERMS = 16
+"""Terms of one reward, at most."""
 
 TERM_KINDS = (
     "arrival",
@@ -83,9 +84,9 @@ PARAMETERS = np.dtype(
         ("frames", "i4"),  # observations that are stacked
         ("near", "f4"),  # m, see `sim.observations.near_distance`
         ("terms", "i4"),  # of the reward
-        ("term_kinds", "i4", (MAX_TERMS,)),
-        ("term_weights", "f4", (MAX_TERMS,)),
-        ("term_options", "f4", (MAX_TERMS,)),  # a margin, m; of progress 1 where it is exponential
+        ("term_kinds", "i4", (ROOM_FOR_TERMS,)),
+        ("term_weights", "f4", (ROOM_FOR_TERMS,)),
+        ("term_options", "f4", (ROOM_FOR_TERMS,)),  # a margin, m; of progress 1 where it is exponential
         ("tabulates", "i4"),  # 1 where a formula reads `Robots.quantities`
         ("arrival_distance", "f4"),  # m
         ("collision_distance", "f4"),  # m

@@ -244,6 +244,11 @@ def test_a_worker_is_drained_with_all_its_processes_until_it_is_started_again(
         "w@a/1": True,
         "w@b/0": False,
     }
+    # A run that it asks for before it has heard of it is not given to it.
+    body = {"worker": "w@a/1", "published_attempt": 0, "queue": "cpu"}
+    refused = worker.post(f"/api/worker/runs/{run_id}/claim", json=body)
+    assert (refused.status_code, refused.json()["detail"]) == (409, "This worker was asked to take up no more runs.")
+    assert worker.post(f"/api/worker/runs/{run_id}/claim", json=body | {"worker": "w@b/0"}).status_code == 200
     assert [beat(name) for name in ("w@a/0", "w@a/1", "w@b/0")] == [True, True, False]
     assert beat("w@a/0", first=True) is False
     assert client.post("/api/workers/drain", json={"worker": "nobody"}).status_code == 404

@@ -105,10 +105,10 @@ def test_metrics_have_their_standard_names_and_growing_steps(whole: Recorder) ->
 def test_every_term_of_the_reward_is_told_and_together_they_are_the_reward(whole: Recorder) -> None:
     for _, values in whole.rows:
         assert sum(values[name] for name in REWARD_TERMS) == pytest.approx(values["train/reward"], abs=1e-3)
-        # The basic reward: 120 on arrival, -100 on collision, no penalty.
+        # The basic reward: 120 on arrival, -100 on collision, progress, and no more.
         assert values["reward/arrival"] * 512 % 120 == pytest.approx(0.0, abs=1e-6)
         assert values["reward/collision"] * 512 % 100 == pytest.approx(0.0, abs=1e-6)
-        assert values["reward/penalty"] == 0.0
+        assert {name for name in values if name.startswith("reward/")} == REWARD_TERMS
     assert any(values["reward/collision"] < 0.0 for _, values in whole.rows)
 
 
