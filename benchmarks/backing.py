@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import time
+from abc import ABC, abstractmethod
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -17,7 +18,7 @@ _PATIENCE_SECONDS = 60.0
 _SYSTEM_USER = "postgres"
 
 
-class Backing:
+class Backing(ABC):
     """A process that others connect to. `start` returns once it answers; its data outlive `kill`."""
 
     # What ends it in order.
@@ -29,13 +30,13 @@ class Backing:
         self._log = directory / f"{name}.log"
         self._process: subprocess.Popen[bytes] | None = None
 
+    @abstractmethod
     def command(self) -> list[str]:
         """What starts it, in the foreground."""
-        raise NotImplementedError
 
+    @abstractmethod
     def answers(self) -> bool:
         """Whether it can be used."""
-        raise NotImplementedError
 
     def start(self) -> None:
         """Start it.
