@@ -5,6 +5,8 @@ export interface ChartSpec {
   title: string
   note?: string
   metrics: readonly { name: string; label: string }[]
+  /** All series whose names begin so, besides. */
+  prefix?: string
   format?: (value: number) => string
   yRange?: readonly [number, number]
   smoothable?: boolean
@@ -49,12 +51,8 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
       {
         title: 'Reward terms',
         note: 'per step, their sum is the reward',
-        metrics: [
-          { name: 'reward/arrival', label: 'arrival' },
-          { name: 'reward/collision', label: 'collision' },
-          { name: 'reward/progress', label: 'progress' },
-          { name: 'reward/penalty', label: 'penalty' },
-        ],
+        metrics: [],
+        prefix: 'reward/',
         smoothable: true,
       },
       {

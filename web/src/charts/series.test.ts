@@ -77,8 +77,6 @@ test('every metric that a training reports is in some chart', () => {
     'policy/kl',
     'policy/entropy',
     'train/reward',
-    'reward/arrival',
-    'reward/penalty',
     'time/update',
   ])
     expect(shown).toContain(name)
@@ -89,4 +87,14 @@ test('a series whose points were taken together has a band from the smallest to 
   const cut = { name: 'loss/policy', steps: [10, 20], values: [2, 3], min: [1, 3], max: [4, 3] }
   expect(chartOf(spec, [cut]).lines[0]?.band).toEqual({ low: [1, 3], high: [4, 3] })
   expect(chartOf(spec, [{ ...cut, min: null, max: null }]).lines[0]?.band).toBeUndefined()
+})
+
+test('every term of a reward has a line, one’s own formulas among them', () => {
+  const spec = { title: 'Reward terms', metrics: [], prefix: 'reward/' }
+  const one = (name: string) => ({ name, steps: [10], values: [2], min: null, max: null })
+  const { lines } = chartOf(spec, ['train/reward', 'reward/progress', 'reward/slow_near'].map(one))
+  expect(lines.map(({ key, label, color }) => [key, label, color])).toEqual([
+    ['reward/progress', 'progress', 0],
+    ['reward/slow_near', 'slow near', 1],
+  ])
 })

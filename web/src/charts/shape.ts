@@ -9,7 +9,7 @@ import { alignSeries, type ChartData, type Line } from './series'
  * lies the band of their smallest and largest values.
  */
 export function chartOf(spec: ChartSpec, series: readonly Series[]): ChartData {
-  const found = spec.metrics.flatMap((metric, color) => {
+  const found = metricsOf(spec, series).flatMap((metric, color) => {
     const one = series.find((candidate) => candidate.name === metric.name)
     return one && one.steps.length > 0 ? [{ ...metric, color, series: one }] : []
   })
@@ -29,6 +29,16 @@ export function chartOf(spec: ChartSpec, series: readonly Series[]): ChartData {
     }),
   )
   return { x, lines }
+}
+
+/** The metrics of a chart, those that it finds by their beginning in the order in which they came. */
+function metricsOf({ metrics, prefix }: ChartSpec, series: readonly Series[]): ChartSpec['metrics'] {
+  if (prefix === undefined) return metrics
+  const found = series.filter(({ name }) => name.startsWith(prefix))
+  return [
+    ...metrics,
+    ...found.map(({ name }) => ({ name, label: name.slice(prefix.length).replaceAll('_', ' ') })),
+  ]
 }
 
 /**

@@ -13,7 +13,8 @@ export function settingText(value: unknown): string {
   if (value === null || value === undefined) return '–'
   if (typeof value === 'number') return Number.isInteger(value) ? count(value) : significant(value, 6)
   if (typeof value === 'boolean') return value ? 'yes' : 'no'
-  if (typeof value === 'string') return words(value)
+  // A name is spelled out, a formula is left as it was typed.
+  if (typeof value === 'string') return /[^\w\s-]/.test(value) ? value : words(value)
   if (Array.isArray(value)) return value.map(settingText).join(', ') || 'none'
   return termText(value as Record<string, unknown>)
 }
