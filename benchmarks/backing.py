@@ -12,7 +12,7 @@ from tempfile import mkdtemp
 
 import psutil
 
-from benchmarks.processes import free_port, tree
+from benchmarks.processes import free_port, kill, tree
 
 _PATIENCE_SECONDS = 60.0
 _SYSTEM_USER = "postgres"
@@ -58,8 +58,8 @@ class Backing(ABC):
 
     def kill(self) -> None:
         """End it without a word."""
-        for member in self.members():
-            member.kill()
+        # Some may end by themselves once the first is gone.
+        kill(self.members())
         if self._process is not None:
             self._process.wait()
 

@@ -4,9 +4,10 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 import httpx
+from pydantic import BaseModel, ValidationError
 
 from workers.errors import (
     ArchiveIntegrityError,
@@ -17,6 +18,8 @@ from workers.errors import (
 )
 from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, HeartbeatAnswer, Queue
 from workers.reporting import EvaluationResult
+
+_Answer = TypeVar("_Answer", bound=BaseModel)
 
 _BLOCK = 256 * 1024
 # Connecting is quick or hopeless; an answer may wait for a busy database.
@@ -53,13 +56,13 @@ class ServerClient:
         """Tell that this worker is there, and why it takes up no run where it does not."""
         beat = Heartbeat(worker=worker, queue=queue, trouble=trouble, first=first)
         response = self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
-        return HeartbeatAnswer.model_validate_json(response.content)
+        return _read(HeartbeatAnswer, response)
 
     def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str, queue: Queue = "cpu") -> Claim:
         """Take up a run; asked again with the same `claim_id`, it is the same attempt."""
         request = ClaimRequest(worker=worker, published_attempt=published_attempt, claim_id=claim_id, queue=queue)
         response = self._send("POST", f"/api/worker/runs/{run_id}/claim", content=request.model_dump_json())
-        return Claim.model_validate_json(response.content)
+        return _read(Claim, response)
 
     def download(self, checkpoint: CheckpointReference, path: Path) -> None:
         """Fetch an archive to `path`; refuses what is not what the server registered.
@@ -111,6 +114,17 @@ class ServerClient:
             raise _unavailable(error) from error
         _check(response)
         return response
+
+
+def _read(model: type[_Answer], response: httpx.Response) -> _Answer:
+    """An answer as the server writes it; whatever else answers in its place may be gone the next time."""
+    try:
+        return model.model_validate_json(response.content)
+    except ValidationError as error:
+        raise ServerUnavailableError(
+            f"what answers is not understood ({response.text[:80]!r}): is something between worker and server, or are "
+            "they of different versions?"
+        ) from error
 
 
 def _upload_body(head: CheckpointUpload, archive: Path) -> Iterator[bytes]:
