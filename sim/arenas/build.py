@@ -7,7 +7,7 @@ from sim.arenas.document import to_arena
 from sim.arenas.families import CLEARANCE, generate_arena, pool_seeds
 from sim.arenas.geometry import Arena
 from sim.arenas.mover import Mover
-from sim.config import AnyArenaConfig, ArenaConfig, GeneratedArenaConfig, MoversConfig, TaskConfig
+from sim.config import AddedArenaPool, AnyArenaConfig, ArenaConfig, ArenaPool, GeneratedArenaConfig, MoversConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.streams import MAPS, stream_seed
 
@@ -27,7 +27,7 @@ def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tup
     """
     if isinstance(config, ArenaConfig):
         return (with_movers(BUILTIN[config.name](), config.movers),)
-    if isinstance(config, GeneratedArenaConfig):
+    if isinstance(config, ArenaPool):
         return tuple(build_arena(config, index, clearance=clearance) for index in range(config.maps))
     if config.arena is None:
         raise ArenaError(
@@ -59,7 +59,7 @@ def with_maps_of(task: TaskConfig, seed: int) -> TaskConfig:
         seed: of the training.
     """
     arena = task.arena
-    if not isinstance(arena, GeneratedArenaConfig) or not arena.own_maps:
+    if not isinstance(arena, ArenaPool) or not arena.own_maps:
         return task
     own = stream_seed(seed, (*MAPS, arena.seed), bits=31)
     return task.model_copy(update={"arena": arena.model_copy(update={"seed": own, "own_maps": False})})
@@ -72,10 +72,19 @@ def build_arena(config: AnyArenaConfig, index: int, *, clearance: float = CLEARA
         ArenaError: as there.
         IndexError: there are not as many.
     """
-    if isinstance(config, GeneratedArenaConfig):
-        seed = pool_seeds(config.seed, config.maps)[index]
-        return with_movers(generate_arena(config.name, config.difficulty, seed, clearance=clearance), config.movers)
+    if isinstance(config, ArenaPool):
+        return pooled_arena(config, pool_seeds(config.seed, config.maps)[index], clearance=clearance)
     return build_arenas(config, clearance=clearance)[index]
+
+
+def pooled_arena(config: GeneratedArenaConfig | AddedArenaPool, seed: int, *, clearance: float = CLEARANCE) -> Arena:
+    """The arena of a pool's family, difficulty and movers that a seed gives, whether it is in the pool or not.
+
+    Raises:
+        ArenaError: as `build_arenas`.
+    """
+    family = config if isinstance(config, AddedArenaPool) else config.name
+    return with_movers(generate_arena(family, config.difficulty, seed, clearance=clearance), config.movers)
 
 
 def with_movers(arena: Arena, config: MoversConfig) -> Arena:
@@ -86,5 +95,5 @@ def with_movers(arena: Arena, config: MoversConfig) -> Arena:
     """
     if not config.count:
         return arena
-    added = (Mover(config.kind, config.radius, config.speed),) * config.count
+    added = (Mover(config.kind, config.radius, config.speed, sees_robots=config.sees_robots),) * config.count
     return replace(arena, movers=arena.movers + added)

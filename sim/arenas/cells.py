@@ -1,4 +1,4 @@
-"""Where a robot fits: an arena as a grid of free cells, and which of them hang together. NumPy only."""
+"""Where a robot fits: an arena as a grid of free cells, and which of them hang together."""
 
 from dataclasses import dataclass
 
@@ -90,43 +90,14 @@ def components(free: Mask, *, corners: bool = True) -> tuple[Labels, NDArray[np.
         (rows, columns) labels, -1 where blocked, 0 for the largest component, the others by size; and (K,) their sizes in
         cells.
     """
-    rows, columns = free.shape
-    padded = np.zeros((rows, columns + 2), dtype=np.int8)
-    padded[:, 1:-1] = free
-    steps = np.diff(padded, axis=1)
-    run_rows, starts = np.nonzero(steps == 1)
-    ends = np.nonzero(steps == -1)[1]
-    roots = _join_runs(run_rows.tolist(), starts.tolist(), ends.tolist(), reach=1 if corners else 0)
-    names, of_run = np.unique(roots, return_inverse=True)
-    lengths = ends - starts
-    sizes = np.bincount(of_run, weights=lengths, minlength=len(names)).astype(np.int64)
-    order = np.argsort(-sizes, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    labels = np.full(free.shape, -1, dtype=np.int32)
-    labels[free] = np.repeat(rank[of_run], lengths)
-    return labels, sizes[order]
+    from scipy.ndimage import generate_binary_structure, label
 
-
-def _join_runs(rows: list[int], starts: list[int], ends: list[int], reach: int) -> NDArray[np.int64]:
-    """The root of every horizontal run of free cells, which come in row-major order.
-
-    Runs of neighbouring rows are joined where their columns overlap or, with a `reach` of 1, meet at a corner.
-    """
-    parent = list(range(len(rows)))
-
-    def find(run: int) -> int:
-        while parent[run] != run:
-            parent[run] = parent[parent[run]]
-            run = parent[run]
-        return run
-
-    above = 0
-    for run, row in enumerate(rows):
-        while rows[above] < row - 1 or (rows[above] == row - 1 and ends[above] + reach <= starts[run]):
-            above += 1
-        other = above
-        while other < run and rows[other] == row - 1 and starts[other] < ends[run] + reach:
-            parent[find(other)] = find(run)
-            other += 1
-    return np.array([find(run) for run in range(len(rows))], dtype=np.int64)
+    found, count = label(free, generate_binary_structure(2, 2 if corners else 1))
+    sizes = np.bincount(found.ravel(), minlength=count + 1)[1:].astype(np.int64)
+    last = np.zeros(count + 1, dtype=np.int64)
+    last[found.ravel()] = np.arange(found.size)
+    # Of two that are equally large, the one that ends first in row-major order comes first: families draw in that order.
+    order = np.lexsort((last[1:], -sizes))
+    rank = np.full(count + 1, -1, dtype=np.int32)
+    rank[1 + order] = np.arange(count)
+    return rank[found], sizes[order]

@@ -68,8 +68,9 @@ def _to_mover(entry: AnyMover) -> Mover:
         times = tuple(frame.t for frame in entry.keyframes)
         mover = Mover("timed", entry.radius, 0.0, places, times, entry.loops)
         return replace(mover, speed=mover.fastest)
-    ways = tuple((corner.x, corner.y) for corner in entry.waypoints) if isinstance(entry, Patrol) else ()
-    return Mover(entry.kind, entry.radius, entry.speed, ways)
+    ways = () if isinstance(entry, Walker) else tuple((corner.x, corner.y) for corner in entry.waypoints)
+    loops = not (isinstance(entry, Pedestrian) and entry.stays)
+    return Mover(entry.kind, entry.radius, entry.speed, ways, loops=loops, sees_robots=entry.sees_robots)
 
 
 def _to_entry(mover: Mover) -> AnyMover:
@@ -77,12 +78,16 @@ def _to_entry(mover: Mover) -> AnyMover:
         frames = zip(mover.times, mover.waypoints, strict=True)
         keyframes = tuple(Keyframe(t=round(t, 4), x=round(x, 4), y=round(y, 4)) for t, (x, y) in frames)
         return Timed(kind="timed", radius=mover.radius, keyframes=keyframes, loops=mover.loops)
+    waypoints = tuple(Waypoint(x=round(x, 4), y=round(y, 4)) for x, y in mover.waypoints)
+    radius, speed, sees = mover.radius, mover.speed, mover.sees_robots
     if mover.kind == "patrol":
-        waypoints = tuple(Waypoint(x=round(x, 4), y=round(y, 4)) for x, y in mover.waypoints)
-        return Patrol(kind="patrol", radius=mover.radius, speed=mover.speed, waypoints=waypoints)
+        return Patrol(kind="patrol", radius=radius, speed=speed, sees_robots=sees, waypoints=waypoints)
     if mover.kind == "walker":
-        return Walker(kind="walker", radius=mover.radius, speed=mover.speed)
-    return Pedestrian(kind="pedestrian", radius=mover.radius, speed=mover.speed)
+        return Walker(kind="walker", radius=radius, speed=speed, sees_robots=sees)
+    stays = not mover.loops
+    return Pedestrian(
+        kind="pedestrian", radius=radius, speed=speed, sees_robots=sees, waypoints=waypoints, stays=stays
+    )  # fmt: skip
 
 
 def free_area(arena: Arena, clearance: float = IMPORT_CLEARANCE) -> float:

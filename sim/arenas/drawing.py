@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.arenas.document import to_arena
 from sim.arenas.geometry import free_distance
-from sim.config import ArenaFile, Patrol, Timed
+from sim.config import ArenaFile, Patrol, Pedestrian, Timed
 
 COLUMNS = 72
 """Characters across the longer side of an arena that is wider than high."""
@@ -38,6 +38,8 @@ def draw(document: ArenaFile) -> str:
         corners: list[tuple[float, float]] = []
         if isinstance(mover, Timed):
             corners = [(frame.x, frame.y) for frame in mover.keyframes]
+        elif isinstance(mover, Pedestrian):
+            corners = [(corner.x, corner.y) for corner in mover.waypoints]
         elif isinstance(mover, Patrol):
             corners = [(corner.x, corner.y) for corner in (*mover.waypoints, *mover.waypoints[:1])]
         for one, other in pairwise(corners):

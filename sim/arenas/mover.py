@@ -19,10 +19,13 @@ class Mover:
         kind: how it goes.
         radius: metres.
         speed: top speed, m/s.
-        waypoints: x, y, metres: the corners of a patrol's round, or where a timed mover is at its `times`. A patrol without
-            any goes to and fro on a line that is drawn when it starts.
+        waypoints: x, y, metres: the corners of a patrol's round, those of a pedestrian's route from its start on, or where a
+            timed mover is at its `times`. A patrol without any goes to and fro on a line that is drawn when it starts, a
+            pedestrian to places that are drawn one after another; with one alone, a pedestrian stays there.
         times: seconds from 0 on, one for each waypoint of a timed mover, in order.
-        loops: whether a timed mover begins anew when its times are over; it stays where it is otherwise.
+        loops: whether a timed mover begins anew when its times are over, and a pedestrian its route; it stays where it is
+            otherwise.
+        sees_robots: whether it gives way to robots; to others a robot makes no difference. A timed one sees nothing.
     """
 
     kind: Kind
@@ -31,6 +34,7 @@ class Mover:
     waypoints: tuple[tuple[float, float], ...] = ()
     times: tuple[float, ...] = ()
     loops: bool = True
+    sees_robots: bool = False
 
     @property
     def fastest(self) -> float:

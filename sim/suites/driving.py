@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actions import action_layout
 from sim.arrays import Floats, PolicyFunction
 from sim.config import TaskConfig
+from sim.drivers import Driver
 from sim.errors import PlacementError, SuiteError
+from sim.kernels.records import TIMEOUT
 from sim.suites.scenarios import scenario_world
 from sim.suites.suite import Suite
 from sim.world import World
@@ -47,17 +50,24 @@ class Situation:
         ranges: (n, rays) metres.
         poses: (n, 3) x, y, heading.
         targets: (n, 2).
+        robots: (n,) which scenario each of them drives, for controllers that remember.
+        velocities: (n, 2) of the last step, m/s and rad/s.
+        discs: (n, K, 5) what moves around each, see `sim.kernels.records.DISC_COLUMNS`: for controllers that are told.
     """
 
     observations: Floats
     ranges: Floats
     poses: Floats
     targets: Floats
+    robots: NDArray[np.int64]
+    velocities: Floats
+    discs: Floats
 
 
 def run_suite(policy: PolicyFunction, task: TaskConfig, suite: Suite, observer: Observer | None = None) -> EpisodeTable:
     """Drive every scenario once with a policy that sees observations; see `run_controller`."""
-    return run_controller(lambda situation: policy(situation.observations), task, suite, observer)
+    driver = Driver(policy, len(suite))
+    return run_controller(lambda situation: driver(situation.observations, situation.robots), task, suite, observer)
 
 
 def run_controller(
@@ -66,14 +76,17 @@ def run_controller(
     """Drive every scenario once, all side by side.
 
     Args:
-        controller: situations of the robots under way to their actions (n, 2); called with fewer robots as they finish.
+        controller: situations of the robots under way to their actions (n, A); called with fewer robots as they finish.
         task: robot, LiDAR, observation, reward and limits; the arenas are the suite's.
         suite: the scenarios.
         observer: looks on.
 
     Raises:
-        SuiteError: the task's robot does not fit at a start of the suite.
+        SuiteError: the task's robot does not fit at a start of the suite, or the suite's rules ask for another.
     """
+    suite.rules.check(suite.name, task)
+    limits = suite.rules.step_limits(task, suite.shortest_paths)
+    task = task.model_copy(update={"step_limit": int(limits.max())})
     world = scenario_world(task, suite.arenas, len(suite))
     try:
         world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
@@ -84,17 +97,26 @@ def run_controller(
         ) from error
     robots = world.robots
     outcomes = np.zeros(len(suite), dtype=np.uint8)
-    actions = np.zeros((len(suite), 2), dtype=np.float32)
+    actions = np.zeros((len(suite), action_layout(task.robot).size), dtype=np.float32)
     ended = {name: robots.records[name].copy() for name in ("steps", "attempt_reward", "path_length", "min_clearance")}
     active = np.arange(len(suite))
+    tiles = world.tiles()
     if observer is not None:
         observer(active, world)
     while len(active):
         situation = Situation(
-            robots.observations[active], robots.ranges[active], robots.poses[active], robots.targets[active]
+            observations=robots.observations[active],
+            ranges=robots.ranges[active],
+            poses=robots.poses[active],
+            targets=robots.targets[active],
+            robots=active,
+            velocities=world.velocities(active),
+            discs=world.movers.discs[tiles[active]],
         )
         actions[active] = controller(situation)
         world.step(actions)
+        late = active[(robots.outcomes[active] == 0) & (robots.records["steps"][active] >= limits[active])]
+        robots.outcomes[late] = TIMEOUT
         if observer is not None:
             observer(active, world)
         done = active[robots.outcomes[active] > 0]

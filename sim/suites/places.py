@@ -8,11 +8,14 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from sim.arenas import Arena, build_arenas
+from sim.arenas.barn import BarnWorld, barn_world
 from sim.arenas.build import with_movers
 from sim.arenas.document import to_arena
 from sim.arenas.families import CLEARANCE, SUITE_SEEDS, generate_arena
 from sim.arenas.mover import Mover
+from sim.arenas.scenes import Scene, SceneName, generate_scene
 from sim.config import ArenaConfig, ArenaFile, FamilyName, Frozen, MoversConfig
+from sim.suites.rules import SuiteRules
 
 _DECIMALS = 6  # of the geometry that is hashed: micrometres, coarser than any rounding of a platform
 
@@ -26,7 +29,30 @@ class GeneratedPlace(Frozen):
     movers: MoversConfig = Field(default_factory=MoversConfig)
 
 
-Place = ArenaConfig | GeneratedPlace | ArenaFile
+class ScenePlace(Frozen):
+    """One scene among people."""
+
+    scene: SceneName
+    seed: int
+    sees: bool
+
+    def build(self) -> Scene:
+        """The arena with its people, and the robot's start and target."""
+        return generate_scene(self.scene, self.seed, sees=self.sees)
+
+
+class BarnPlace(Frozen):
+    """One world of the BARN benchmark's kind."""
+
+    world: int
+    barn_seed: int
+
+    def build(self) -> BarnWorld:
+        """The world with its start and goal."""
+        return barn_world(self.world, self.barn_seed)
+
+
+Place = ArenaConfig | GeneratedPlace | ScenePlace | BarnPlace | ArenaFile
 PLACES: TypeAdapter[tuple[Place, ...]] = TypeAdapter(tuple[Place, ...])
 
 
@@ -46,6 +72,8 @@ def build_places(places: Iterable[Place], *, clearance: float = CLEARANCE) -> tu
         if isinstance(place, GeneratedPlace):
             arena = generate_arena(place.family, place.difficulty, place.seed, clearance=clearance)
             arenas.append(with_movers(arena, place.movers))
+        elif isinstance(place, ScenePlace | BarnPlace):
+            arenas.append(place.build().arena)
         elif isinstance(place, ArenaFile):
             arenas.append(to_arena(place))
         else:
@@ -56,10 +84,12 @@ def build_places(places: Iterable[Place], *, clearance: float = CLEARANCE) -> tu
 def _content(mover: Mover) -> list[object]:
     """What is hashed of a mover; of those that keep no times as before any did."""
     timed: list[object] = [mover.times, mover.loops] if mover.times else []
-    return [mover.kind, mover.radius, mover.speed, mover.waypoints, *timed]
+    route: list[object] = [mover.loops] if mover.kind == "pedestrian" and mover.waypoints else []
+    sees: list[object] = ["sees robots"] if mover.sees_robots else []
+    return [mover.kind, mover.radius, mover.speed, mover.waypoints, *timed, *route, *sees]
 
 
-def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str:
+def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]], rules: SuiteRules | None = None) -> str:
     """SHA-256 of what a policy meets."""
     geometry = [
         [
@@ -71,4 +101,7 @@ def content_hash(arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> str
         ]
         for arena in arenas
     ]
-    return hashlib.sha256(json.dumps([geometry, scenarios]).encode()).hexdigest()
+    # Suites that ask for nothing keep the hash that they had before any did.
+    asked = [rules.content()] if rules and rules.content() else []
+    content = [geometry, scenarios, *asked]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()

@@ -15,6 +15,7 @@ from sim.errors import PlacementError
 from sim.kernels.records import CELL
 from sim.kernels.step import MIN_TARGET_DISTANCE, MOVER_ROOM, SPAWN_TRIES
 from sim.streams import EVALUATION
+from sim.suites.places import BarnPlace, ScenePlace
 from sim.world import World, spawn_space
 
 COLUMNS = ("arena", "x", "y", "heading", "target_x", "target_y", "shortest_path")
@@ -98,6 +99,32 @@ def own_scenarios(documents: Sequence[ArenaFile], task: TaskConfig | None = None
                 )
         shortest = Planner(arena, task.robot.circumscribed_radius).shortest_path(*places).length
         row = [start.x, start.y, math.radians(start.heading), target.x, target.y, shortest]
+        scenarios.append([index, *(round(value, _DECIMALS) for value in row)])
+    return scenarios
+
+
+def scene_scenarios(places: Sequence[ScenePlace], task: TaskConfig) -> list[list[float]]:
+    """The scenarios of scenes among people, a list of `COLUMNS` for each; shortest paths are those around what stands.
+
+    Args:
+        places: the scenes.
+        task: whose robot drives there.
+    """
+    scenarios: list[list[float]] = []
+    for index, place in enumerate(places):
+        scene = place.build()
+        shortest = Planner(scene.arena, task.robot.circumscribed_radius).shortest_path(scene.start[:2], scene.target).length
+        row = [*scene.start, *scene.target, shortest]
+        scenarios.append([index, *(round(value, _DECIMALS) for value in row)])
+    return scenarios
+
+
+def barn_scenarios(places: Sequence[BarnPlace]) -> list[list[float]]:
+    """The scenarios of BARN's worlds, a list of `COLUMNS` for each; for the shortest path stands the challenge's."""
+    scenarios: list[list[float]] = []
+    for index, place in enumerate(places):
+        world = place.build()
+        row = [*world.start, *world.target, world.path_length()]
         scenarios.append([index, *(round(value, _DECIMALS) for value in row)])
     return scenarios
 

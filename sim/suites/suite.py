@@ -5,10 +5,11 @@ A suite's file in `sim/suites/data` holds where every scenario starts, its targe
 differs in anything is another suite, and a file that does not match its hash is refused.
 """
 
+import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib import resources
 
@@ -16,10 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arenas import Arena, arena_clearance, build_arenas
-from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, GeneratedArenaConfig, ImportedArenaConfig, TaskConfig
+from sim.arenas.build import pooled_arena
+from sim.arenas.families import SUITE_SEEDS
+from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, ArenaPool, ImportedArenaConfig, TaskConfig
 from sim.errors import PlacementError, SuiteError
-from sim.suites.places import PLACES, GeneratedPlace, build_places, content_hash, suite_places
-from sim.suites.scenarios import draw_scenarios, own_scenarios
+from sim.suites.places import PLACES, GeneratedPlace, ScenePlace, build_places, content_hash
+from sim.suites.rules import SuiteRules
+from sim.suites.scenarios import draw_scenarios, own_scenarios, scene_scenarios
 
 # Maps and scenarios of a suite that is drawn for a task.
 _DRAWN_MAPS = 20
@@ -39,7 +43,8 @@ class Suite:
         arena_indices: (S,) the arena of each scenario.
         starts: (S, 3) x, y, heading.
         targets: (S, 2).
-        shortest_paths: (S,) metres, for the default robot's body around the obstacles.
+        shortest_paths: (S,) metres, for the default robot's body around the obstacles, or that of the suite's rules.
+        rules: what it asks of a robot; by default nothing.
     """
 
     name: str
@@ -49,6 +54,7 @@ class Suite:
     starts: NDArray[np.float64]
     targets: NDArray[np.float64]
     shortest_paths: NDArray[np.float64]
+    rules: SuiteRules = field(default_factory=SuiteRules)
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -71,15 +77,18 @@ def load_suite(name: str) -> Suite:
         raise SuiteError(f"there is no suite {name!r}; there are {', '.join(suite_names())}")
     content = json.loads((resources.files("sim.suites") / "data" / f"{name}.json").read_text("utf-8"))
     arenas = build_places(PLACES.validate_python(content["arenas"]))
-    if content_hash(arenas, content["scenarios"]) != content["hash"]:
+    rules = SuiteRules.model_validate(content.get("rules", {}))
+    if content_hash(arenas, content["scenarios"], rules) != content["hash"]:
         raise SuiteError(
             f"suite {name!r} is not what its hash says: its file or its arenas have changed. Restore them, or give the new "
             "scenarios a new name (python -m sim.suites.builder NAME)"
         )
-    return _suite(name, content["hash"], arenas, content["scenarios"])
+    return _suite(name, content["hash"], arenas, content["scenarios"], rules)
 
 
-def _suite(name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[list[float]]) -> Suite:
+def _suite(
+    name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[list[float]], rules: SuiteRules | None = None
+) -> Suite:
     table = np.array(scenarios, dtype=np.float64)
     return Suite(
         name=name,
@@ -89,6 +98,7 @@ def _suite(name: str, content: str, arenas: tuple[Arena, ...], scenarios: list[l
         starts=table[:, 1:4],
         targets=table[:, 4:6],
         shortest_paths=table[:, 6],
+        rules=rules or SuiteRules(),
     )
 
 
@@ -107,11 +117,17 @@ def suite_of(name: str, documents: Sequence[ArenaFile], task: TaskConfig | None 
     return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
 
 
-def suite_in(name: str, places: Sequence[GeneratedPlace], count: int) -> Suite:
+def suite_in(name: str, places: Sequence[GeneratedPlace], count: int, rules: SuiteRules | None = None) -> Suite:
     """A suite of scenarios spread evenly over places, drawn as those of a frozen suite of this name would be."""
     arenas = build_places(places)
     scenarios = draw_scenarios(name, arenas, count)
-    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+    return _suite(name, content_hash(arenas, scenarios, rules), arenas, scenarios, rules)
+
+
+def suite_of_scenes(name: str, places: Sequence[ScenePlace], rules: SuiteRules) -> Suite:
+    """A suite of scenes among people, one scenario each: their own start and target."""
+    arenas, scenarios = build_places(places), scene_scenarios(places, rules.task())
+    return _suite(name, content_hash(arenas, scenarios, rules), arenas, scenarios, rules)
 
 
 def suite_for(task: TaskConfig) -> Suite:
@@ -148,18 +164,26 @@ def _draw_suite(arena: AnyArenaConfig, task: TaskConfig) -> Suite:
     """Scenarios for the robot and collision distance of `task`."""
     usual = task.passable_clearance <= TaskConfig().passable_clearance
     ending = f"{_DRAWN_SCENARIOS}" if usual else f"{task.passable_clearance:.2f}m-{_DRAWN_SCENARIOS}"
-    if isinstance(arena, GeneratedArenaConfig):
-        name = f"{arena.name}-{arena.difficulty:g}"
-        places = suite_places(arena.name, arena.difficulty, _DRAWN_MAPS, arena.movers)
-        arenas = build_places(places, clearance=arena_clearance(task))
+    if isinstance(arena, ArenaPool):
+        name = f"{arena.name}-{arena.difficulty:g}{_variant(arena)}"
+        seeds = SUITE_SEEDS[:_DRAWN_MAPS]
+        arenas = tuple(pooled_arena(arena, seed, clearance=arena_clearance(task)) for seed in seeds)
     else:
         arenas = build_arenas(arena)
         name = arenas[0].name[:_NAME]
     if arena.movers.count:
-        name += f"-{arena.movers.count}-{arena.movers.kind}"
+        name += f"-{arena.movers.count}-{arena.movers.kind}" + ("-seeing" if arena.movers.sees_robots else "")
     name += f"-{ending}"
     scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS, task)
     if isinstance(arena, ImportedArenaConfig) and arena.arena and arena.arena.start and arena.arena.target:
         with suppress(PlacementError):  # a start or target that this robot does not fit at
             scenarios[:1] = own_scenarios([arena.arena], task)
     return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+
+
+def _variant(arena: ArenaPool) -> str:
+    """What tells the parameters that a family of an extension has of its own from others, in the name of a suite."""
+    own = arena.model_dump(mode="json", exclude=set(ArenaPool.model_fields))
+    if own == type(arena).model_validate({}).model_dump(mode="json", include=set(own)):
+        return ""
+    return f"-{hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:6]}"

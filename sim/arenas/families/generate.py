@@ -1,6 +1,8 @@
 """From (family, difficulty, seed) to an arena in which a robot gets everywhere; the same three give the same arena."""
 
+import hashlib
 from collections.abc import Callable
+from functools import partial
 from typing import Final, get_args
 
 import numpy as np
@@ -17,6 +19,8 @@ from sim.arenas.families.warehouse import warehouse
 from sim.arenas.geometry import Arena
 from sim.config import MAX_MAPS, FamilyName
 from sim.errors import ArenaError
+from sim.extending.discovery import implementation
+from sim.extending.parts import ArenaFamily
 
 FAMILIES: Final[dict[FamilyName, Callable[[Plan], None]]] = {
     "clutter": clutter,
@@ -53,12 +57,12 @@ def pool_seeds(seed: int, maps: int) -> range:
 
 
 def generate_arena(
-    family: FamilyName, difficulty: float, seed: int, *, size: float = SIZE, clearance: float = CLEARANCE
+    family: FamilyName | ArenaFamily, difficulty: float, seed: int, *, size: float = SIZE, clearance: float = CLEARANCE
 ) -> Arena:
     """A square arena of a family.
 
     Args:
-        family: one of `FAMILIES`.
+        family: one of `FAMILIES`, or the configuration of one that an extension has added.
         difficulty: 0 (few obstacles, wide passages) to 1 (many, and passages 0.4 m wider than the robot's own space).
         seed: 0 to 2^63 - 1; the difficulty does not change the random numbers, so one seed is one layout, easy or hard.
         size: edge, 5 to 40 m.
@@ -66,9 +70,9 @@ def generate_arena(
             together but for crumbs of 2 %: there is a path between any two points of its largest part.
 
     Raises:
-        ArenaError: an argument is out of its range.
+        ArenaError: an argument is out of its range, or what an extension draws is in two parts time and again.
     """
-    if family not in FAMILIES:
+    if not isinstance(family, ArenaFamily) and family not in FAMILIES:
         raise ArenaError(f"there is no family of arenas {family!r}: choose one of {', '.join(get_args(FamilyName))}")
     if not 0.0 <= difficulty <= 1.0:
         raise ArenaError(f"a difficulty lies between 0 and 1, and {difficulty} does not")
@@ -78,14 +82,27 @@ def generate_arena(
         raise ArenaError(f"arenas are generated for clearances of {_CLEARANCES[0]} to {_CLEARANCES[1]} m, not {clearance} m")
     if not 0 <= seed < 2**63:
         raise ArenaError(f"a seed lies between 0 and 2^63 - 1, and {seed} does not")
-    name = f"{family}-{difficulty:g}-{seed}"
+    label, number, fill = _family(family)
+    name = f"{label}-{difficulty:g}-{seed}"
     for attempt in range(_ATTEMPTS):
-        entropy = np.random.SeedSequence([list(FAMILIES).index(family), attempt, seed])
+        entropy = np.random.SeedSequence([number, attempt, seed])
         plan = Plan(size, difficulty, clearance, np.random.Generator(np.random.PCG64(entropy)))
-        FAMILIES[family](plan)
+        fill(plan)
         circles, boxes = plan.turned()
         arena = Arena(name, plan.half, plan.half, circles, boxes)
         _, sizes = components(free_mask(arena, clearance, CELL))
         if len(sizes) and sizes[0] >= (1.0 - _CRUMBS) * sizes.sum():
             return arena
     raise ArenaError(f"no open arena came out of {name} at a clearance of {clearance} m: choose a larger size")
+
+
+def _family(family: FamilyName | ArenaFamily) -> tuple[str, int, Callable[[Plan], object]]:
+    """A family's name, the number that tells its random numbers from those of others, and what fills a plan."""
+    if isinstance(family, ArenaFamily):
+        number = int.from_bytes(hashlib.sha256(family.name.encode()).digest()[:8])
+        return family.name, number, partial(_filled, implementation(family), family)
+    return family, list(FAMILIES).index(family), FAMILIES[family]
+
+
+def _filled(fill: Callable[[Plan, ArenaFamily], object], family: ArenaFamily, plan: Plan) -> None:
+    fill(plan, family)
