@@ -7,4 +7,4 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 PolicyFunction = Callable[[Floats], Floats]
-"""Observations (n, numbers) to actions (n, 2), deterministic; safe to call from another thread."""
+"""Observations (n, numbers) to actions (n, A), deterministic; safe to call from another thread."""

@@ -1,15 +1,37 @@
-"""The observations that a policy may see: named, versioned and explained number by number.
+"""What every number of an observation means: where it stands, its formula, unit and range, part by part.
 
-Both have `batches + 6` numbers, 16 with the default scanner. A name's meaning never changes: a different layout gets another
-version, and a checkpoint says which one it was trained on. Where frames are stacked, the same numbers follow as they were a
-step before, two steps before and so on; an episode begins with its first frame repeated.
+`sim.config.ObservationConfig` lists the parts. An observation holds the newest moment of all of them, in the list's order,
+then those that have more frames as they were a step before, two steps before and so on; an episode begins with its first
+moment repeated.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
-from sim.config import ObservationName, TaskConfig
-from sim.kernels.records import EXTRA
+import numpy as np
+
+from sim.actions import ActionComponent, action_layout
+from sim.config import (
+    ActionsPart,
+    BearingPart,
+    DeviationPart,
+    DirectionPart,
+    DistancePart,
+    HeadingPart,
+    ObservationPart,
+    RangesPart,
+    SpeedsPart,
+    TaskConfig,
+    part_key,
+)
+from sim.config.observation import MAX_FRAMES, MAX_PARTS, part_size
+from sim.kernels.records import PART_KINDS, ROOM_FOR_FRAMES, ROOM_FOR_PARTS
+
+assert MAX_PARTS <= ROOM_FOR_PARTS
+assert MAX_FRAMES <= ROOM_FOR_FRAMES
+
+_BEARING = "where bearing = atan2(dy, dx) - heading"
 
 
 @dataclass(frozen=True)
@@ -20,94 +42,202 @@ class ObservationNumber:
         name: what it is.
         formula: how it is computed; lengths in metres, angles in radians.
         low, high: the range that it stays in.
+        unit: what 1 stands for; '' where it grows less than what it tells.
     """
 
     name: str
     formula: str
     low: float
     high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ObservationBlock:
+    """The numbers of one part at one moment.
+
+    Attributes:
+        part: whose they are.
+        age: steps since then; 0 is now.
+        start: where they begin in the observation.
+        numbers: what they are.
+    """
+
+    part: ObservationPart
+    age: int
+    start: int
+    numbers: tuple[ObservationNumber, ...]
+
+    @property
+    def key(self) -> str:
+        """The part's name."""
+        return part_key(self.part)
+
+    @property
+    def place(self) -> slice:
+        """Where they are in the observation."""
+        return slice(self.start, self.start + len(self.numbers))
 
 
 @dataclass(frozen=True)
 class ObservationLayout:
-    """What every number of an observation means."""
+    """What every number of an observation means.
 
-    name: ObservationName
-    version: Literal[1]
-    numbers: tuple[ObservationNumber, ...]
+    Attributes:
+        name: 'improved' or 'paper' where it has their parts, else how many it has.
+        blocks: its parts at their moments, in order.
+        version: of what parts mean: a part that comes to mean something else raises it.
+    """
+
+    name: str
+    blocks: tuple[ObservationBlock, ...]
+    version: Literal[1] = 1
+
+    @property
+    def numbers(self) -> tuple[ObservationNumber, ...]:
+        """All numbers, in order."""
+        return tuple(number for block in self.blocks for number in block.numbers)
 
     @property
     def size(self) -> int:
         """Numbers in one observation."""
-        return len(self.numbers)
+        return sum(len(block.numbers) for block in self.blocks)
+
+    def places(self, key: str) -> tuple[slice, ...]:
+        """Where a part's numbers are, the newest first; nowhere where the observation does not have it."""
+        return tuple(block.place for block in self.blocks if block.key == key)
 
 
 def observation_size(task: TaskConfig) -> int:
     """Numbers in one observation of this task."""
-    return task.frames * frame_size(task)
+    return task.observation.size(*_robot_sizes(task))
 
 
-def frame_size(task: TaskConfig) -> int:
-    """Numbers of one observation that belong to one moment."""
-    return task.lidar.batches + EXTRA
+def _robot_sizes(task: TaskConfig) -> tuple[int, int]:
+    """Numbers in an action, and LiDARs."""
+    return action_layout(task.robot).size, len(task.lidar.mount.places)
 
 
 def near_distance(task: TaskConfig) -> float:
-    """Distance at which the improved observation's inverse range reaches 1, metres: the collision distance or the body."""
+    """Distance at which an inverse range reaches 1, metres: the collision distance or the body."""
     return max(task.collision_distance, task.robot.inscribed_radius)
 
 
 def observation_layout(task: TaskConfig) -> ObservationLayout:
-    """Every number of a task's observation, in order: the newest frame first."""
-    newest = _frame_layout(task)
-    earlier = (
-        replace(number, name=f"{number.name}, {age} before", formula=f"{number.name} {age} step{'s'[: age > 1]} before")
-        for age in range(1, task.frames)
-        for number in newest.numbers
-    )
-    return replace(newest, numbers=(*newest.numbers, *earlier))
+    """Every number of a task's observation, in order: the newest moment first."""
+    return ObservationLayout(task.observation.in_short, tuple(_blocks(task)))
 
 
-def _frame_layout(task: TaskConfig) -> ObservationLayout:
-    rays = task.lidar.rays // task.lidar.batches
-    batches = range(task.lidar.batches)
-    velocities = (
-        ObservationNumber("linear velocity", "linear velocity of the last step / its limit", 0.0, 1.0),
-        ObservationNumber("angular velocity", "angular velocity of the last step / its limit", -1.0, 1.0),
-    )
-    if task.observation == "paper":
-        return ObservationLayout(
-            name="paper",
-            version=1,
-            numbers=(
-                *(
-                    ObservationNumber(
-                        f"range {k}", f"min(ranges[{k * rays}:{(k + 1) * rays}]) / {task.lidar.range:g}", 0.0, 1.0
-                    )
-                    for k in batches
-                ),
-                *velocities,
-                ObservationNumber("target distance", "distance to the target / the arena's diagonal", 0.0, 1.0),
-                ObservationNumber("target direction", "(atan2(dy, dx) mod 2 pi) / 2 pi, in the arena's frame", 0.0, 1.0),
-                ObservationNumber("yaw", "(heading mod 2 pi) / 2 pi", 0.0, 1.0),
-                ObservationNumber("heading deviation", "|bearing| / pi, where bearing = atan2(dy, dx) - heading", 0.0, 1.0),
-            ),
-        )
-    near = near_distance(task)
-    return ObservationLayout(
-        name="improved",
-        version=1,
-        numbers=(
-            *(
+def _blocks(task: TaskConfig) -> Iterator[ObservationBlock]:
+    start = 0
+    newest = {part_key(part): _numbers(part, task) for part in task.observation.parts}
+    for age in range(task.observation.frames):
+        for part in task.observation.parts:
+            if age < part.frames:
+                numbers = tuple(_before(number, age) for number in newest[part_key(part)])
+                yield ObservationBlock(part, age, start, numbers)
+                start += len(numbers)
+
+
+def _before(number: ObservationNumber, age: int) -> ObservationNumber:
+    if not age:
+        return number
+    formula = f"{number.name} {age} step{'s'[: age > 1]} before"
+    return ObservationNumber(f"{number.name}, {age} before", formula, number.low, number.high, number.unit)
+
+
+def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber, ...]:
+    """The numbers of a part at one moment."""
+    match part:
+        case RangesPart():
+            return tuple(_ranges(part, task))
+        case SpeedsPart():
+            return tuple(
+                ObservationNumber(one.measure, f"{one.measure} of the last step / its limit", one.low, 1.0, _unit(one))
+                for one in action_layout(task.robot).components
+            )
+        case ActionsPart():
+            return tuple(
                 ObservationNumber(
-                    f"nearness {k}", f"{near:g} / max(min(ranges[{k * rays}:{(k + 1) * rays}]), {near:g})", 0.0, 1.0
+                    f"{one.name} command", f"{one.measure} last commanded / its limit", one.low, 1.0, _unit(one)
                 )
-                for k in batches
-            ),
-            *velocities,
-            ObservationNumber("target distance", "d / (d + 1 m), where d = distance to the target", 0.0, 1.0),
-            ObservationNumber("bearing", "bearing / pi, where bearing = atan2(dy, dx) - heading, left positive", -1.0, 1.0),
-            ObservationNumber("yaw", "heading / pi", -1.0, 1.0),
-            ObservationNumber("heading deviation", "|bearing| / pi", 0.0, 1.0),
-        ),
-    )
+                for one in action_layout(task.robot).components
+            )
+        case DistancePart(scaling="diagonal"):
+            return (
+                ObservationNumber(
+                    "target distance", "distance to the target / the arena's diagonal", 0.0, 1.0, "the arena's diagonal"
+                ),
+            )
+        case DistancePart():
+            return (ObservationNumber("target distance", "d / (d + 1 m), where d = distance to the target", 0.0, 1.0),)
+        case DirectionPart():
+            formula = "(atan2(dy, dx) mod 2 pi) / 2 pi, in the arena's frame"
+            return (ObservationNumber("target direction", formula, 0.0, 1.0, "2 pi rad"),)
+        case BearingPart(encoding="sine_cosine"):
+            return (
+                ObservationNumber("sine of bearing", f"sin(bearing), {_BEARING}, left positive", -1.0, 1.0),
+                ObservationNumber("cosine of bearing", "cos(bearing)", -1.0, 1.0),
+            )
+        case BearingPart():
+            return (ObservationNumber("bearing", f"bearing / pi, {_BEARING}, left positive", -1.0, 1.0, "pi rad"),)
+        case HeadingPart(scaling="turn"):
+            return (ObservationNumber("yaw", "(heading mod 2 pi) / 2 pi", 0.0, 1.0, "2 pi rad"),)
+        case HeadingPart():
+            return (ObservationNumber("yaw", "heading / pi", -1.0, 1.0, "pi rad"),)
+        case DeviationPart():
+            return (ObservationNumber("heading deviation", f"|bearing| / pi, {_BEARING}", 0.0, 1.0, "pi rad"),)
+
+
+def _unit(component: ActionComponent) -> str:
+    return f"{component.limit:g} {component.unit.rstrip(',')}"
+
+
+def _ranges(part: RangesPart, task: TaskConfig) -> Iterator[ObservationNumber]:
+    rays, near, limit = task.lidar.rays // part.batches, near_distance(task), task.lidar.range
+    for k in range(part.batches * len(task.lidar.mount.places)):
+        nearest = f"min(ranges[{k * rays}:{(k + 1) * rays}])"
+        if part.inverse:
+            yield ObservationNumber(f"nearness {k}", f"{near:g} / max({nearest}, {near:g})", 0.0, 1.0)
+        else:
+            yield ObservationNumber(f"range {k}", f"{nearest} / {limit:g}", 0.0, 1.0, f"{limit:g} m")
+
+
+def pack_parts(task: TaskConfig) -> dict[str, object]:
+    """Those fields of `sim.kernels.records.PARAMETERS` that say what is seen."""
+    observation = task.observation
+    rows = {part_key(part): row for row, part in enumerate(observation.parts)}
+    starts = np.zeros((ROOM_FOR_PARTS, ROOM_FOR_FRAMES), np.int32)
+    for block in observation_layout(task).blocks:
+        starts[rows[block.key], block.age] = block.start
+    places, options = np.full(len(PART_KINDS), -1, np.int32), np.zeros(len(PART_KINDS), np.int32)
+    for row, part in enumerate(observation.parts):
+        kind = PART_KINDS.index(part.name)
+        places[kind], options[kind] = starts[row, 0], _option(part)
+    sizes = _robot_sizes(task)
+    room = (0, ROOM_FOR_PARTS - len(observation.parts))
+    return {
+        "part_places": places,
+        "part_options": options,
+        "batches": observation.batches * len(task.lidar.mount.places),
+        "rays_per_batch": task.lidar.rays // (observation.batches or 1),
+        "frames": observation.frames,
+        "parts": len(observation.parts),
+        "part_sizes": np.pad([part_size(part, *sizes) for part in observation.parts], room),
+        "part_frames": np.pad([part.frames for part in observation.parts], room),
+        "part_starts": starts,
+        "near": near_distance(task),
+    }
+
+
+def _option(part: ObservationPart) -> int:
+    """The one choice that a part has, as 0 for how the paper has it or 1."""
+    match part:
+        case RangesPart():
+            return int(part.inverse)
+        case DistancePart() | HeadingPart():
+            return int(part.scaling in ("saturating", "signed"))
+        case BearingPart():
+            return int(part.encoding == "sine_cosine")
+        case _:
+            return 0

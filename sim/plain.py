@@ -12,13 +12,28 @@ import numpy as np
 import pymunk
 from numpy.typing import NDArray
 
+from sim.actions import action_layout, twists
 from sim.arenas import Arena
-from sim.config import FormulaTerm, RewardTerm, TaskConfig
+from sim.config import (
+    ActionsPart,
+    BearingPart,
+    DeviationPart,
+    DirectionPart,
+    DistancePart,
+    FormulaTerm,
+    HeadingPart,
+    ObservationPart,
+    RangesPart,
+    RewardTerm,
+    SpeedsPart,
+    TaskConfig,
+)
+from sim.extending.parts import RewardTerm as AddedTerm
 from sim.footprint import rectangle_clearance
-from sim.lidar import drawn_ray_angles
+from sim.lidar import drawn_ray_angles, ray_origins
 from sim.observations import near_distance
 from sim.physics import add_arena, robot_body
-from sim.rewards import constants, evaluate
+from sim.rewards import constants, evaluate, parameters_of, program_of
 
 Outcome = Literal["none", "arrival", "collision", "timeout"]
 
@@ -26,15 +41,20 @@ _AHEAD = math.radians(30.0)
 _MAX_RATIO = 8.0
 
 
-def exact_arc(pose: tuple[float, float, float], linear: float, angular: float, time: float) -> tuple[float, float, float]:
-    """Where a differential drive ends that keeps its velocities, in m/s and rad/s, for `time` seconds from `pose`."""
+def exact_arc(
+    pose: tuple[float, float, float], linear: float, angular: float, time: float, lateral: float = 0.0
+) -> tuple[float, float, float]:
+    """Where a body ends that keeps its speeds forwards and to the left, m/s, and its turning rate, rad/s, for `time` s."""
     x, y, heading = pose
-    if abs(angular) < 1e-12:
-        return x + linear * time * math.cos(heading), y + linear * time * math.sin(heading), heading
     # The chord of a circle of radius v/w; as a difference of sines it would cancel in slow turns.
     half = angular * time / 2.0
-    chord = 2.0 * linear / angular * math.sin(half)
-    return x + chord * math.cos(heading + half), y + chord * math.sin(heading + half), heading + angular * time
+    seconds = 2.0 / angular * math.sin(half) if abs(angular) >= 1e-12 else time
+    cos, sin = math.cos(heading + half), math.sin(heading + half)
+    return (
+        x + seconds * (linear * cos - lateral * sin),
+        y + seconds * (linear * sin + lateral * cos),
+        heading + angular * time,
+    )
 
 
 def wrapped(angle: float) -> float:
@@ -84,22 +104,34 @@ class PlainWorld:
         self.body.angle = pose[2]
         self.target = target
         self.steps = 0
-        self.velocities = self.last_velocities = (0.0, 0.0)
+        self.velocities: tuple[float, ...] = (0.0,) * action_layout(task.robot).size
+        self.last_velocities = self.velocities
         self.distance = math.dist(pose[:2], target)
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
+        self._seen: list[list[NDArray[np.float64]]] = []
+        if task.observation.frames > 1:
+            self.observe(self.scan())
 
     def scan(self) -> NDArray[np.float64]:
-        """(rays,) metres, by Chipmunk's ray queries."""
+        """(scan,) metres, by Chipmunk's ray queries."""
         limit = self.task.lidar.range
         here = self.body.position
+        origins = ray_origins(self.task.lidar, [(here.x, here.y, self.body.angle)])[0].tolist()
         ranges = np.full(len(self._angles), limit)
-        for k, angle in enumerate(self._angles):
+        for k, (angle, (x, y)) in enumerate(zip(self._angles, origins, strict=True)):
             direction = self.body.angle + angle
-            end = (here.x + limit * math.cos(direction), here.y + limit * math.sin(direction))
-            hit = self.space.segment_query_first(here, end, 0.0, self.shape.filter)
+            end = (x + limit * math.cos(direction), y + limit * math.sin(direction))
+            hit = self.space.segment_query_first((x, y), end, 0.0, self.shape.filter)
             if hit is not None:
                 ranges[k] = hit.alpha * limit
         return ranges
+
+    def nearest_to_middle(self, ranges: NDArray[np.float64]) -> float:
+        """Distance of the nearest thing that a ray meets from the middle of the body, metres; infinite where none does."""
+        start = ray_origins(self.task.lidar, [(0.0, 0.0, 0.0)])[0]
+        ends = start + ranges[:, None] * np.stack([np.cos(self._angles), np.sin(self._angles)], axis=1)
+        away = np.hypot(*ends.T)[ranges < self.task.lidar.range]
+        return float(away.min(initial=math.inf))
 
     def clearance(self) -> float:
         """Distance from the body to the nearest shape, metres, negative in contact: of a disc by Chipmunk's point query."""
@@ -115,22 +147,37 @@ class PlainWorld:
         return wrapped(math.atan2(self.target[1] - here.y, self.target[0] - here.x) - self.body.angle)
 
     def observe(self, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The task's observation, see `sim.observations`."""
-        task = self.task
-        nearest = ranges.reshape(task.lidar.batches, -1).min(axis=1)
-        bearing, heading = self.bearing(), wrapped(self.body.angle)
-        if task.observation == "paper":
-            scan = nearest / task.lidar.range
-            polar = (
-                self.distance / self.arena.diagonal,
-                (bearing + heading) % math.tau / math.tau,
-                heading % math.tau / math.tau,
-            )
-        else:
-            near = near_distance(task)
-            scan = near / np.maximum(nearest, near)
-            polar = (self.distance / (self.distance + 1.0), bearing / math.pi, heading / math.pi)
-        return np.array([*scan, *self.velocities, *polar, abs(bearing) / math.pi])
+        """The task's observation after a step: what it sees now before what it saw earlier, see `sim.observations`."""
+        parts = self.task.observation.parts
+        now = [self._part(part, ranges) for part in parts]
+        self._seen = [now, *(self._seen or [now] * self.task.observation.frames)][: self.task.observation.frames]
+        return np.concatenate(
+            [seen[k] for age, seen in enumerate(self._seen) for k, part in enumerate(parts) if age < part.frames]
+        )
+
+    def _part(self, part: ObservationPart, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The numbers of one part, see `sim.config.observation`."""
+        task, bearing, heading = self.task, self.bearing(), wrapped(self.body.angle)
+        match part:
+            case RangesPart():
+                nearest = ranges.reshape(part.batches * len(task.lidar.mount.places), -1).min(axis=1)
+                near = near_distance(task)
+                return np.asarray(near / np.maximum(nearest, near) if part.inverse else nearest / task.lidar.range)
+            case SpeedsPart() | ActionsPart():  # nothing is late here
+                return np.array(self.velocities)
+            case DistancePart():
+                scale = self.arena.diagonal if part.scaling == "diagonal" else self.distance + 1.0
+                return np.array([self.distance / scale])
+            case DirectionPart():
+                return np.array([(bearing + heading) % math.tau / math.tau])
+            case BearingPart(encoding="sine_cosine"):
+                return np.array([math.sin(bearing), math.cos(bearing)])
+            case BearingPart():
+                return np.array([bearing / math.pi])
+            case HeadingPart():
+                return np.array([heading % math.tau / math.tau if part.scaling == "turn" else heading / math.pi])
+            case DeviationPart():
+                return np.array([abs(bearing) / math.pi])
 
     def reward_terms(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> tuple[float, ...]:
         """The reward's terms for a step that began `before` metres from the target (paper, Eq. 4 and 5)."""
@@ -138,8 +185,8 @@ class PlainWorld:
 
     def _worth(self, term: RewardTerm, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> float:
         """A term before its weight, see `sim.config.reward`."""
-        if isinstance(term, FormulaTerm):
-            return evaluate(term.formula, self._quantities(before, ranges, outcome))
+        if isinstance(term, FormulaTerm | AddedTerm):
+            return evaluate(program_of(term), self._quantities(before, ranges, outcome) | parameters_of(term))
         if term.name in ("arrival", "collision", "timeout"):
             return float(term.name == outcome)
         if outcome in ("arrival", "collision"):
@@ -166,20 +213,21 @@ class PlainWorld:
 
     def _ahead(self, ranges: NDArray[np.float64]) -> float:
         """Free distance within 30 degrees of the heading, metres."""
-        return float(min(r for r, angle in zip(ranges, self._angles, strict=True) if abs(angle) <= _AHEAD))
+        off = np.abs([wrapped(angle) for angle in self._angles])
+        return float(ranges[off <= max(_AHEAD, off.min()) + 1e-6].min())
 
     def _quantities(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> dict[str, float]:
-        """What formulas may read, see `sim.config.expression`."""
-        limits = self.task.robot.max_linear_speed, self.task.robot.max_angular_speed
+        """What formulas may read, see `sim.extending.expression`."""
+        (speed, _, turn), (last_speed, _, last_turn) = twists(self.task.robot, [self.velocities, self.last_velocities])
         return constants(self.task) | {
             "distance": self.distance,
             "previous_distance": before,
             "bearing": self.bearing(),
             "heading": wrapped(self.body.angle),
-            "speed": limits[0] * self.velocities[0],
-            "turning_rate": limits[1] * self.velocities[1],
-            "last_speed": limits[0] * self.last_velocities[0],
-            "last_turning_rate": limits[1] * self.last_velocities[1],
+            "speed": speed,
+            "turning_rate": turn,
+            "last_speed": last_speed,
+            "last_turning_rate": last_turn,
             "clearance": self.clearance(),
             "ahead": self._ahead(ranges),
             "nearest": float(ranges.min()),
@@ -190,25 +238,28 @@ class PlainWorld:
             "timed_out": float(outcome == "timeout"),
         }
 
-    def step(self, linear: float, angular: float) -> Step:
-        """Drive for one control period; `linear` in [0, 1] and `angular` in [-1, 1] are fractions of the limits."""
+    def step(self, *action: float) -> Step:
+        """Drive for one control period by an action, fractions of the limits within their ranges (`sim.actions`)."""
         task = self.task
-        turn = angular * task.robot.max_angular_speed
+        forwards, aside, turn = twists(task.robot, [action])[0].tolist()
         half = turn * task.control_period / 2.0
-        speed = linear * task.robot.max_linear_speed * (math.sin(half) / half if half else 1.0)
+        chord = math.sin(half) / half if half else 1.0
         direction = self.body.angle + half
-        self.body.velocity = speed * math.cos(direction), speed * math.sin(direction)
+        self.body.velocity = (
+            chord * (forwards * math.cos(direction) - aside * math.sin(direction)),
+            chord * (forwards * math.sin(direction) + aside * math.cos(direction)),
+        )
         self.body.angular_velocity = turn
         self.space.step(task.control_period)
 
         self.steps += 1
-        self.last_velocities, self.velocities = self.velocities, (linear, angular)
+        self.last_velocities, self.velocities = self.velocities, action
         before, self.distance = self.distance, math.dist(self.body.position, self.target)
         ranges = self.scan()
         outcome: Outcome = "none"
         if self.distance < task.arrival_distance:
             outcome = "arrival"
-        elif self.clearance() < 0.0 or ranges.min() < task.collision_distance:
+        elif self.clearance() < 0.0 or self.nearest_to_middle(ranges) < task.collision_distance:
             outcome = "collision"
         elif self.steps >= task.step_limit:
             outcome = "timeout"

@@ -9,7 +9,7 @@ from sim.arenas import Arena
 from sim.config import AnyRobotConfig, LidarConfig
 from sim.kernels.footprint import rectangle_clearances
 from sim.kernels.sensing import clearance_points, scan_poses
-from sim.lidar import drawn_ray_angles, padded
+from sim.lidar import drawn_ray_angles, padded, ray_origins
 from sim.shapes import pack_shapes
 
 
@@ -25,32 +25,38 @@ def scan(
 
     Args:
         arena: the place.
-        poses: (N, 3) x, y in metres, heading in radians.
-        lidar: the scanner, by default the default one.
+        poses: (N, 3) x, y of bodies in metres, heading in radians.
+        lidar: the scanner, mounted on them, by default the default one.
         movers: (K, 3) x, y, radius of what moves in it at that moment.
         fields_of_view: (N,) degrees that the rays cover from each pose, by default the scanner's.
 
     Returns:
-        (N, rays) metres, at most the LiDAR's range; 0 from inside an obstacle.
+        (N, scan) metres, at most the LiDAR's range; 0 from inside an obstacle.
     """
     lidar = lidar or LidarConfig()
     discs = np.asarray(movers, dtype=np.float64).reshape(-1, 3)
     scene = replace(arena, circles=np.vstack([arena.circles, discs])) if len(discs) else arena
     where = np.ascontiguousarray(poses, dtype=np.float32).reshape(-1, 3)
     fields = np.array([lidar.field_of_view]) if fields_of_view is None else np.asarray(fields_of_view, dtype=np.float64)
-    angles = drawn_ray_angles(lidar, fields)
-    ranges = np.empty((len(where), lidar.rays), dtype=np.float32)
-    scan_poses(
-        where,
-        np.zeros(len(where), dtype=np.int32),
-        *pack_shapes((scene,)),
-        padded(np.cos(angles)),
-        padded(np.sin(angles)),
-        np.float32(lidar.range),
-        np.int32(fields.max(initial=0.0) <= 180.0),
-        ranges,
-    )
-    return ranges
+    scans = []
+    for number, (_, _, yaw) in enumerate(lidar.mount.places):
+        first = number * lidar.rays
+        angles = drawn_ray_angles(lidar, fields)[:, first : first + lidar.rays]
+        sensors = where.copy()
+        sensors[:, :2] = ray_origins(lidar, where)[:, first] if lidar.mount.name != "centre" else where[:, :2]
+        ranges = np.empty((len(where), lidar.rays), dtype=np.float32)
+        scan_poses(
+            sensors,
+            np.zeros(len(where), dtype=np.int32),
+            *pack_shapes((scene,)),
+            padded(np.cos(angles)),
+            padded(np.sin(angles)),
+            np.float32(lidar.range),
+            np.int32(fields.max(initial=0.0) <= 180.0 and yaw == 0.0),
+            ranges,
+        )
+        scans.append(ranges)
+    return np.concatenate(scans, axis=1)
 
 
 def body_clearances(arena: Arena, poses: ArrayLike, robot: AnyRobotConfig) -> NDArray[np.float32]:

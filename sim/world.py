@@ -7,36 +7,38 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.actions import action_layout, fastest_way
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import FreeSpace, free_space
-from sim.config import RandomisationConfig, TaskConfig
-from sim.config.expression import QUANTITIES
+from sim.config import AckermannDrive, OmnidirectionalDrive, RandomisationConfig, TaskConfig
 from sim.disturbances import longest_delay, quantity_spans
 from sim.errors import PlacementError
+from sim.extending.expression import QUANTITIES
 from sim.footprint import rectangle_clearance
 from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
 from sim.kernels.random import seed_streams
 from sim.kernels.records import (
+    ACKERMANN,
+    DIFFERENTIAL,
     DISTANCE_NOISE,
     DROPOUT,
     FIELD_OF_VIEW,
     HEADING_NOISE,
-    IMPROVED,
     MAX_ANGULAR,
     MAX_LINEAR,
     NOISE,
-    PAPER,
+    OMNIDIRECTIONAL,
     PARAMETERS,
     RANGE,
     RATE,
     ROBOT,
 )
-from sim.kernels.step import ARRIVAL_MARGIN, MIN_TARGET_DISTANCE, reset_robots, step_robots
+from sim.kernels.step import ARRIVAL_MARGIN, MIN_TARGET_DISTANCE, reset_robots, step_any_robots, step_usual_robots
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.movers import Movers
-from sim.observations import near_distance, observation_size
+from sim.observations import observation_size, pack_parts
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.rewards import Formulas, pack_terms, reads_changes
 from sim.shapes import pack_shapes
@@ -49,7 +51,7 @@ Restart = Literal["same step", "next step", "reset"]
 """When a robot whose episode has ended begins the next one: in that step, in the one after it whatever its action, or when
 `World.reset` is called."""
 
-_OBSERVATIONS = {"paper": PAPER, "improved": IMPROVED}
+_DRIVES = {"differential": DIFFERENTIAL, "omnidirectional": OMNIDIRECTIONAL, "ackermann": ACKERMANN}
 
 
 def spawn_space(task: TaskConfig, arena: Arena) -> FreeSpace:
@@ -68,10 +70,24 @@ def _path_samples(task: TaskConfig) -> int:
     A fast robot could jump through a wall otherwise, and a corner of a rectangular one sweep over a pole.
     """
     robot = task.robot
-    _, (fastest, turning) = quantity_spans(task)[[MAX_LINEAR, MAX_ANGULAR]].T
+    _, (linear, turning) = quantity_spans(task)[[MAX_LINEAR, MAX_ANGULAR]].T.tolist()
+    fastest = fastest_way(robot, linear, turning)
     if robot.half_extents:
         fastest += turning * robot.circumscribed_radius
-    return math.ceil(float(fastest) * task.control_period / robot.inscribed_radius)
+    return math.ceil(fastest * task.control_period / robot.inscribed_radius)
+
+
+def _pack_drive(task: TaskConfig) -> dict[str, object]:
+    """The drive's fields of the parameters."""
+    drive = task.robot.drive
+    values: dict[str, object] = {"drive": _DRIVES[drive.name], "least_linear": 0.0 - drive.reverse}
+    if isinstance(drive, OmnidirectionalDrive):
+        values["sideways"] = drive.sideways
+    if isinstance(drive, AckermannDrive):
+        values["wheel_base"] = drive.wheel_base
+        values["steering_limit"] = math.radians(drive.steering_limit)
+        values["steering_rate"] = math.radians(drive.steering_rate)
+    return values
 
 
 def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) -> NDArray[np.void]:
@@ -90,6 +106,7 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "spans": spans,
         "perceives": bool(spans[[NOISE, DROPOUT, RATE]].any() or spans[RANGE, 0] < task.lidar.range),
         "drifts": bool(spans[[DISTANCE_NOISE, HEADING_NOISE]].any()),
+        **_pack_drive(task),
         "max_linear_acceleration": task.robot.max_linear_acceleration,
         "max_angular_acceleration": task.robot.max_angular_acceleration,
         "radius": task.robot.inscribed_radius,
@@ -97,12 +114,10 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "half_width": half_width,
         "range": task.lidar.range,
         "field_of_view": task.lidar.field_of_view,
-        "looks_ahead": spans[FIELD_OF_VIEW, 1] <= 180.0,
-        "batches": task.lidar.batches,
-        "rays_per_batch": task.lidar.rays // task.lidar.batches,
-        "observation": _OBSERVATIONS[task.observation],
-        "frames": task.frames,
-        "near": near_distance(task),
+        "mounted": any(any(place) for place in task.lidar.mount.places) or len(task.lidar.mount.places) > 1,
+        "lidars": len(task.lidar.mount.places),
+        "mounts": np.resize(np.array(task.lidar.mount.places), (2, 3)),
+        "looks_ahead": spans[FIELD_OF_VIEW, 1] <= 180.0 and not any(yaw for _, _, yaw in task.lidar.mount.places),
         "arrival_distance": task.arrival_distance,
         "collision_distance": task.collision_distance,
         "step_limit": task.step_limit,
@@ -112,7 +127,7 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "min_target_distance": max(float(MIN_TARGET_DISTANCE), task.arrival_distance + ARRIVAL_MARGIN),
         "path_samples": _path_samples(task),
     }
-    for name, value in (values | pack_terms(task.reward)).items():
+    for name, value in (values | pack_parts(task) | pack_terms(task.reward)).items():
         parameters[name] = value
     return parameters
 
@@ -122,7 +137,10 @@ class World:
 
     A robot goes on after an arrival, with a new target, unless that ends the episode; after a collision or a time-out it
     starts anew, in an arena drawn from the pool. Its fate depends on the seed and its own index, never on the number of
-    robots. Robots do not see one another; they see movers, which take no notice of them.
+    robots. Robots do not see one another; they see movers, which take no notice of them unless they are made to.
+
+    Movers that see robots go otherwise for each robot that is among them: there is then a copy of the arenas for every robot
+    and arena, in which a robot is alone if `reset` is told arenas, and meets few others where it draws them.
 
     Args:
         task: robot, LiDAR, observation, reward and limits.
@@ -159,17 +177,28 @@ class World:
     ) -> None:
         self.task = task
         self.arenas = tuple(arenas)
-        replicas = math.ceil(robots / (ROBOTS_PER_TILE * len(self.arenas)))
+        watched = any(mover.sees_robots for arena in self.arenas for mover in arena.movers)
+        self._crowding = crowding = (1 if watched else ROBOTS_PER_TILE) * len(self.arenas)
+        replicas = math.ceil(robots / crowding)
         origins = tile_origins(self.arenas, replicas)
         nowhere = np.empty((0, 2), dtype=np.float32)
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
         bounds, circles, boxes = shapes = pack_shapes(self.arenas)
-        self.movers = Movers(self.arenas, shapes, origins, task.control_period, alike=not respawn)
+        self.movers = Movers(
+            self.arenas,
+            shapes,
+            origins,
+            task.control_period,
+            alike=not respawn,
+            robots=robots,
+            robot_radius=task.passable_clearance,
+        )
         spans = quantity_spans(task)
         fields = np.full(robots if task.randomisation.field_of_view else 1, spans[FIELD_OF_VIEW, 0])
         angles = drawn_ray_angles(task.lidar, fields)
-        ray_cos, ray_sin = padded(np.cos(angles)), padded(np.sin(angles))
-        ray_x, ray_y, scan = np.empty((3, ray_cos.shape[1]), dtype=np.float32)
+        lidars = len(task.lidar.mount.places)
+        ray_cos, ray_sin = padded(np.cos(angles), lidars), padded(np.sin(angles), lidars)
+        ray_x, ray_y, scan = np.empty((3, ray_cos.shape[1] // lidars), dtype=np.float32)
         self.geometry = Geometry(
             bounds=bounds,
             circles=circles,
@@ -188,12 +217,13 @@ class World:
         )
         numbers = observation_size(task)
         self._formulas = formulas = Formulas(task, robots)
+        sees_actions = any(part.name == "actions" for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
             poses=np.zeros((robots, 3), dtype=np.float32),
             targets=np.zeros((robots, 2), dtype=np.float32),
-            ranges=np.zeros((robots, task.lidar.rays), dtype=np.float32),
+            ranges=np.zeros((robots, task.lidar.scan_size), dtype=np.float32),
             observations=np.zeros((robots, numbers), dtype=np.float32),
             final_observations=np.zeros((robots, numbers), dtype=np.float32),
             rewards=np.zeros(robots, dtype=np.float32),
@@ -205,16 +235,22 @@ class World:
             drawn=np.tile(spans[:, 0], (robots, 1)),
             ray_cos=ray_cos,
             ray_sin=ray_sin,
-            ahead=np.array([rays_ahead(row, 1.0) for row in angles], dtype=np.int32),
+            ahead=np.array([rays_ahead(row[: task.lidar.rays], 1.0) for row in angles], dtype=np.int32),
             drift=np.zeros((robots if drifts else 0, 3)),
-            pending=np.zeros((robots, longest_delay(task), 2), dtype=np.float32),
-            held_ranges=np.zeros((robots if holds else 0, task.lidar.rays), dtype=np.float32),
+            pending=np.zeros((robots, longest_delay(task), action_layout(task.robot).size), dtype=np.float32),
+            commands=np.zeros((robots if sees_actions else 0, action_layout(task.robot).size), dtype=np.float32),
+            held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=restart == "same step")
+        is_usual = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
+        self._step_robots = step_usual_robots if is_usual else step_any_robots
         self._parameters["replica_stride"] = len(self.arenas)
-        self._parameters["closing"] = (spans[MAX_LINEAR, 1] + self.movers.fastest) * task.control_period
-        self.robots.records["replica"] = np.arange(robots) // (ROBOTS_PER_TILE * len(self.arenas))
+        self._parameters["closing"] = (
+            fastest_way(task.robot, spans[MAX_LINEAR, 1], spans[MAX_ANGULAR, 1]) + self.movers.fastest
+        ) * task.control_period
+        self._alone = watched and not respawn
+        self.robots.records["replica"] = np.arange(robots) // crowding
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self._placed = np.zeros(robots, dtype=np.int32)
         self._restart, self._stream = restart, stream
@@ -252,6 +288,8 @@ class World:
         placed = self._placements("poses", poses, 3, maps)
         aimed = self._placements("targets", targets, 2, maps)
         self.robots.records["map"] = maps
+        if self._alone and arenas is not None:
+            self.robots.records["replica"] = self._replicas_of_their_own(maps)
         self.robots.records["parked"] = 0
         self.movers.place()
         space = self._space
@@ -259,6 +297,23 @@ class World:
         everybody = np.ones(n, dtype=np.bool_)
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
+
+    def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
+        """(N,) copies of their arenas (N,) in which robots are alone.
+
+        Raises:
+            PlacementError: an arena has fewer copies than robots.
+        """
+        order = np.argsort(maps, kind="stable")
+        ranks = np.empty(len(maps), dtype=np.int32)
+        ranks[order] = np.arange(len(maps)) - np.searchsorted(maps[order], maps[order])
+        copies = len(self.geometry.origins) // len(self.arenas)
+        if ranks.max(initial=0) >= copies:
+            raise PlacementError(
+                f"movers that see robots need a copy of an arena for each: there are {copies}, and {ranks.max() + 1} robots "
+                "in one; spread them evenly over the arenas"
+            )
+        return ranks
 
     def reset_with(self, options: Mapping[str, ArrayLike] | None) -> None:
         """`reset`, with its arguments as Gymnasium passes them.
@@ -307,7 +362,7 @@ class World:
         """Drive every robot for one control period.
 
         Args:
-            actions: (N, 2) float32, linear in [0, 1] and angular in [-1, 1] as fractions of the robot's limits; clipped.
+            actions: (N, A) float32 fractions of the robot's limits, see `sim.actions`; clipped.
                 What it is makes no difference to robots that begin their next episode in this step.
 
         Raises:
@@ -318,13 +373,14 @@ class World:
         ended = self.robots.terminations | self.robots.truncations if self._restart == "next step" else None
         if ended is not None:
             self.robots.records["parked"][ended] = 1
+        self.movers.look(self.robots, self._parameters)
         invalid = write_commands(actions, self.robots, space.state, space.command, self._parameters)
         if invalid >= 0:
             raise ValueError(f"the action of robot {invalid} is not finite: {actions[invalid].tolist()}")
         if len(self.movers):
             self.movers.step(space.command, len(self))
         space.step(self.task.control_period)
-        count = step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
+        count = self._step_robots(space.state, self._placed, self.robots, self.geometry, self._parameters)
         if count:
             space.put(self._placed[:count])
         self._formulas.add(self.robots)
@@ -344,11 +400,24 @@ class World:
         fields: NDArray[np.float64] = self.robots.drawn[:, FIELD_OF_VIEW]
         return fields
 
+    def followed(self) -> NDArray[np.float32]:
+        """(N, A) commands that were followed in the last step: late, and limited by accelerations."""
+        # The last number of an action is kept as `angular`, whatever it turns the robot by.
+        names = (*action_layout(self.task.robot).names[:-1], "angular")
+        return np.stack([self.robots.records[name] for name in names], axis=1)
+
     def tiles(self) -> NDArray[np.int32]:
         """(N,) which copy of an arena each robot is in: a row of the movers' discs; modulo the arenas it is the arena."""
         records = self.robots.records
         tiles: NDArray[np.int32] = records["replica"] * np.int32(len(self.arenas)) + records["map"]
         return tiles
+
+    def velocities(self, which: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(n, 2) of some robots in the last step, m/s and rad/s."""
+        records, drawn = self.robots.records[which], self.robots.drawn[which]
+        fractions = np.stack([records["linear"], records["angular"]], axis=1)
+        velocities: NDArray[np.float32] = (fractions * drawn[:, [MAX_LINEAR, MAX_ANGULAR]]).astype(np.float32)
+        return velocities
 
     def park(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> None:
         """Leave robots standing, at next to no cost, until the next `reset`; their outcomes stay 0."""
@@ -356,14 +425,17 @@ class World:
 
     def _state(self) -> dict[str, NDArray[np.generic]]:
         """The arrays that the future depends on; those that have nothing to say in this task are left out."""
-        changes = {"last_linear", "last_angular"} if not reads_changes(self.task.reward) else set()
-        names = (name for name in ROBOT.names or () if name not in changes)
+        unread = {"last_linear", "last_angular", "last_lateral"} if not reads_changes(self.task.reward) else set()
+        if self.task.robot.drive.name != "omnidirectional":
+            unread |= {"lateral", "last_lateral"}
+        names = (name for name in ROBOT.names or () if name not in unread)
         state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in names}
         drawn = self.task.randomisation
         constant = {"records", "terms", "quantities"} | (set() if drawn != RandomisationConfig() else {"drawn"})
         constant |= set() if drawn.field_of_view else {"ray_cos", "ray_sin", "ahead"}
         arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
-        rays = self.task.lidar.rays
+        # Zeros behind the rays were not part of it when there was one LiDAR only.
+        rays = self.task.lidar.rays if len(self.task.lidar.mount.places) == 1 else None
         arrays |= {"ray_cos": self.robots.ray_cos[:, :rays], "ray_sin": self.robots.ray_sin[:, :rays]}
         state |= {name: array for name, array in arrays.items() if array.size and name not in constant}
         state["bodies"] = self._space.state

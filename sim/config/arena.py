@@ -1,13 +1,15 @@
 """Where robots drive: built-in arenas, pools that are drawn from a seed, and arenas from files (pydantic only)."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from sim.config.arena_file import ArenaFile
 from sim.config.base import ADVANCED, HIDDEN, Frozen
 from sim.config.movers import MoversConfig
+from sim.extending.discovery import added, complete, with_added
+from sim.extending.parts import ArenaFamily
 
 ArenaName = Literal["simple", "complex"]
 FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed"]
@@ -28,15 +30,10 @@ MAX_MAPS = 4096
 """Maps of the largest pool; pools of different seeds never share a map."""
 
 
-class GeneratedArenaConfig(Frozen):
-    """A pool of arenas drawn from a seed; the robots are spread over all of them."""
+class ArenaPool(Frozen):
+    """A pool of arenas of a family, drawn from a seed; the robots are spread over all of them."""
 
-    name: FamilyName = Field(
-        "clutter",
-        title="Arena",
-        description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
-        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed.",
-    )
+    name: str
     difficulty: float = Field(
         0.5,
         ge=0.0,
@@ -77,6 +74,17 @@ class GeneratedArenaConfig(Frozen):
         return arena
 
 
+class GeneratedArenaConfig(ArenaPool):
+    """A pool of arenas of a family that is built in."""
+
+    name: FamilyName = Field(
+        "clutter",
+        title="Arena",
+        description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
+        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed.",
+    )
+
+
 class ImportedArenaConfig(Frozen):
     """An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash."""
 
@@ -99,4 +107,16 @@ class ImportedArenaConfig(Frozen):
         return cls(sha256=arena.sha256, arena=arena)
 
 
-AnyArenaConfig = Annotated[ArenaConfig | GeneratedArenaConfig | ImportedArenaConfig, Field(discriminator="name")]
+class AddedArenaPool(ArenaPool, ArenaFamily):
+    """A pool of arenas of a family that an extension has added."""
+
+
+ADDED_FAMILIES = tuple(complete(family, AddedArenaPool) for family in added(ArenaFamily))
+"""The configurations of the families that extensions have added."""
+
+if TYPE_CHECKING:
+    AnyArenaConfig = ArenaConfig | GeneratedArenaConfig | AddedArenaPool | ImportedArenaConfig
+else:
+    AnyArenaConfig = Annotated[
+        with_added(ArenaConfig | GeneratedArenaConfig | ImportedArenaConfig, ADDED_FAMILIES), Field(discriminator="name")
+    ]

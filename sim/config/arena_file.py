@@ -77,7 +77,15 @@ class Target(_Part):
     y: Coordinate
 
 
+def _default(value: object) -> bool:
+    """Left out of files: arenas keep the hash that they had before a mover could be told."""
+    return not value
+
+
 class _MoverPart(_Part):
+    sees_robots: bool = Field(
+        False, exclude_if=_default, description="Whether it gives way to robots; else it goes as if there were none."
+    )
     radius: MoverRadius = Field(0.25, description="Metres.")
     speed: MoverSpeed = Field(1.0, description="Top speed, metres per second.")
 
@@ -114,9 +122,19 @@ class Walker(_MoverPart):
 
 
 class Pedestrian(_MoverPart):
-    """Walks from place to place and avoids the others."""
+    """Walks from place to place, or along its route, and avoids the others."""
 
     kind: Literal["pedestrian"]
+    waypoints: tuple[Waypoint, ...] = Field(
+        (),
+        max_length=MAX_WAYPOINTS,
+        strict=False,
+        exclude_if=_default,
+        description="Its route from its start on; one alone is where it stands. Without any it goes where it likes.",
+    )
+    stays: bool = Field(
+        False, exclude_if=_default, description="Whether it stays at the end of its route; it begins anew otherwise."
+    )
 
 
 class Keyframe(_Part):

@@ -21,9 +21,7 @@ MoverRadius = Annotated[float, Field(ge=0.1, le=0.5, allow_inf_nan=False)]
 class MoversConfig(Frozen):
     """Movers that are put into every arena of a task."""
 
-    count: int = Field(
-        0, ge=0, le=MAX_MOVERS, title="Moving obstacles", description="In each arena; they never give way to a robot."
-    )
+    count: int = Field(0, ge=0, le=MAX_MOVERS, title="Moving obstacles", description="In each arena.")
     kind: MoverKind = Field(
         "pedestrian",
         title="Movement",
@@ -36,6 +34,13 @@ class MoversConfig(Frozen):
         title="Speed",
         description="Top speed, metres per second.",
         json_schema_extra=ADVANCED | needs("count"),
+    )
+    sees_robots: bool = Field(
+        False,
+        title="See robots",
+        description="They give way to robots as to one another, and walk into none that stands; else they walk as if there "
+        "were no robot.",
+        json_schema_extra=needs("count"),
     )
     radius: MoverRadius = Field(
         0.25, title="Radius", description="Metres.", json_schema_extra=ADVANCED | needs("count")

@@ -6,12 +6,14 @@ other terms but formulas of one's own in every step that ends in neither arrival
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from sim.config.base import ADVANCED, Frozen
-from sim.config.expression import MAX_CHARACTERS, parse
+from sim.extending.discovery import added, with_added
+from sim.extending.expression import MAX_CHARACTERS, parse
+from sim.extending.parts import RewardTerm as AddedTerm
 
 MAX_TERMS = 16
 """Terms of one reward, at most."""
@@ -91,14 +93,14 @@ class AlignmentTerm(Frozen):
 
 
 class SmoothnessTerm(Frozen):
-    """Changes of the command: (change of linear)² + (change of angular velocity)², both as fractions of their limits."""
+    """Changes of the command: the squared changes of its numbers, as fractions of their limits, added up."""
 
     name: Literal["smoothness"] = Field("smoothness", title="Smoothness")
     weight: float = _weight(-1.0, "per unit")
 
 
 class SpeedTerm(Frozen):
-    """Linear speed, metres per second."""
+    """Speed forwards, metres per second; less than nothing backwards."""
 
     name: Literal["speed"] = Field("speed", title="Speed")
     weight: float = _weight(1.0, "per step at 1 m/s")
@@ -142,7 +144,7 @@ class FormulaTerm(Frozen):
         return text
 
 
-RewardTerm = Annotated[
+BuiltInTerm = (
     ArrivalTerm
     | CollisionTerm
     | TimeoutTerm
@@ -154,9 +156,13 @@ RewardTerm = Annotated[
     | SmoothnessTerm
     | SpeedTerm
     | PeopleTerm
-    | FormulaTerm,
-    Field(discriminator="name"),
-]
+    | FormulaTerm
+)
+
+if TYPE_CHECKING:
+    RewardTerm = BuiltInTerm | AddedTerm
+else:
+    RewardTerm = Annotated[with_added(BuiltInTerm, added(AddedTerm)), Field(discriminator="name")]
 
 RewardPreset = Literal["basic", "clearance", "alignment"]
 """The paper's rewards. It leaves open what hd, the second factor of the advanced one's penalty, is: here the free distance

@@ -17,7 +17,7 @@ def _top_speed(default: float) -> Any:
         gt=0.0,
         le=3.0,
         title="Top speed",
-        description="Metres per second; the robot does not reverse.",
+        description="Metres per second forwards.",
         json_schema_extra=ADVANCED,
     )
 
@@ -28,7 +28,7 @@ def _top_turning_rate(default: float) -> Any:
         gt=0.0,
         le=6.0,
         title="Top turning rate",
-        description="Radians per second, both ways.",
+        description="Radians per second, both ways; an Ackermann drive steers less where it would turn faster.",
         json_schema_extra=ADVANCED,
     )
 
@@ -54,9 +54,85 @@ def _width(default: float) -> Any:
     return Field(default, gt=0.04, le=2.0, title="Width", description="Of the body, metres.", json_schema_extra=ADVANCED)
 
 
-class _Drive(Frozen):
-    """Limits of a differential drive."""
+def _reverse(default: float) -> Any:
+    return Field(
+        default,
+        ge=0.0,
+        le=1.0,
+        title="Reverse",
+        description="Fastest backwards, as a share of the top speed; 0 never reverses.",
+        json_schema_extra=ADVANCED,
+    )
 
+
+class DifferentialDrive(Frozen):
+    """Two driven wheels: it drives forwards or backwards, and turns about its middle."""
+
+    name: Literal["differential"] = Field("differential", title="Differential")
+    reverse: float = _reverse(0.0)
+
+
+class OmnidirectionalDrive(Frozen):
+    """Wheels that also roll sideways: it drives any way while it turns about its middle; speeds hold for each axis."""
+
+    name: Literal["omnidirectional"] = Field("omnidirectional", title="Omni")
+    reverse: float = _reverse(1.0)
+    sideways: float = Field(
+        1.0,
+        gt=0.0,
+        le=1.0,
+        title="Sideways",
+        description="Fastest to either side, as a share of the top speed.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class AckermannDrive(Frozen):
+    """Steered front wheels, as a car's: it drives on circles about points abeam of its rear axle, and never on the spot.
+
+    The body's middle is half-way between the axles. Speeds are those of the rear axle's middle, which turns on a circle of
+    radius wheel base / tan(steering angle).
+    """
+
+    name: Literal["ackermann"] = Field("ackermann", title="Ackermann")
+    wheel_base: float = Field(
+        0.16,
+        ge=0.02,
+        le=2.0,
+        title="Wheel base",
+        description="Metres between the axles.",
+        json_schema_extra=ADVANCED,
+    )
+    steering_limit: float = Field(
+        30.0,
+        ge=1.0,
+        le=80.0,
+        title="Steering limit",
+        description="Degrees to either side.",
+        json_schema_extra=ADVANCED,
+    )
+    steering_rate: float = Field(
+        0.0,
+        ge=0.0,
+        le=10_000.0,
+        title="Steering rate",
+        description="Degrees per second that the steering angle changes at most; 0 is unlimited.",
+        json_schema_extra=ADVANCED,
+    )
+    reverse: float = _reverse(1.0)
+
+
+AnyDrive = Annotated[DifferentialDrive | OmnidirectionalDrive | AckermannDrive, Field(discriminator="name")]
+
+
+def _drive(default: type[DifferentialDrive | OmnidirectionalDrive | AckermannDrive] = DifferentialDrive) -> Any:
+    return Field(default_factory=default, title="Drive", description="How its wheels move it.", json_schema_extra=ADVANCED)
+
+
+class _Limits(Frozen):
+    """The drive, and how fast it may go."""
+
+    drive: AnyDrive = _drive()
     max_linear_speed: float = _top_speed(0.25)
     max_angular_speed: float = _top_turning_rate(1.0)
     max_linear_acceleration: float = Field(
@@ -72,12 +148,12 @@ class _Drive(Frozen):
         ge=0.0,
         le=100.0,
         title="Angular acceleration",
-        description="Radians per second squared, both ways; 0 is unlimited.",
+        description="Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.",
         json_schema_extra=ADVANCED,
     )
 
 
-class DiscRobot(_Drive):
+class DiscRobot(_Limits):
     """A round body."""
 
     radius: float = _radius(0.105)
@@ -98,7 +174,7 @@ class DiscRobot(_Drive):
         return self.radius
 
 
-class RectangularRobot(_Drive):
+class RectangularRobot(_Limits):
     """A rectangular body that turns about its middle."""
 
     length: float = _length(0.5)
@@ -163,6 +239,43 @@ class JackalConfig(RectangularRobot):
     max_angular_speed: float = _top_turning_rate(4.0)
 
 
+class RacecarConfig(RectangularRobot):
+    """A car like F1TENTH's: 0.58 x 0.31 m, axles 0.33 m apart, steering up to 24 degrees at 183 degrees a second.
+
+    From the vehicle parameters of its simulator (f1tenth/f1tenth_gym: gym/f110_gym/envs/f110_env.py: length, width, lf + lr,
+    s_max, sv_max), whose middle of mass is within 7 mm of half-way between the axles. The real one drives 20 m/s; here it
+    goes at 1 m/s.
+    """
+
+    name: Literal["racecar"] = Field("racecar", title="F1TENTH-like car")
+    length: float = _length(0.58)
+    width: float = _width(0.31)
+    max_linear_speed: float = _top_speed(1.0)
+    max_angular_speed: float = _top_turning_rate(3.0)
+    drive: AnyDrive = Field(
+        default_factory=lambda: AckermannDrive(wheel_base=0.3302, steering_limit=24.0, steering_rate=183.0),
+        title="Drive",
+        description="How its wheels move it.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class RidgebackConfig(RectangularRobot):
+    """A robot like Clearpath's Ridgeback: 0.96 x 0.793 m on mecanum wheels, 1 m/s along each axis and 4 rad/s.
+
+    The speeds are the limits of its controller (ridgeback/ridgeback: ridgeback_control/config/control.yaml), which also
+    allows 1 m/s² and 25 rad/s². The size is the
+    one that is quoted as the maker's specification; the data sheet itself was not at hand.
+    """
+
+    name: Literal["ridgeback"] = Field("ridgeback", title="Ridgeback-like")
+    length: float = _length(0.96)
+    width: float = _width(0.793)
+    max_linear_speed: float = _top_speed(1.0)
+    max_angular_speed: float = _top_turning_rate(4.0)
+    drive: AnyDrive = _drive(OmnidirectionalDrive)
+
+
 class RoundConfig(DiscRobot):
     """Any robot with a round body."""
 
@@ -181,5 +294,6 @@ class RectangularConfig(RectangularRobot):
 
 
 AnyRobotConfig = Annotated[
-    BurgerConfig | WaffleConfig | JackalConfig | RoundConfig | RectangularConfig, Field(discriminator="name")
+    BurgerConfig | WaffleConfig | JackalConfig | RacecarConfig | RidgebackConfig | RoundConfig | RectangularConfig,
+    Field(discriminator="name"),
 ]

@@ -1,6 +1,7 @@
 """What a robot perceives, and how badly: LiDAR, odometry, and what is drawn anew for every episode (pydantic only)."""
 
-from typing import Annotated, Any, Self
+import math
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -10,24 +11,86 @@ MAX_DELAY = 5
 """Longest delay of a command, control steps."""
 
 
-class LidarConfig(Frozen):
-    """A planar scanner that looks ahead; the observation holds the minimum of each batch of neighbouring rays."""
-
-    rays: int = Field(30, ge=3, le=360, title="Rays", description="Rays per scan.", json_schema_extra=ADVANCED)
-    batches: int = Field(
-        10,
-        ge=1,
-        le=120,
-        title="Batches",
-        description="Numbers of the scan that the policy sees; must divide the rays.",
+def _place(title: str, default: float = 0.0) -> Any:
+    return Field(
+        default,
+        ge=-2.0,
+        le=2.0,
+        title=title,
+        description="Metres from the body's middle, within the body.",
         json_schema_extra=ADVANCED,
     )
+
+
+def _yaw(title: str, default: float = 0.0) -> Any:
+    return Field(
+        default,
+        ge=-180.0,
+        le=180.0,
+        title=title,
+        description="Degrees that its field of view is turned to the left.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class CentredMount(Frozen):
+    """One LiDAR in the body's middle, looking ahead."""
+
+    name: Literal["centre"] = Field("centre", title="Middle")
+
+    @property
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """Of each LiDAR, in the order of the scan: x ahead and y to the left of the middle, metres; yaw, radians."""
+        return ((0.0, 0.0, 0.0),)
+
+
+class SingleMount(Frozen):
+    """One LiDAR anywhere on the body."""
+
+    name: Literal["single"] = Field("single", title="Elsewhere")
+    x: float = _place("Ahead", 0.05)
+    y: float = _place("To the left")
+    yaw: float = _yaw("Turned by")
+
+    @property
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """See `CentredMount.places`."""
+        return ((self.x, self.y, math.radians(self.yaw)),)
+
+
+class DoubleMount(Frozen):
+    """Two LiDARs of one kind; the scan is the first one's rays, then the second one's."""
+
+    name: Literal["double"] = Field("double", title="Two")
+    x: float = _place("First, ahead", 0.05)
+    y: float = _place("First, to the left")
+    yaw: float = _yaw("First, turned by")
+    second_x: float = _place("Second, ahead", -0.05)
+    second_y: float = _place("Second, to the left")
+    second_yaw: float = _yaw("Second, turned by", 180.0)
+
+    @property
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """See `CentredMount.places`."""
+        return (
+            (self.x, self.y, math.radians(self.yaw)),
+            (self.second_x, self.second_y, math.radians(self.second_yaw)),
+        )
+
+
+AnyMount = Annotated[CentredMount | SingleMount | DoubleMount, Field(discriminator="name")]
+
+
+class LidarConfig(Frozen):
+    """A planar scanner, or two alike, where they are mounted."""
+
+    rays: int = Field(30, ge=3, le=360, title="Rays", description="Rays per scan.", json_schema_extra=ADVANCED)
     field_of_view: float = Field(
         180.0,
         gt=0.0,
         le=360.0,
         title="Field of view",
-        description="Degrees, symmetric about the heading.",
+        description="Degrees, symmetric about where it looks.",
         json_schema_extra=ADVANCED,
     )
     range: float = Field(3.5, gt=0.2, le=30.0, title="Range", description="Metres.", json_schema_extra=ADVANCED)
@@ -56,11 +119,17 @@ class LidarConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
 
-    @model_validator(mode="after")
-    def _batches_divide_rays(self) -> Self:
-        if self.rays % self.batches:
-            raise ValueError(f"batches must divide rays, and {self.batches} does not divide {self.rays}")
-        return self
+    mount: AnyMount = Field(
+        default_factory=CentredMount,
+        title="Mount",
+        description="Where it stands on the body, above what would hide anything from it.",
+        json_schema_extra=ADVANCED,
+    )
+
+    @property
+    def scan_size(self) -> int:
+        """Rays of a whole scan: of both LiDARs where there are two."""
+        return self.rays * len(self.mount.places)
 
 
 class OdometryConfig(Frozen):
@@ -101,7 +170,7 @@ def _span(title: str, what: str) -> Any:
 class RandomisationConfig(Frozen):
     """What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
 
-    Rays and batches decide how many numbers an observation has, so they cannot be drawn.
+    Rays decide how many numbers an observation has, so they cannot be drawn.
     """
 
     range: tuple[Annotated[float, Field(gt=0.2, le=30.0)], ...] = _span(

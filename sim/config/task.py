@@ -1,17 +1,17 @@
 """What an environment is: arena, robot, sensors, observation, reward and limits (pydantic only)."""
 
+import math
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from sim.config.arena import AnyArenaConfig, ArenaConfig
 from sim.config.base import ADVANCED, Frozen
+from sim.config.observation import MAX_ACTIONS, MAX_NUMBERS, ObservationConfig, read_first_observations
 from sim.config.reward import RewardConfig
 from sim.config.robot import AnyRobotConfig, BurgerConfig
 from sim.config.sensing import MAX_DELAY, LidarConfig, OdometryConfig, RandomisationConfig
-
-ObservationName = Literal["paper", "improved"]
 
 
 class TaskConfig(Frozen):
@@ -25,19 +25,7 @@ class TaskConfig(Frozen):
     )
     lidar: LidarConfig = Field(default_factory=LidarConfig, title="LiDAR")
     odometry: OdometryConfig = Field(default_factory=OdometryConfig, title="Odometry")
-    observation: ObservationName = Field(
-        "improved",
-        title="Observation",
-        description="Improved: inverse ranges and a signed bearing. Paper: ranges and angles as published.",
-    )
-    frames: int = Field(
-        1,
-        ge=1,
-        le=8,
-        title="Stacked frames",
-        description="Observations that the policy sees at once: the newest and those of the steps before it.",
-        json_schema_extra=ADVANCED,
-    )
+    observation: ObservationConfig = Field(default_factory=ObservationConfig, title="Observation")
     reward: RewardConfig = Field(default_factory=RewardConfig, title="Reward")
     control_period: float = Field(
         0.2,
@@ -60,7 +48,7 @@ class TaskConfig(Frozen):
         ge=0.0,
         le=1.0,
         title="Collision distance",
-        description="A ray shorter than this is a collision; touching the body always is. Metres.",
+        description="Metres from the body's middle within which what a ray meets is a collision; touching it always is.",
         json_schema_extra=ADVANCED,
     )
     step_limit: int = Field(
@@ -87,6 +75,31 @@ class TaskConfig(Frozen):
         if self.randomisation.range and self.randomisation.range[1] > self.lidar.range:
             raise ValueError(f"randomisation.range goes beyond the LiDAR's range of {self.lidar.range:g} m")
         return self
+
+    @model_validator(mode="after")
+    def _lidars_stand_on_the_body(self) -> Self:
+        length, width = self.robot.half_extents or (math.inf, math.inf)
+        for x, y, _ in self.lidar.mount.places:
+            beyond = abs(x) > length or abs(y) > width
+            if beyond or (self.robot.half_extents is None and math.hypot(x, y) > self.robot.circumscribed_radius):
+                raise ValueError(f"lidar.mount has a LiDAR at ({x:g}, {y:g}) m, which is not on the robot's body")
+        return self
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_observations_had_a_name(cls, data: Any) -> Any:
+        return read_first_observations(data)
+
+    @field_validator("observation")
+    @classmethod
+    def _can_be_seen(cls, observation: ObservationConfig, info: ValidationInfo) -> ObservationConfig:
+        """An observation of this LiDAR, and of a size that fits."""
+        lidar = info.data.get("lidar")
+        if lidar and observation.batches and lidar.rays % observation.batches:
+            raise ValueError(f"batches must divide the LiDAR's rays, and {observation.batches} does not divide {lidar.rays}")
+        if (size := observation.size(MAX_ACTIONS, len(lidar.mount.places) if lidar else 1)) > MAX_NUMBERS:
+            raise ValueError(f"these are {size:,} numbers, more than the {MAX_NUMBERS:,} that may be: take fewer frames")
+        return observation
 
     @field_validator("robot", mode="before")
     @classmethod

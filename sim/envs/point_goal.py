@@ -12,22 +12,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from sim.actions import ActionLayout, action_layout
 from sim.envs.single import NavigationEnv
 from sim.envs.vector import Floats, NavigationVectorEnv, Task, read_task
 from sim.kernels.records import ARRIVAL
 
 _UNLIMITED = np.iinfo(np.int32).max
-_LINEAR_FROM_SYMMETRIC = np.array([0.5, 0.0], dtype=np.float32), np.array([0.5, 1.0], dtype=np.float32)
 
 
-def symmetric_space() -> Space[Floats]:
-    """Actions in [-1, 1]: the linear one from standing to the top speed."""
-    return Box(-1.0, 1.0, (2,), np.float32)
+def symmetric_space(layout: ActionLayout) -> Space[Floats]:
+    """Actions in [-1, 1], each from the lowest that the robot takes to the highest."""
+    return Box(-1.0, 1.0, (layout.size,), np.float32)
 
 
-def from_symmetric(actions: Floats) -> Floats:
-    """Actions (..., 2) in [-1, 1] as the robot takes them: linear in [0, 1], angular in [-1, 1]."""
-    offset, scale = _LINEAR_FROM_SYMMETRIC
+def from_symmetric(actions: Floats, layout: ActionLayout) -> Floats:
+    """Actions (..., A) in [-1, 1] as the robot takes them."""
+    scale = np.array(layout.half_spans, dtype=np.float32)
+    offset = np.ones(layout.size, dtype=np.float32) - scale
     return np.asarray(offset + scale * np.asarray(actions, dtype=np.float32), dtype=np.float32)
 
 
@@ -38,7 +39,7 @@ class PointGoalEnv(NavigationEnv):
 
     Args:
         task: arena, robot, LiDAR, observation and reward.
-        symmetric_actions: whether both actions are in [-1, 1], as libraries assume that do not scale actions themselves.
+        symmetric_actions: whether all of an action is in [-1, 1], as libraries assume that do not scale actions themselves.
         render_mode: see `NavigationEnv`.
 
     Raises:
@@ -53,14 +54,15 @@ class PointGoalEnv(NavigationEnv):
     def __init__(self, task: Task = None, *, symmetric_actions: bool = False, render_mode: str | None = None) -> None:
         super().__init__(read_task(task).model_copy(update={"step_limit": _UNLIMITED}), render_mode=render_mode)
         self._symmetric = symmetric_actions
+        self._layout = action_layout(self.task.robot)
         if symmetric_actions:
-            self.action_space = symmetric_space()
+            self.action_space = symmetric_space(self._layout)
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Drive for one control period.
 
         Args:
-            action: (2,) as fractions of the robot's limits, see `action_space`; clipped.
+            action: (A,) as fractions of the robot's limits, see `action_space`; clipped.
 
         Returns:
             Observation, reward, terminated (arrival or collision), truncated (never: the time limit is a wrapper's), and an
@@ -69,7 +71,7 @@ class PointGoalEnv(NavigationEnv):
         Raises:
             ValueError: the action is not finite.
         """
-        return super().step(from_symmetric(action) if self._symmetric else action)
+        return super().step(from_symmetric(action, self._layout) if self._symmetric else action)
 
     def _info(self) -> dict[str, Any]:
         return super()._info() | {"is_success": bool(self._world.robots.outcomes[0] == ARRIVAL)}
@@ -85,7 +87,7 @@ class PointGoalVectorEnv(NavigationVectorEnv, VectorEnv[Floats, Floats, NDArray[
         task: arena, robot, LiDAR, observation and reward.
         num_envs: robots.
         max_episode_steps: after which an episode is truncated; None is never.
-        symmetric_actions: whether both actions are in [-1, 1].
+        symmetric_actions: whether all of an action is in [-1, 1].
         seed: see `NavigationVectorEnv`, as for all that follow.
         render_mode: likewise.
         copy: likewise.
@@ -116,20 +118,21 @@ class PointGoalVectorEnv(NavigationVectorEnv, VectorEnv[Floats, Floats, NDArray[
             limited, num_envs, seed=seed, render_mode=render_mode, copy=copy, autoreset_mode=autoreset_mode
         )  # fmt: skip
         self._symmetric = symmetric_actions
+        self._layout = action_layout(self.task.robot)
         if symmetric_actions:
-            self.single_action_space = symmetric_space()
+            self.single_action_space = symmetric_space(self._layout)
             self.action_space = batch_space(self.single_action_space, num_envs)
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Drive every robot for one control period; see `NavigationVectorEnv.step`.
 
         Args:
-            actions: (N, 2) as fractions of the robot's limits, see `single_action_space`; clipped.
+            actions: (N, A) as fractions of the robot's limits, see `single_action_space`; clipped.
 
         Raises:
             ValueError: the actions have the wrong shape or are not finite.
         """
-        return super().step(from_symmetric(actions) if self._symmetric else actions)
+        return super().step(from_symmetric(actions, self._layout) if self._symmetric else actions)
 
     def _infos(self) -> dict[str, Any]:
         infos = super()._infos()

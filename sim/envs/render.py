@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.geometry import box_distance
-from sim.lidar import drawn_ray_angles
+from sim.lidar import drawn_ray_angles, ray_origins
 from sim.world import World
 
 LONG_SIDE = 480
@@ -61,8 +61,9 @@ def render_robot(world: World, index: int) -> NDArray[np.uint8]:
     directions = heading + drawn_ray_angles(world.task.lidar, world.fields_of_view[index])
     along = np.arange(0.0, world.task.lidar.range, 1.0 / scale)
     seen = along[None, :] < ranges[:, None]
-    px = (x + along * np.cos(directions)[:, None])[seen]
-    py = (y + along * np.sin(directions)[:, None])[seen]
+    from_x, from_y = ray_origins(world.task.lidar, robots.poses[index : index + 1])[0].T[:, :, None]
+    px = (from_x + along * np.cos(directions)[:, None])[seen]
+    py = (from_y + along * np.sin(directions)[:, None])[seen]
     rows = np.clip(((pixels[0, 0, 1] - py) * scale + 0.5).astype(int), 0, image.shape[0] - 1)
     columns = np.clip(((px - pixels[0, 0, 0]) * scale + 0.5).astype(int), 0, image.shape[1] - 1)
     image[rows, columns] = 0.65 * image[rows, columns] + 0.35 * _RAY

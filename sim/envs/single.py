@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actions import action_layout
 from sim.arenas import build_task_arenas
 from sim.envs.render import render_robot
 from sim.envs.vector import Floats, Task, known_mode, read_task, single_spaces
@@ -40,6 +41,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         self.render_mode = known_mode(render_mode, self.metadata)
         self._window = Window("Mapless", self.task.control_period) if render_mode == "human" else None
         self.observation_space, self.action_space = single_spaces(self.task)
+        self._action_size = action_layout(self.task.robot).size
         # The next episode waits for `reset`: pose and picture of a last step are those of the episode that it ends.
         self._world = World(self.task, build_task_arenas(self.task), 1, arrival_ends=self._ARRIVAL_ENDS, restart="reset")
 
@@ -68,7 +70,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         """Drive for one control period.
 
         Args:
-            action: (2,) linear in [0, 1] and angular in [-1, 1], as fractions of the robot's limits; clipped.
+            action: (A,) fractions of the robot's limits, see `sim.actions`; clipped.
 
         Returns:
             Observation, reward, terminated (collision), truncated (time-out), and an info with `pose`, `target` and, where
@@ -77,7 +79,7 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         Raises:
             ValueError: the action is not finite.
         """
-        self._world.step(np.asarray(action, dtype=np.float32).reshape(1, 2))
+        self._world.step(np.asarray(action, dtype=np.float32).reshape(1, self._action_size))
         robots = self._world.robots
         terminated, truncated = bool(robots.terminations[0]), bool(robots.truncations[0])
         self._show()

@@ -9,6 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from sim.actions import action_layout, twists
 from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
 from sim.envs.render import render_robot
@@ -34,7 +35,8 @@ def single_spaces(task: TaskConfig) -> tuple[Space[Floats], Space[Floats]]:
         np.array([number.low for number in numbers], dtype=np.float32),
         np.array([number.high for number in numbers], dtype=np.float32),
     )
-    action: Space[Any] = Box(np.array([0.0, -1.0], dtype=np.float32), np.array([1.0, 1.0], dtype=np.float32))
+    actions = action_layout(task.robot)
+    action: Space[Any] = Box(np.array(actions.lows, dtype=np.float32), np.ones(actions.size, dtype=np.float32))
     return observation, action
 
 
@@ -160,10 +162,14 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         return self._world.arenas
 
     def velocities(self) -> Floats:
-        """(N, 2) velocities of the last step, m/s and rad/s; zero for robots that have started anew in it."""
+        """(N, 2) speed forwards, m/s, and turning rate, rad/s, of the last step; zero for robots that started anew in it."""
+        return self.twists()[:, [0, 2]]
+
+    def twists(self) -> Floats:
+        """(N, 3) speeds forwards and to the left, m/s, and turning rate, rad/s, of the middle of each body; likewise."""
         robots = self._world.robots
-        fractions = np.stack([robots.records["linear"], robots.records["angular"]], axis=1)
-        return np.asarray(fractions * robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]], dtype=np.float32)
+        fastest, turning = robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]].T
+        return twists(self.task.robot, self._world.followed(), fastest, turning).astype(np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode for every robot.
@@ -189,7 +195,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """Drive every robot for one control period.
 
         Args:
-            actions: (N, 2) linear in [0, 1] and angular in [-1, 1], as fractions of the robot's limits; clipped.
+            actions: (N, A) fractions of the robot's limits, see `sim.actions`; clipped.
 
         Returns:
             Observations (N, numbers), rewards (N,), terminations (N,), truncations (N,), and infos: `attempt` where one
@@ -200,8 +206,9 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             ValueError: the actions have the wrong shape or are not finite.
         """
         actions = np.ascontiguousarray(actions, dtype=np.float32)
-        if actions.shape != (self.num_envs, 2):
-            raise ValueError(f"actions must have shape ({self.num_envs}, 2), not {actions.shape}")
+        expected = self.num_envs, action_layout(self.task.robot).size
+        if actions.shape != expected:
+            raise ValueError(f"actions must have shape {expected}, not {actions.shape}")
         self._world.step(actions)
         robots = self._world.robots
         results = (robots.observations, robots.rewards, robots.terminations, robots.truncations)

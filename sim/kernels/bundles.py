@@ -20,8 +20,8 @@ class Geometry(NamedTuple):
         starts, targets: (cells, 2) lower left corners of the free cells of all arenas, one after another.
         start_offsets, target_offsets: (M + 1,) where each arena's cells begin.
         origins: (tiles, 2) float64, centre of each tile in the Space.
-        ray_angles: (rays,) float64 where the rays point that the policy believes in, radians against the heading.
-        ray_x, ray_y: (rays or some more, see `sim.lidar.padded`) scratch for those of one robot's rays in its arena.
+        ray_angles: (rays,) float64 where the rays of a LiDAR point that the policy believes in, radians against its axis.
+        ray_x, ray_y: (rays or some more, see `sim.lidar.padded`) scratch for those of one LiDAR's rays in its arena.
         scan: likewise, for what they read.
         near: (most shapes of a kind + 1,) scratch for those that one robot may see.
         discs: (tiles, K, 5) movers as they are now, see `DISC_COLUMNS`.
@@ -56,6 +56,11 @@ class Crowd(NamedTuple):
         hulls: (M, 3, C + B) float64 x, y, radius of a disc round every circle and box; far away for an empty slot.
         near, met: (C + B + 1,) and (K + 1,) scratch for the obstacles and for the others that one mover has to look at.
         steps: (1,) taken since all were placed.
+        sees: (tiles * K,) whether a mover sees robots.
+        robot_radius: (1,) metres that a robot is taken to fill around its centre.
+        seen: (N, 4) float64 x, y in the arena's frame, vx, vy of the robots at the last decision, tile by tile; (0, 4) where
+            no mover sees any.
+        first_seen: (tiles + 1,) where each tile's begin.
         lines, chosen: scratch for half-planes, (2, n, 3), and for the velocities of a tile's movers, (K + 1, 2).
     """
 
@@ -72,6 +77,10 @@ class Crowd(NamedTuple):
     near: Integers
     met: Integers
     steps: NDArray[np.int64]
+    sees: NDArray[np.bool_]
+    robot_radius: Doubles
+    seen: Doubles
+    first_seen: NDArray[np.int64]
     lines: Doubles
     chosen: Doubles
 
@@ -83,21 +92,23 @@ class Robots(NamedTuple):
         records: (N,) of `sim.kernels.records.ROBOT`.
         poses: (N, 3) x, y, heading in the arena's frame; heading in [-pi, pi].
         targets: (N, 2).
-        ranges: (N, rays) metres.
-        observations: (N, numbers), after the step and after a reset that it caused; stacked frames newest first.
+        ranges: (N, scan) metres, of each LiDAR one after the other.
+        observations: (N, numbers), after the step and after a reset that it caused; see `sim.observations`.
         final_observations: (N, numbers), the last ones of the episodes that ended in this step.
         rewards: (N,) of this step.
         terms: (N, terms) the reward's terms, in the configuration's order.
-        quantities: (Q, N) what formulas read of this step, see `sim.config.expression.QUANTITIES`; (0, N) without formulas.
+        quantities: (Q, N) what formulas read, see `sim.extending.expression.QUANTITIES`; (0, N) without formulas.
         terminations, truncations: (N,) bool.
         outcomes: (N,) how the attempt that ended in this step ended; 0 where none did.
         drawn: (N, 10) what differs from robot to robot in this episode, in the order of `QUANTITIES`.
-        ray_cos, ray_sin: (N, rays or some more) directions of each robot's rays against its heading, then zeros, see
-            `sim.lidar.padded`; one row where all are alike.
-        ahead: (N, 2) first, and one past the last, of the rays that tell how free the way ahead is; (1, 2) likewise.
+        ray_cos, ray_sin: (N, scan or some more) directions of each robot's rays against its heading, behind those of each
+            LiDAR zeros, see `sim.lidar.padded`; one row where all are alike.
+        ahead: (N, 2) first, and one past the last, of the rays that tell how free the way ahead is; (1, 2) likewise. Where
+            LiDARs are mounted elsewhere, their directions tell.
         drift: (N, 3) how far the believed pose is from the true one; (0, 3) where it never is.
-        pending: (N, delay, 2) actions that wait to be followed, the next one first; none where nothing is delayed.
-        held_ranges: (N, rays) the last scan; (0, rays) where every step has a new one.
+        pending: (N, delay, A) actions that wait to be followed, the next one first; none where nothing is delayed.
+        commands: (N, A) what was commanded last, whenever it is followed; (0, A) where nobody sees it.
+        held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
 
@@ -119,5 +130,6 @@ class Robots(NamedTuple):
     ahead: Integers
     drift: Doubles
     pending: Floats
+    commands: Floats
     held_ranges: Floats
     scan_ages: Integers

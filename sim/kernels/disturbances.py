@@ -37,16 +37,18 @@ def rays_ahead(angles, spread):
 def _spread_rays(i, robots, geometry, p):
     """Let robot i's rays cover the field of view that it has drawn."""
     spread = robots.drawn[i, FIELD_OF_VIEW] / p.field_of_view
-    for k in range(geometry.ray_angles.shape[0]):
-        angle = spread * geometry.ray_angles[k]
-        robots.ray_cos[i, k] = np.float32(math.cos(angle))
-        robots.ray_sin[i, k] = np.float32(math.sin(angle))
+    room = robots.ray_cos.shape[1] // p.lidars
+    for s in range(p.lidars):
+        for k in range(geometry.ray_angles.shape[0]):
+            angle = spread * geometry.ray_angles[k] + p.mounts[s, 2]
+            robots.ray_cos[i, s * room + k] = np.float32(math.cos(angle))
+            robots.ray_sin[i, s * room + k] = np.float32(math.sin(angle))
     robots.ahead[i, 0], robots.ahead[i, 1] = rays_ahead(geometry.ray_angles, spread)
 
 
 @kernel()
 def begin_episode(i, robots, geometry, p):
-    """Draw what robot i is like in this episode; its pose is known, no action waits, and the next scan is new."""
+    """Draw what robot i is like in this episode; its pose is known, nothing is commanded yet, and the next scan is new."""
     for k in range(robots.drawn.shape[1]):
         low = p.spans[k, 0]
         high = p.spans[k, 1]
@@ -57,6 +59,8 @@ def begin_episode(i, robots, geometry, p):
     find_itself(i, robots)
     if robots.pending.shape[1]:
         robots.pending[i] = ZERO
+    if robots.commands.shape[0]:
+        robots.commands[i] = ZERO
     if robots.scan_ages.shape[0]:
         robots.scan_ages[i] = 0
 

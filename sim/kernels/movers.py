@@ -13,16 +13,22 @@ closest to their wish that also keeps them apart for `HORIZON` seconds (ORCA, `s
 
 Timed movers are where their keyframes say, whatever is in the way, on the straight line between two of them.
 
-Positions are kept in the arena's own frame, so that a mover's way does not depend on the tile that its arena is in. Robots
-make no difference to movers.
+Positions are kept in the arena's own frame, so that a mover's way does not depend on the tile that its arena is in.
+
+Robots make no difference to a mover, unless it sees them. Then a robot is to it what another mover is, a disc that goes on
+as it goes now: it keeps to its side of the plane between them, and so walks into no robot that stands; and a pedestrian
+gives way in time, counting on the robot for the other half, as on a pedestrian.
 """
 
 import math
 
+import numpy as np
+
 from sim.kernels.avoidance import choose_velocity, free_part, orca_line
+from sim.kernels.commands import twist
 from sim.kernels.options import kernel
 from sim.kernels.random import uniform
-from sim.kernels.records import PATROL, PEDESTRIAN, TIMED, WALKER
+from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR, PATROL, PEDESTRIAN, TIMED, WALKER
 from sim.kernels.surroundings import EXACT, SKIN, free_length, gap, obstacle_lines
 
 DECISION = 0.6
@@ -41,6 +47,10 @@ _TURNING = 0.5  # of its top speed: slower, a walker turns
 _PATIENCE = 1.5  # s of standing before a patrol turns round
 _DETOUR = 1.5  # times the straight way's time after which a pedestrian goes elsewhere
 _HESITATION = 2.0  # s more, likewise
+_REACHED = 0.3  # m from a corner of its route at which a pedestrian turns to the next
+
+GUESTS = 16
+"""Robots in one tile, at most, that its movers see: the first ones."""
 
 
 @kernel(fastmath=EXACT, inline="always")
@@ -93,13 +103,28 @@ def _next_waypoint(record, crowd):
         record.other_y = y
 
 
+@kernel(fastmath=EXACT, inline="always")
+def _next_corner(record, crowd):
+    """Send a pedestrian on along its route: to the next corner, after the last one to the first if it walks round."""
+    if record.waypoint + 1 < record.waypoints:
+        record.waypoint += 1
+    elif record.way:
+        record.waypoint = 0
+    record.goal_x = crowd.waypoints[record.first_waypoint + record.waypoint, 0]
+    record.goal_y = crowd.waypoints[record.first_waypoint + record.waypoint, 1]
+
+
 @kernel(fastmath=EXACT)
 def _draw_place(m, index, crowd):
-    """Put mover m somewhere: on its round if it has one, else anywhere within the walls."""
+    """Put mover m somewhere: at its route's or on its round if it has one, else anywhere within the walls."""
     records = crowd.records
     waypoints = crowd.waypoints
     record = records[m]
-    if record.waypoints:
+    if record.waypoints and record.kind == PEDESTRIAN:
+        record.waypoint = min(1, record.waypoints - 1)
+        record.x = waypoints[record.first_waypoint, 0]
+        record.y = waypoints[record.first_waypoint, 1]
+    elif record.waypoints:
         leg = int(uniform(records, m) * record.waypoints)
         part = uniform(records, m)
         a = record.first_waypoint + leg
@@ -176,7 +201,8 @@ def place_movers(crowd):
                 record.present = 1
                 break
         if record.present and record.kind != TIMED:
-            record.way = 1
+            if record.kind != PEDESTRIAN or not record.waypoints:
+                record.way = 1
             record.patience = _PATIENCE
             if record.kind == WALKER:
                 _turn(m, records)
@@ -230,6 +256,91 @@ def _dividing_lines(m, first, slots, records, interval, lines, n, met):
     return n, count
 
 
+@kernel(fastmath=EXACT)
+def see_robots(crowd, robots, stride, parameters):
+    """Note in `crowd.seen` where the robots of every tile are and how they drive, but for those that are parked.
+
+    Args:
+        crowd: `sim.kernels.bundles.Crowd`.
+        robots: `sim.kernels.bundles.Robots`.
+        stride: tiles between one replica of the pool and the next.
+        parameters: (1,) PARAMETERS.
+    """
+    p = parameters[0]
+    records = robots.records
+    first = crowd.first_seen
+    first[:] = 0
+    for i in range(records.shape[0]):
+        if not records[i].parked:
+            first[records[i].replica * stride + records[i].map + 1] += 1
+    for tile in range(first.shape[0] - 1):
+        first[tile + 1] += first[tile]
+    for i in range(records.shape[0]):
+        if records[i].parked:
+            continue
+        tile = records[i].replica * stride + records[i].map
+        forwards, aside, _ = twist(
+            np.float64(records[i].linear), np.float64(records[i].lateral), np.float64(records[i].angular),
+            robots.drawn[i, MAX_LINEAR], robots.drawn[i, MAX_ANGULAR], p,
+        )  # fmt: skip
+        cos = math.cos(np.float64(robots.poses[i, 2]))
+        sin = math.sin(np.float64(robots.poses[i, 2]))
+        row = first[tile]
+        crowd.seen[row, 0] = robots.poses[i, 0]
+        crowd.seen[row, 1] = robots.poses[i, 1]
+        crowd.seen[row, 2] = forwards * cos - aside * sin
+        crowd.seen[row, 3] = forwards * sin + aside * cos
+        first[tile] += 1
+    for tile in range(first.shape[0] - 1, 0, -1):
+        first[tile] = first[tile - 1]
+    first[0] = 0
+
+
+@kernel(fastmath=EXACT, inline="always")
+def _lines_before_robots(record, tile, crowd, interval, lines, n):
+    """Write, from row n on, the half-planes that keep a mover on its side of the robots for `interval` seconds.
+
+    Returns how many rows there are then.
+    """
+    first = crowd.first_seen[tile]
+    near = record.radius + crowd.robot_radius[0] + SKIN
+    far = near + 2.0 * record.speed * interval
+    for k in range(first, min(crowd.first_seen[tile + 1], first + GUESTS)):
+        px = crowd.seen[k, 0] - record.x
+        py = crowd.seen[k, 1] - record.y
+        squared = px * px + py * py
+        if squared < far * far:
+            distance = max(math.sqrt(squared), 1e-9)
+            lines[n, 0] = px / distance
+            lines[n, 1] = py / distance
+            lines[n, 2] = max(distance - near, 0.0) / (2.0 * interval)
+            n += 1
+    return n
+
+
+@kernel(fastmath=EXACT, inline="always")
+def _orca_lines_of_robots(record, tile, crowd, lines, n):
+    """Write, from row n on, the half-planes that keep a mover and robots apart for `HORIZON` seconds, if these do as much.
+
+    Returns how many rows there are then.
+    """
+    first = crowd.first_seen[tile]
+    apart = record.radius + crowd.robot_radius[0]
+    for k in range(first, min(crowd.first_seen[tile + 1], first + GUESTS)):
+        px = crowd.seen[k, 0] - record.x
+        py = crowd.seen[k, 1] - record.y
+        vx = crowd.seen[k, 2]
+        vy = crowd.seen[k, 3]
+        squared = px * px + py * py
+        far = apart + (record.speed + math.sqrt(vx * vx + vy * vy)) * HORIZON
+        if apart * apart < squared and squared < far * far:
+            orca_line(
+                px, py, record.vx - vx, record.vy - vy, apart, HORIZON, 0.5, record.vx, record.vy, lines, n
+            )  # fmt: skip
+            n += 1
+    return n
+
+
 @kernel(fastmath=EXACT, inline="always")
 def _orca_lines(m, met, count, records, lines, n):
     """Write, from row n on, the half-planes that keep mover m and `count` others in `met` apart for `HORIZON` seconds."""
@@ -265,6 +376,8 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
             crowd.bounds, crowd.circles, crowd.boxes, crowd.hulls, crowd.near, lines,
         )  # fmt: skip
         hard, met = _dividing_lines(m, first, slots, records, interval, lines, hard, crowd.met)
+        if crowd.sees[m]:
+            hard = _lines_before_robots(record, tile, crowd, interval, lines, hard)
 
         if record.kind == WALKER:
             part = free_part(lines, hard, record.speed * record.goal_x, record.speed * record.goal_y)
@@ -281,7 +394,13 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
         gx = record.goal_x - record.x
         gy = record.goal_y - record.y
         distance = math.sqrt(gx * gx + gy * gy)
-        if distance < _ARRIVED or (record.patience <= 0.0 and record.kind == PEDESTRIAN):
+        if record.kind == PEDESTRIAN and record.waypoints:
+            if distance < _REACHED and (record.way or record.waypoint + 1 < record.waypoints) and record.waypoints > 1:
+                _next_corner(record, crowd)
+                gx = record.goal_x - record.x
+                gy = record.goal_y - record.y
+                distance = math.sqrt(gx * gx + gy * gy)
+        elif distance < _ARRIVED or (record.patience <= 0.0 and record.kind == PEDESTRIAN):
             if record.kind == PATROL:
                 _next_waypoint(record, crowd)
             else:
@@ -305,7 +424,10 @@ def _decide(tile, crowd, interval, lines, scratch, chosen):
             continue
 
         _orca_lines(m, crowd.met, met, records, lines, hard)
-        choose_velocity(lines, hard, hard + met, record.speed, vx, vy, scratch, velocity)
+        count = hard + met
+        if crowd.sees[m]:
+            count = _orca_lines_of_robots(record, tile, crowd, lines, count)
+        choose_velocity(lines, hard, count, record.speed, vx, vy, scratch, velocity)
         part = free_part(lines, hard, velocity[0], velocity[1])
         chosen[k, 0] = part * velocity[0]
         chosen[k, 1] = part * velocity[1]

@@ -5,7 +5,17 @@ import math
 import numpy as np
 
 from sim.kernels.options import kernel
-from sim.kernels.records import EXTRA, PAPER
+from sim.kernels.records import (
+    ACTIONS_PART,
+    BEARING_PART,
+    DEVIATION_PART,
+    DIRECTION_PART,
+    DISTANCE_PART,
+    HEADING_PART,
+    OMNIDIRECTIONAL,
+    RANGES_PART,
+    SPEEDS_PART,
+)
 from sim.kernels.sensing import FAST, nearest_of
 
 ZERO = np.float32(0.0)
@@ -31,21 +41,47 @@ def bearing_of(dx, dy, heading):
 
 
 @kernel(fastmath=FAST, inline="always")
-def observe(i, robots, geometry, p):
-    """Write robot i's newest observation before the earlier ones; `sim.observations` says what each number is."""
-    record = robots.records[i]
+def _see_ranges(i, robots, p):
+    """Write the nearest ray of each batch."""
     out = robots.observations
-    size = p.batches + EXTRA
-    for k in range((p.frames - 1) * size - 1, -1, -1):
-        out[i, k + size] = out[i, k]
+    at = p.part_places[RANGES_PART]
     rays = p.rays_per_batch
-    paper = p.observation == PAPER
+    inverse = p.part_options[RANGES_PART]
     for k in range(p.batches):
         nearest = nearest_of(robots.ranges, i, k * rays, (k + 1) * rays)
-        out[i, k] = nearest / p.range if paper else p.near / max(nearest, p.near)
-    k = p.batches
-    out[i, k] = record.linear
-    out[i, k + 1] = record.angular
+        # One loop for both: apart from one another, the compiler would divide by multiplying, which rounds otherwise.
+        out[i, at + k] = p.near / max(nearest, p.near) if inverse else nearest / p.range
+
+
+@kernel(fastmath=FAST, inline="always")
+def _grow_older(i, robots, p):
+    """Move what robot i saw at each moment to where the moment before it was."""
+    out = robots.observations
+    for part in range(p.parts):
+        for age in range(p.part_frames[part] - 1, 0, -1):
+            for k in range(p.part_sizes[part]):
+                out[i, p.part_starts[part, age] + k] = out[i, p.part_starts[part, age - 1] + k]
+
+
+@kernel(fastmath=FAST, inline="always")
+def observe(i, robots, geometry, p):
+    """Write what robot i sees now before what it saw earlier; `sim.observations` says what each number is."""
+    if p.frames > 1:
+        _grow_older(i, robots, p)
+    record = robots.records[i]
+    out = robots.observations
+    if p.part_places[RANGES_PART] >= 0:
+        _see_ranges(i, robots, p)
+    if p.part_places[SPEEDS_PART] >= 0:
+        at = p.part_places[SPEEDS_PART]
+        out[i, at] = record.linear
+        if p.drive == OMNIDIRECTIONAL:
+            at += 1
+            out[i, at] = record.lateral
+        out[i, at + 1] = record.angular
+    if p.part_places[ACTIONS_PART] >= 0:
+        for k in range(robots.commands.shape[1]):
+            out[i, p.part_places[ACTIONS_PART] + k] = robots.commands[i, k]
     heading = robots.poses[i, 2]
     dx = robots.targets[i, 0] - robots.poses[i, 0]
     dy = robots.targets[i, 1] - robots.poses[i, 1]
@@ -56,25 +92,37 @@ def observe(i, robots, geometry, p):
         distance = np.float32(math.sqrt(dx * dx + dy * dy))
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
     bearing = bearing_of(dx, dy, heading)
-    if paper:
-        width = geometry.bounds[record.map, 0]
-        height = geometry.bounds[record.map, 1]
+    if p.part_places[DISTANCE_PART] >= 0:
+        if p.part_options[DISTANCE_PART]:
+            out[i, p.part_places[DISTANCE_PART]] = distance / (distance + ONE)
+        else:
+            width = geometry.bounds[record.map, 0]
+            height = geometry.bounds[record.map, 1]
+            diagonal = np.float32(2.0) * np.float32(math.sqrt(width * width + height * height))
+            out[i, p.part_places[DISTANCE_PART]] = min(distance / diagonal, ONE) if p.drifts else distance / diagonal
+    if p.part_places[DIRECTION_PART] >= 0:
         direction = np.float32(math.atan2(dy, dx))
-        diagonal = np.float32(2.0) * np.float32(math.sqrt(width * width + height * height))
-        out[i, k + 2] = min(distance / diagonal, ONE) if p.drifts else distance / diagonal
-        out[i, k + 3] = (direction if direction >= ZERO else direction + TWO_PI) / TWO_PI
-        out[i, k + 4] = (heading if heading >= ZERO else heading + TWO_PI) / TWO_PI
-    else:
-        out[i, k + 2] = distance / (distance + ONE)
-        out[i, k + 3] = bearing / PI
-        out[i, k + 4] = heading / PI
-    out[i, k + 5] = abs(bearing) / PI
+        out[i, p.part_places[DIRECTION_PART]] = (direction if direction >= ZERO else direction + TWO_PI) / TWO_PI
+    if p.part_places[BEARING_PART] >= 0:
+        if p.part_options[BEARING_PART]:
+            out[i, p.part_places[BEARING_PART]] = np.float32(math.sin(bearing))
+            out[i, p.part_places[BEARING_PART] + 1] = np.float32(math.cos(bearing))
+        else:
+            out[i, p.part_places[BEARING_PART]] = bearing / PI
+    if p.part_places[HEADING_PART] >= 0:
+        if p.part_options[HEADING_PART]:
+            out[i, p.part_places[HEADING_PART]] = heading / PI
+        else:
+            out[i, p.part_places[HEADING_PART]] = (heading if heading >= ZERO else heading + TWO_PI) / TWO_PI
+    if p.part_places[DEVIATION_PART] >= 0:
+        out[i, p.part_places[DEVIATION_PART]] = abs(bearing) / PI
 
 
 @kernel(fastmath=FAST, inline="always")
 def observe_first(i, robots, geometry, p):
-    """Write robot i's first observation of an episode, which stands for the earlier ones too."""
+    """Write what robot i sees first in an episode, which stands for what it saw earlier too."""
     observe(i, robots, geometry, p)
-    size = p.batches + EXTRA
-    for k in range(size, p.frames * size):
-        robots.observations[i, k] = robots.observations[i, k - size]
+    for part in range(p.parts):
+        for age in range(1, p.part_frames[part]):
+            for k in range(p.part_sizes[part]):
+                robots.observations[i, p.part_starts[part, age] + k] = robots.observations[i, p.part_starts[part, 0] + k]

@@ -5,14 +5,31 @@ import numpy as np
 CELL = 0.1
 """Edge of a cell of free space (`sim.arenas.freespace`), metres."""
 
-EXTRA = 6
-"""Numbers of an observation that are not the scan (`sim.observations`)."""
-
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
 
-PAPER, IMPROVED = 0, 1
-"""Observation layouts, see `sim.observations`."""
+ROOM_FOR_PARTS = 16
+"""Parts of one observation, at most."""
+
+ROOM_FOR_FRAMES = 8
+"""Moments at which a part is seen, at most."""
+
+PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation")
+"""Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
+
+(
+    RANGES_PART,
+    SPEEDS_PART,
+    ACTIONS_PART,
+    DISTANCE_PART,
+    DIRECTION_PART,
+    BEARING_PART,
+    HEADING_PART,
+    DEVIATION_PART,
+) = range(len(PART_KINDS))
+
+DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2
+"""Drives, see `sim.config.AnyDrive`."""
 
 ROOM_FOR_TERMS = 16
 """Terms of one reward, at most."""
@@ -70,6 +87,12 @@ PARAMETERS = np.dtype(
         ("spans", "f8", (len(QUANTITIES), 2)),  # lowest and highest of what robots draw; equal where they draw nothing
         ("perceives", "i4"),  # 1 where the scan that is seen differs from the true one
         ("drifts", "i4"),  # 1 where the believed pose differs from the true one
+        ("drive", "i4"),
+        ("least_linear", "f4"),  # lowest fraction of the top speed: below zero where the robot reverses
+        ("sideways", "f8"),  # of an omnidirectional drive, share of the top speed
+        ("wheel_base", "f8"),  # m, of an Ackermann drive
+        ("steering_limit", "f8"),  # rad
+        ("steering_rate", "f8"),  # rad/s, 0 is unlimited
         ("max_linear_acceleration", "f8"),  # m/s², 0 is unlimited
         ("max_angular_acceleration", "f8"),  # rad/s²
         ("radius", "f4"),  # m, of a round robot
@@ -77,11 +100,19 @@ PARAMETERS = np.dtype(
         ("half_width", "f4"),
         ("range", "f4"),  # m, of the LiDAR
         ("field_of_view", "f8"),  # degrees, of the LiDAR that the policy believes in
+        ("mounted", "i4"),  # 0 where the only LiDAR looks ahead from the body's middle
+        ("lidars", "i4"),
+        ("mounts", "f8", (2, 3)),  # of each x ahead and y to the left of the body's middle, m, and yaw, rad
         ("looks_ahead", "i4"),  # 1 when every field of view that is drawn is within the front half plane
+        ("part_places", "i4", (len(PART_KINDS),)),  # where each kind's newest numbers begin; -1 where it is not seen
+        ("part_options", "i4", (len(PART_KINDS),)),  # see `sim.observations.pack_parts`
         ("batches", "i4"),
         ("rays_per_batch", "i4"),
-        ("observation", "i4"),
-        ("frames", "i4"),  # observations that are stacked
+        ("frames", "i4"),  # moments at which anything is seen
+        ("parts", "i4"),  # of the observation
+        ("part_sizes", "i4", (ROOM_FOR_PARTS,)),  # numbers of each at one moment
+        ("part_frames", "i4", (ROOM_FOR_PARTS,)),
+        ("part_starts", "i4", (ROOM_FOR_PARTS, ROOM_FOR_FRAMES)),  # where the numbers of each moment begin
         ("near", "f4"),  # m, see `sim.observations.near_distance`
         ("terms", "i4"),  # of the reward
         ("term_kinds", "i4", (ROOM_FOR_TERMS,)),
@@ -114,9 +145,11 @@ ROBOT = np.dtype(
         ("distance", "f4"),  # m, to the target
         ("min_clearance", "f4"),  # m, body to anything else, smallest of this attempt
         ("linear", "f4"),  # velocities of the last step, as fractions of the limits
-        ("angular", "f4"),
+        ("angular", "f4"),  # of an Ackermann drive the steering angle
         ("last_linear", "f4"),  # those of the step before
         ("last_angular", "f4"),
+        ("lateral", "f4"),  # likewise, of an omnidirectional drive
+        ("last_lateral", "f4"),
         ("parked", "i4"),  # 1 when the robot neither senses nor acts any more
     ],
     align=True,

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 
+from sim.kernels.commands import twist
+from sim.kernels.disturbances import AHEAD
 from sim.kernels.observing import bearing_of
 from sim.kernels.options import kernel
 from sim.kernels.records import (
+    ACKERMANN,
     ALIGNMENT_TERM,
     ARRIVAL,
     ARRIVAL_TERM,
@@ -15,6 +18,7 @@ from sim.kernels.records import (
     COLLISION_TERM,
     MAX_ANGULAR,
     MAX_LINEAR,
+    OMNIDIRECTIONAL,
     PEOPLE_TERM,
     PROGRESS_TERM,
     PROXIMITY_TERM,
@@ -29,6 +33,7 @@ from sim.kernels.sensing import FAST, disc_clearance, nearest_of
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 PI = np.float32(math.pi)
+COS_AHEAD = np.float32(math.cos(AHEAD))
 
 MAX_RATIO = np.float32(8.0)
 """Cap of d_{t-1}/d_t in the advanced reward, which would overflow when a robot stands on its target."""
@@ -36,7 +41,7 @@ MAX_RATIO = np.float32(8.0)
 NO_MOVER = np.float32(100.0)
 """Distance of the nearest mover where there is none, metres."""
 
-# Codes of `sim.config.expression.OPERATIONS`, which `sim.rewards` checks when it is imported.
+# Codes of `sim.extending.expression.OPERATIONS`, which `sim.rewards` checks when it is imported.
 NUMBER, QUANTITY, CONSTANT, NEGATIVE, IF = range(5)
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER = range(5, 10)
 LESS, LESS_EQUAL, GREATER, GREATER_EQUAL = range(10, 14)
@@ -49,9 +54,30 @@ def _ratio(a, b):
     return a / b
 
 
+@kernel()
+def ahead_of_mounts(i, robots, geometry, p):
+    """Metres that rays near the heading see at least, of LiDARs mounted anywhere: by where each ray points."""
+    own = i if robots.ahead.shape[0] > 1 else 0
+    room = geometry.scan.shape[0]
+    rays = geometry.ray_angles.shape[0]
+    straightest = np.float32(-1.0)
+    for s in range(p.lidars):
+        for k in range(rays):
+            straightest = max(straightest, robots.ray_cos[own, s * room + k])
+    within = min(COS_AHEAD, straightest) - np.float32(1e-6)
+    nearest = np.float32(math.inf)
+    for s in range(p.lidars):
+        for k in range(rays):
+            if robots.ray_cos[own, s * room + k] >= within:
+                nearest = min(nearest, robots.ranges[i, s * rays + k])
+    return nearest
+
+
 @kernel(fastmath=FAST, inline="always")
-def _ahead(i, robots):
-    """Metres that robot i's rays near its heading see at least."""
+def _ahead(i, straight, robots):
+    """Metres that robot i's rays near its heading see at least; `straight` where that is known already, below zero not."""
+    if straight >= ZERO:
+        return straight
     own = i if robots.ahead.shape[0] > 1 else 0
     return nearest_of(robots.ranges, i, robots.ahead[own, 0], robots.ahead[own, 1])
 
@@ -73,7 +99,7 @@ def _from_movers(i, tile, robots, geometry, p):
 
 
 @kernel(fastmath=FAST)
-def _way_term(i, k, before, clearance, tile, robots, geometry, p):
+def _way_term(i, k, before, clearance, straight, tile, robots, geometry, p):
     """Term k of a step that ends in neither arrival nor collision."""
     kind = p.term_kinds[k]
     weight = p.term_weights[k]
@@ -85,7 +111,7 @@ def _way_term(i, k, before, clearance, tile, robots, geometry, p):
         ratio = MAX_RATIO if record.distance * MAX_RATIO <= before else before / record.distance
         return gained * np.float32(2.0**ratio)
     if kind == CLEARANCE_TERM:
-        return weight - weight * _ratio(_ahead(i, robots), p.range)
+        return weight - weight * _ratio(_ahead(i, straight, robots), p.range)
     if kind == ALIGNMENT_TERM:
         safety = ONE - abs(_bearing(i, robots)) / PI
         return weight - weight * safety
@@ -96,6 +122,9 @@ def _way_term(i, k, before, clearance, tile, robots, geometry, p):
     if kind == SMOOTHNESS_TERM:
         linear = record.linear - record.last_linear
         angular = record.angular - record.last_angular
+        if p.drive == OMNIDIRECTIONAL:
+            lateral = record.lateral - record.last_lateral
+            return weight * (linear * linear + lateral * lateral + angular * angular)
         return weight * (linear * linear + angular * angular)
     if kind == SPEED_TERM:
         return weight * np.float32(robots.drawn[i, MAX_LINEAR]) * record.linear
@@ -105,7 +134,7 @@ def _way_term(i, k, before, clearance, tile, robots, geometry, p):
 
 
 @kernel(fastmath=FAST, inline="always")
-def reward(i, outcome, before, clearance, tile, robots, geometry, p):
+def reward(i, outcome, before, clearance, straight, tile, robots, geometry, p):
     """Write robot i's reward and its terms, formulas left out, for a step that began `before` metres from the target."""
     total = ZERO
     for k in range(p.terms):
@@ -118,7 +147,7 @@ def reward(i, outcome, before, clearance, tile, robots, geometry, p):
         elif kind == TIMEOUT_TERM:
             term = p.term_weights[k] if outcome == TIMEOUT else ZERO
         elif outcome != ARRIVAL and outcome != COLLISION:
-            term = _way_term(i, k, before, clearance, tile, robots, geometry, p)
+            term = _way_term(i, k, before, clearance, straight, tile, robots, geometry, p)
         robots.terms[i, k] = term
         total += term
     robots.rewards[i] = total
@@ -126,8 +155,8 @@ def reward(i, outcome, before, clearance, tile, robots, geometry, p):
 
 
 @kernel(fastmath=FAST)
-def tabulate(i, outcome, before, clearance, nearest, tile, robots, geometry, p):
-    """Write what formulas may read of robot i: the rows of `sim.config.expression.QUANTITIES`."""
+def tabulate(i, outcome, before, clearance, nearest, straight, tile, robots, geometry, p):
+    """Write what formulas may read of robot i: the rows of `sim.extending.expression.QUANTITIES`."""
     record = robots.records[i]
     linear = np.float32(robots.drawn[i, MAX_LINEAR])
     angular = np.float32(robots.drawn[i, MAX_ANGULAR])
@@ -140,8 +169,15 @@ def tabulate(i, outcome, before, clearance, nearest, tile, robots, geometry, p):
     table[5, i] = angular * record.angular
     table[6, i] = linear * record.last_linear
     table[7, i] = angular * record.last_angular
+    if p.drive == ACKERMANN:
+        most_linear = robots.drawn[i, MAX_LINEAR]
+        most_angular = robots.drawn[i, MAX_ANGULAR]
+        _, _, turn = twist(record.linear, record.lateral, record.angular, most_linear, most_angular, p)
+        _, _, last_turn = twist(record.last_linear, record.last_lateral, record.last_angular, most_linear, most_angular, p)
+        table[5, i] = np.float32(turn)
+        table[7, i] = np.float32(last_turn)
     table[8, i] = clearance
-    table[9, i] = _ahead(i, robots)
+    table[9, i] = _ahead(i, straight, robots)
     table[10, i] = nearest
     table[11, i] = _from_movers(i, tile, robots, geometry, p)
     table[12, i] = np.float32(record.steps)

@@ -1,9 +1,11 @@
 """After the physics of a step: outcomes, rewards, observations and resets."""
 
 import math
+from typing import Any
 
 import numpy as np
 
+from sim.kernels.commands import twist
 from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
 from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
 from sim.kernels.observing import observe, observe_first
@@ -18,11 +20,12 @@ from sim.kernels.records import (
     NONE,
     TIMEOUT,
 )
-from sim.kernels.rewards import reward, tabulate
-from sim.kernels.sensing import FAST, clearance_at, disc_clearance, nearest_of, sense, sense_discs, swept_clearance
+from sim.kernels.rewards import ahead_of_mounts, reward, tabulate
+from sim.kernels.sensing import FAR, FAST, clearance_at, disc_clearance, nearest_of, sense, sense_discs, swept_clearance
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
+MINUS_ONE = np.float32(-1.0)
 PI = np.float32(math.pi)
 _CELL = np.float32(CELL)
 
@@ -113,6 +116,8 @@ def _place(i, x, y, heading, robots, geometry, p, state):
     robots.records[i].angular = ZERO
     robots.records[i].last_linear = ZERO
     robots.records[i].last_angular = ZERO
+    robots.records[i].lateral = ZERO
+    robots.records[i].last_lateral = ZERO
 
 
 @kernel()
@@ -164,7 +169,7 @@ def reset_robots(which, poses, targets, robots, geometry, parameters, state):
         _forget_attempt(robots.records[i])
         _nothing_happened(i, robots)
         begin_episode(i, robots, geometry, p)
-        _sense(i, robots, geometry, p)
+        _sense_as_mounted(i, robots, geometry, p)
         if p.perceives:
             perceive(i, robots, p)
         observe_first(i, robots, geometry, p)
@@ -176,9 +181,67 @@ def _scanner_of(i, robots):
     return i if robots.ahead.shape[0] > 1 else 0
 
 
+@kernel()
+def _sense_from_mounts(i, robots, geometry, p):
+    """Scan by robot i's LiDARs, where they stand elsewhere; returns the clearance of its middle, metres."""
+    x = robots.poses[i, 0]
+    y = robots.poses[i, 1]
+    cos_heading = np.float32(math.cos(robots.poses[i, 2]))
+    sin_heading = np.float32(math.sin(robots.poses[i, 2]))
+    index = robots.records[i].map
+    tile = robots.records[i].replica * p.replica_stride + index
+    own = _scanner_of(i, robots)
+    room = geometry.scan.shape[0]
+    rays = geometry.ray_angles.shape[0]
+    for s in range(p.lidars):
+        ahead = np.float32(p.mounts[s, 0])
+        aside = np.float32(p.mounts[s, 1])
+        from_x = x + cos_heading * ahead - sin_heading * aside
+        from_y = y + sin_heading * ahead + cos_heading * aside
+        clearance = sense(
+            from_x, from_y, cos_heading, sin_heading, index, geometry.bounds, geometry.circles, geometry.boxes,
+            robots.ray_cos[own, s * room : (s + 1) * room], robots.ray_sin[own, s * room : (s + 1) * room],
+            p.range, p.looks_ahead, geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near,
+        )  # fmt: skip
+        sense_discs(
+            from_x, from_y, cos_heading, sin_heading, tile, geometry.discs, p.range, p.looks_ahead,
+            geometry.scan, geometry.ray_x, geometry.ray_y, geometry.near, clearance,
+        )  # fmt: skip
+        for k in range(rays):
+            robots.ranges[i, s * rays + k] = geometry.scan[k]
+    clearance = clearance_at(x, y, index, geometry.bounds, geometry.circles, geometry.boxes)
+    return min(clearance, disc_clearance(x, y, tile, geometry.discs))
+
+
+@kernel()
+def _nearest_to_middle(i, robots, geometry, p):
+    """Distance of the nearest thing that robot i's rays meet from the middle of its body, metres."""
+    own = _scanner_of(i, robots)
+    room = geometry.scan.shape[0]
+    rays = geometry.ray_angles.shape[0]
+    nearest = FAR
+    for s in range(p.lidars):
+        for k in range(rays):
+            seen = robots.ranges[i, s * rays + k]
+            if seen < p.range:
+                ahead = np.float32(p.mounts[s, 0]) + seen * robots.ray_cos[own, s * room + k]
+                aside = np.float32(p.mounts[s, 1]) + seen * robots.ray_sin[own, s * room + k]
+                nearest = min(nearest, np.float32(math.sqrt(ahead * ahead + aside * aside)))
+    return nearest
+
+
+@kernel()
+def _motion(i, robots, p):
+    """How robot i moved in this step: speeds forwards and to the left, m/s, and turning rate, rad/s."""
+    record = robots.records[i]
+    return twist(
+        record.linear, record.lateral, record.angular, robots.drawn[i, MAX_LINEAR], robots.drawn[i, MAX_ANGULAR], p
+    )  # fmt: skip
+
+
 @kernel(inline="always")
 def _sense(i, robots, geometry, p):
-    """Scan from robot i's pose; returns the clearance of its centre, metres."""
+    """Scan from robot i's pose by the LiDAR in its middle; returns the clearance of that, metres."""
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
     cos_heading = np.float32(math.cos(robots.poses[i, 2]))
@@ -197,6 +260,14 @@ def _sense(i, robots, geometry, p):
     for k in range(robots.ranges.shape[1]):
         robots.ranges[i, k] = geometry.scan[k]
     return clearance
+
+
+@kernel()
+def _sense_as_mounted(i, robots, geometry, p):
+    """Scan from robot i's pose by its LiDARs, wherever they are; returns the clearance of its middle, metres."""
+    if p.mounted:
+        return _sense_from_mounts(i, robots, geometry, p)
+    return _sense(i, robots, geometry, p)
 
 
 @kernel(fastmath=FAST, inline="always")
@@ -227,103 +298,138 @@ def _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry
     return clearance
 
 
-@kernel(fastmath=FAST)
-def step_robots(state, placed, robots, geometry, parameters):
-    """Everything that follows the physics of a step.
+def _steps(*, usual: bool) -> Any:
+    """The kernel of a step, compiled for the usual robot alone or for every robot.
+
+    What drives and mounts of other robots need costs the usual one a fifth of its rate where it only stands beside it.
 
     Args:
-        state: (bodies, 3) x, y, angle in the Space; rows of robots that start anew, or have turned far, are overwritten.
-        placed: (N,) int32, written: which rows were.
-        robots: `sim.kernels.bundles.Robots`, whose arrays are updated.
-        geometry: `sim.kernels.bundles.Geometry`.
-        parameters: (1,) PARAMETERS.
-
-    Returns:
-        How many rows of `state` were overwritten.
+        usual: whether the drive is differential and the only LiDAR looks ahead from the body's middle.
     """
-    p = parameters[0]
-    records = robots.records
-    count = 0
-    for i in range(records.shape[0]):
-        if records[i].parked:
-            _nothing_happened(i, robots)
-            continue
-        if robots.outcomes[i] != NONE:
-            _forget_attempt(records[i])
-        tile = records[i].replica * p.replica_stride + records[i].map
-        x = np.float32(state[i, 0] - geometry.origins[tile, 0])
-        y = np.float32(state[i, 1] - geometry.origins[tile, 1])
-        heading = state[i, 2]
-        if abs(heading) > math.pi:
-            heading -= 2.0 * math.pi * math.floor((heading + math.pi) / (2.0 * math.pi))
-        overwritten = abs(state[i, 2]) > MOST_TURNED
-        if overwritten:
-            state[i, 2] = heading
-        last_x = robots.poses[i, 0]
-        last_y = robots.poses[i, 1]
-        last_heading = robots.poses[i, 2]
-        robots.poses[i, 0] = x
-        robots.poses[i, 1] = y
-        robots.poses[i, 2] = np.float32(heading)
-        if p.drifts:
-            turn = robots.drawn[i, MAX_ANGULAR] * records[i].angular * p.period
-            drift(i, np.float64(x - last_x), np.float64(y - last_y), turn, robots)
 
-        clearance = _sense(i, robots, geometry, p)
-        if p.half_length > ZERO:
-            clearance = moving_rectangle_clearance(
-                last_x, last_y, last_heading, x, y, robots.poses[i, 2], records[i].map,
-                geometry.bounds, geometry.circles, geometry.boxes, p.half_length, p.half_width, p.path_samples,
-            )  # fmt: skip
-        else:
-            if p.path_samples > 1:
-                clearance = _clearance_on_the_way(i, last_x, last_y, clearance, robots, geometry, p)
-            clearance -= p.radius
-        if geometry.discs.shape[1]:
-            clearance = _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry, p)
-        nearest = nearest_of(robots.ranges, i, 0, robots.ranges.shape[1])
-        before = records[i].distance
-        records[i].distance = _distance_to_target(i, robots)
-        records[i].steps += 1
-        records[i].path_length += robots.drawn[i, MAX_LINEAR] * records[i].linear * p.period
-        if records[i].steps == 1 or clearance < records[i].min_clearance:
-            records[i].min_clearance = clearance
+    @kernel(fastmath=FAST)
+    def step_robots(state, placed, robots, geometry, parameters):
+        """Everything that follows the physics of a step.
 
-        outcome = NONE
-        if records[i].distance < p.arrival_distance:
-            outcome = ARRIVAL
-        elif clearance < ZERO or nearest < p.collision_distance:
-            outcome = COLLISION
-        elif records[i].steps >= p.step_limit:
-            outcome = TIMEOUT
-        robots.outcomes[i] = outcome
-        ended = outcome in (COLLISION, TIMEOUT) or (outcome == ARRIVAL and p.arrival_ends)
-        robots.terminations[i] = ended and outcome != TIMEOUT
-        robots.truncations[i] = outcome == TIMEOUT
-        reward(i, outcome, before, clearance, tile, robots, geometry, p)
-        if p.tabulates:
-            tabulate(i, outcome, before, clearance, nearest, tile, robots, geometry, p)
+        Args:
+            state: (bodies, 3) x, y, angle in the Space; rows of robots that start anew, or have turned far, are overwritten.
+            placed: (N,) int32, written: which rows were.
+            robots: `sim.kernels.bundles.Robots`, whose arrays are updated.
+            geometry: `sim.kernels.bundles.Geometry`.
+            parameters: (1,) PARAMETERS.
 
-        # Outcomes and rewards are of the world as it is; the robot gets to see less.
-        if p.perceives:
-            perceive(i, robots, p)
-        if outcome == ARRIVAL and not ended:
-            _draw_target(i, robots, geometry, p)
-            find_itself(i, robots)
-        observe(i, robots, geometry, p)
-        if ended:
-            for k in range(robots.observations.shape[1]):
-                robots.final_observations[i, k] = robots.observations[i, k]
-        if ended and p.starts_anew:
-            _draw_start(i, robots, geometry, p, state)
-            overwritten = True
-            _draw_target(i, robots, geometry, p)
-            begin_episode(i, robots, geometry, p)
-            _sense(i, robots, geometry, p)
+        Returns:
+            How many rows of `state` were overwritten.
+        """
+        p = parameters[0]
+        records = robots.records
+        count = 0
+        for i in range(records.shape[0]):
+            if records[i].parked:
+                _nothing_happened(i, robots)
+                continue
+            if robots.outcomes[i] != NONE:
+                _forget_attempt(records[i])
+            tile = records[i].replica * p.replica_stride + records[i].map
+            x = np.float32(state[i, 0] - geometry.origins[tile, 0])
+            y = np.float32(state[i, 1] - geometry.origins[tile, 1])
+            heading = state[i, 2]
+            if abs(heading) > math.pi:
+                heading -= 2.0 * math.pi * math.floor((heading + math.pi) / (2.0 * math.pi))
+            overwritten = abs(state[i, 2]) > MOST_TURNED
+            if overwritten:
+                state[i, 2] = heading
+            last_x = robots.poses[i, 0]
+            last_y = robots.poses[i, 1]
+            last_heading = robots.poses[i, 2]
+            robots.poses[i, 0] = x
+            robots.poses[i, 1] = y
+            robots.poses[i, 2] = np.float32(heading)
+            if p.drifts:
+                if usual:
+                    turn = robots.drawn[i, MAX_ANGULAR] * records[i].angular * p.period
+                else:
+                    turn = _motion(i, robots, p)[2] * p.period
+                drift(i, np.float64(x - last_x), np.float64(y - last_y), turn, robots)
+
+            clearance = _sense(i, robots, geometry, p) if usual else _sense_as_mounted(i, robots, geometry, p)
+            if p.half_length > ZERO:
+                clearance = moving_rectangle_clearance(
+                    last_x, last_y, last_heading, x, y, robots.poses[i, 2], records[i].map,
+                    geometry.bounds, geometry.circles, geometry.boxes, p.half_length, p.half_width, p.path_samples,
+                )  # fmt: skip
+            else:
+                if p.path_samples > 1:
+                    clearance = _clearance_on_the_way(i, last_x, last_y, clearance, robots, geometry, p)
+                clearance -= p.radius
+            if geometry.discs.shape[1]:
+                clearance = _clearance_from_passing(i, last_x, last_y, clearance, tile, robots, geometry, p)
+            nearest = nearest_of(robots.ranges, i, 0, robots.ranges.shape[1])
+            reached = nearest
+            if not usual and p.mounted:
+                reached = _nearest_to_middle(i, robots, geometry, p)
+            before = records[i].distance
+            records[i].distance = _distance_to_target(i, robots)
+            records[i].steps += 1
+            if usual:
+                records[i].path_length += abs(robots.drawn[i, MAX_LINEAR] * records[i].linear) * p.period
+            else:
+                forwards, aside, _ = _motion(i, robots, p)
+                records[i].path_length += math.sqrt(forwards * forwards + aside * aside) * p.period
+            if records[i].steps == 1 or clearance < records[i].min_clearance:
+                records[i].min_clearance = clearance
+
+            outcome = NONE
+            if records[i].distance < p.arrival_distance:
+                outcome = ARRIVAL
+            elif clearance < ZERO or reached < p.collision_distance:
+                outcome = COLLISION
+            elif records[i].steps >= p.step_limit:
+                outcome = TIMEOUT
+            robots.outcomes[i] = outcome
+            ended = outcome in (COLLISION, TIMEOUT) or (outcome == ARRIVAL and p.arrival_ends)
+            robots.terminations[i] = ended and outcome != TIMEOUT
+            robots.truncations[i] = outcome == TIMEOUT
+            # Where it takes more than a look at neighbouring rays; found among the rewards, it would slow every robot.
+            straight = MINUS_ONE
+            if not usual and p.mounted:
+                straight = ahead_of_mounts(i, robots, geometry, p)
+            reward(i, outcome, before, clearance, straight, tile, robots, geometry, p)
+            if p.tabulates:
+                tabulate(i, outcome, before, clearance, nearest, straight, tile, robots, geometry, p)
+
+            # Outcomes and rewards are of the world as it is; the robot gets to see less.
             if p.perceives:
                 perceive(i, robots, p)
-            observe_first(i, robots, geometry, p)
-        if overwritten:
-            placed[count] = i
-            count += 1
-    return count
+            if outcome == ARRIVAL and not ended:
+                _draw_target(i, robots, geometry, p)
+                find_itself(i, robots)
+            observe(i, robots, geometry, p)
+            if ended:
+                for k in range(robots.observations.shape[1]):
+                    robots.final_observations[i, k] = robots.observations[i, k]
+            if ended and p.starts_anew:
+                _draw_start(i, robots, geometry, p, state)
+                overwritten = True
+                _draw_target(i, robots, geometry, p)
+                begin_episode(i, robots, geometry, p)
+                if usual:
+                    _sense(i, robots, geometry, p)
+                else:
+                    _sense_as_mounted(i, robots, geometry, p)
+                if p.perceives:
+                    perceive(i, robots, p)
+                observe_first(i, robots, geometry, p)
+            if overwritten:
+                placed[count] = i
+                count += 1
+        return count
+
+    return step_robots
+
+
+step_usual_robots = _steps(usual=True)
+"""Everything that follows the physics of a step, for a differential drive whose only LiDAR looks ahead from its middle."""
+
+step_any_robots = _steps(usual=False)
+"""The same for every drive and every mount."""

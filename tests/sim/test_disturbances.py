@@ -11,6 +11,7 @@ from sim.config import (
     ArenaConfig,
     BurgerConfig,
     LidarConfig,
+    ObservationConfig,
     ObservationName,
     OdometryConfig,
     RandomisationConfig,
@@ -152,7 +153,9 @@ def test_with_a_new_target_odometry_starts_from_the_true_pose() -> None:
 
 @pytest.mark.parametrize("observation", ["paper", "improved"])
 def test_observations_stay_within_their_bounds_however_far_odometry_drifts(observation: ObservationName) -> None:
-    task = TaskConfig(observation=observation, odometry=OdometryConfig(distance_noise=0.5, heading_noise=0.5))
+    task = TaskConfig(
+        observation=ObservationConfig.preset(observation), odometry=OdometryConfig(distance_noise=0.5, heading_noise=0.5)
+    )
     envs = NavigationVectorEnv(task, 200, seed=0)
     envs.reset()
     for action in np.random.default_rng(0).uniform([0.5, -1.0], 1.0, (300, 200, 2)).astype(np.float32):
@@ -284,7 +287,9 @@ def test_spans_that_make_no_sense_are_refused(randomisation: dict[str, list[floa
 @pytest.mark.parametrize("observation", ["paper", "improved"])
 def test_a_heading_that_has_drifted_far_is_still_a_direction(observation: ObservationName) -> None:
     # On the spot for 400 s: the belief drifts by 0.5 sqrt(400) = 10 rad, and is anywhere then.
-    task = TaskConfig(observation=observation, odometry=OdometryConfig(heading_noise=0.5), step_limit=10_000)
+    task = TaskConfig(
+        observation=ObservationConfig.preset(observation), odometry=OdometryConfig(heading_noise=0.5), step_limit=10_000
+    )
     envs = NavigationVectorEnv(task, 2000, seed=0)
     envs.reset(options={"poses": [0.0, 0.0, 0.0], "targets": [3.0, 0.0]})
     for _ in range(2000):

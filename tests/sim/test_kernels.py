@@ -11,7 +11,7 @@ import workers.kernels
 from sim.kernels.movers import move_movers
 from sim.kernels.options import kernels_in
 from sim.kernels.sensing import scan_poses
-from sim.kernels.step import step_robots
+from sim.kernels.step import step_usual_robots
 from workers.kernels.dense import tanh
 
 
@@ -21,7 +21,7 @@ def folder_of(package: ModuleType) -> Path:
 
 
 def test_compiled_code_is_kept_by_the_sources_of_all_kernels(tmp_path: Path) -> None:
-    # Numba alone would go on with a `step_robots` that was compiled with yesterday's `sense`.
+    # Numba alone would go on with a `step_usual_robots` that was compiled with yesterday's `sense`.
     def key(folder: Path) -> str:
         @kernels_in(folder)()
         def nothing() -> None:
@@ -29,7 +29,7 @@ def test_compiled_code_is_kept_by_the_sources_of_all_kernels(tmp_path: Path) -> 
 
         return Path(nothing.stats.cache_path).parent.name
 
-    assert {Path(kernel.stats.cache_path).parent.name for kernel in (step_robots, move_movers, scan_poses)} == {
+    assert {Path(kernel.stats.cache_path).parent.name for kernel in (step_usual_robots, move_movers, scan_poses)} == {
         key(folder_of(sim.kernels))
     }
     assert Path(tanh.stats.cache_path).parent.name == key(folder_of(workers.kernels))

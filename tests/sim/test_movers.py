@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 
 from sim.arenas import Arena, Mover, build_arenas, free_distance
 from sim.baselines.simple import go_to_goal
-from sim.config import ArenaConfig, JackalConfig, LidarConfig, MoverKind, MoversConfig, RandomisationConfig, TaskConfig
+from sim.config import (
+    ArenaConfig,
+    JackalConfig,
+    LidarConfig,
+    MoverKind,
+    MoversConfig,
+    ObservationConfig,
+    RandomisationConfig,
+    TaskConfig,
+)
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
@@ -253,7 +262,12 @@ def test_a_crowded_cell_has_scenarios_too() -> None:
 
 def test_the_lidar_sees_a_mover() -> None:
     arena = Arena("seen", movers=(Mover("patrol", 0.2, 0.5, ((2.0, 0.0), (2.0, 1e-6))),))
-    world = World(TaskConfig(lidar=LidarConfig(rays=3, batches=3)), (arena,), 1, seed=0)
+    world = World(
+        TaskConfig(lidar=LidarConfig(rays=3), observation=ObservationConfig.preset("improved", batches=3)),
+        (arena,),
+        1,
+        seed=0,
+    )
     world.reset(poses=(0.0, 0.0, 0.0), targets=(-3.0, 0.0))
     assert world.robots.ranges[0] == pytest.approx([3.5, 1.8, 3.5])
 

@@ -132,7 +132,7 @@ def hold_against_the_plain_twin(task: TaskConfig) -> None:
             "arena": COMPLEX,
             "observation": task.observation,
             "reward": task.reward,
-            "lidar": {"rays": task.lidar.rays, "batches": task.lidar.batches, "field_of_view": task.lidar.field_of_view},
+            "lidar": {"rays": task.lidar.rays, "field_of_view": task.lidar.field_of_view},
             **SHORT,
         }
     )

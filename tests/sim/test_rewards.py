@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim.config import FormulaTerm, ProgressTerm, RewardConfig, RewardTerm, SmoothnessTerm, TaskConfig, preset_terms
-from sim.config.expression import CONSTANTS, MAX_DEPTH, QUANTITIES
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import FormulaError
+from sim.extending.expression import CONSTANTS, MAX_DEPTH, QUANTITIES, parse
 from sim.rewards import Formulas, constants, evaluate, term_names
 from sim.world import World
 
@@ -84,7 +84,7 @@ def test_what_was_never_a_reward_is_refused() -> None:
     ],
 )
 def test_a_formula_means_what_it_says(text: str, values: dict[str, float], expected: float) -> None:
-    assert evaluate(text, constants(TaskConfig()) | values) == pytest.approx(expected, abs=1e-12)
+    assert evaluate(parse(text), constants(TaskConfig()) | values) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_the_compiled_formula_is_the_plain_one(text: str) -> None:
     Formulas(task, 16).add(robots)
     for i in range(16):
         values = constants(task) | dict(zip(QUANTITIES, robots.quantities[:, i].astype(float).tolist(), strict=True))
-        expected = evaluate(text, values)
+        expected = evaluate(parse(text), values)
         near = any(operator in text for operator in "<>") or " if " in text  # a comparison may round to either side
         assert near or robots.terms[i, 1] == pytest.approx(expected, rel=1e-3, abs=1e-3)
 

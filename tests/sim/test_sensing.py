@@ -60,7 +60,7 @@ def grazing(
 @settings(max_examples=60, deadline=None)
 @given(arenas, st.integers(0, 2**32 - 1), st.sampled_from([(30, 180.0), (30, 360.0), (7, 90.0), (64, 270.0)]))
 def test_rays_are_those_of_chipmunk(arena: Arena, seed: int, scanner: tuple[int, float]) -> None:
-    lidar = LidarConfig(rays=scanner[0], batches=1, field_of_view=scanner[1], range=3.5)
+    lidar = LidarConfig(rays=scanner[0], field_of_view=scanner[1], range=3.5)
     poses = random_poses(arena, seed, 12)
     outside = free_distance(arena, poses[:, :2]) > TOLERANCE
     poses = poses[outside].astype(np.float32).astype(np.float64)
@@ -90,7 +90,7 @@ def test_clearance_is_that_of_chipmunk_and_of_the_geometry(arena: Arena, seed: i
 
 def test_a_scan_worked_by_hand() -> None:
     arena = Arena("hand", circles=np.array([[2.0, 0.0, 0.5]]), boxes=np.array([[0.0, 2.0, 1.0, 0.25, 0.0]]))
-    lidar = LidarConfig(rays=3, batches=1, field_of_view=180.0, range=3.5)
+    lidar = LidarConfig(rays=3, field_of_view=180.0, range=3.5)
     # At the origin, looking along x: nothing within 3.5 m on the right, the circle ahead, the box on the left.
     assert scan(arena, np.array([[0.0, 0.0, 0.0]]), lidar)[0] == pytest.approx([3.5, 1.5, 1.75])
     # In the corner, looking at the wall x = 5: the wall y = -5 on the right.
@@ -99,20 +99,20 @@ def test_a_scan_worked_by_hand() -> None:
 
 def test_a_ray_that_starts_in_an_obstacle_reads_zero() -> None:
     arena = Arena("inside", circles=np.array([[2.0, 0.0, 0.5]]))
-    lidar = LidarConfig(rays=3, batches=1)
+    lidar = LidarConfig(rays=3)
     assert scan(arena, np.array([[2.1, 0.0, 0.3]]), lidar)[0] == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_a_full_circle_has_no_ray_twice() -> None:
-    angles = ray_angles(LidarConfig(rays=4, batches=4, field_of_view=360.0))
+    angles = ray_angles(LidarConfig(rays=4, field_of_view=360.0))
     assert angles == pytest.approx([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
-    assert ray_angles(LidarConfig(rays=3, batches=3))[[0, -1]] == pytest.approx([-np.pi / 2, np.pi / 2])
+    assert ray_angles(LidarConfig(rays=3))[[0, -1]] == pytest.approx([-np.pi / 2, np.pi / 2])
 
 
 def test_a_drawn_field_of_view_spreads_the_same_rays() -> None:
-    angles = drawn_ray_angles(LidarConfig(rays=5, batches=5), [90.0, 180.0, 200.0])
+    angles = drawn_ray_angles(LidarConfig(rays=5), [90.0, 180.0, 200.0])
     assert np.degrees(angles) == pytest.approx(np.array([45.0, 90.0, 100.0])[:, None] * [-1.0, -0.5, 0.0, 0.5, 1.0])
     # A full circle that is a little short begins and ends short.
-    assert np.degrees(drawn_ray_angles(LidarConfig(rays=4, batches=4, field_of_view=360.0), [342.0]))[0] == pytest.approx(
+    assert np.degrees(drawn_ray_angles(LidarConfig(rays=4, field_of_view=360.0), [342.0]))[0] == pytest.approx(
         [-171.0, -85.5, 0.0, 85.5]
     )

@@ -6,6 +6,7 @@ they hold, else 0), `a if condition else b`, parentheses, and the functions of `
 
 import ast
 import math
+from collections.abc import Set
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -87,8 +88,12 @@ class Step:
 
 
 @lru_cache(maxsize=256)
-def parse(text: str) -> tuple[Step, ...]:
+def parse(text: str, parameters: frozenset[str] = frozenset()) -> tuple[Step, ...]:
     """The program of a formula: operands before their operator.
+
+    Args:
+        text: the formula.
+        parameters: names of more constants than `CONSTANTS` that it may read.
 
     Raises:
         ValueError: it is not a formula, says what of it is not allowed, and what is.
@@ -101,7 +106,7 @@ def parse(text: str) -> tuple[Step, ...]:
         place = f" near character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
         raise ValueError(f"this is not a formula{place}: write for example min(0, clearance - 0.3) * speed") from None
     steps: list[Step] = []
-    _translate(tree.body, steps)
+    _translate(tree.body, steps, CONSTANTS.keys() | parameters)
     if len(steps) > MAX_OPERATIONS:
         raise ValueError(f"at most {MAX_OPERATIONS} numbers, names and operators, this has {len(steps)}")
     if (deepest := depth(steps)) > MAX_DEPTH:
@@ -127,7 +132,7 @@ def operands(operation: str) -> int:
     return {"negative": 1, "if": 3}.get(operation, 2)
 
 
-def _translate(node: ast.expr, steps: list[Step]) -> None:
+def _translate(node: ast.expr, steps: list[Step], constants: Set[str]) -> None:
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             if not (math.isfinite(value) and abs(value) <= MAX_NUMBER):
@@ -135,32 +140,33 @@ def _translate(node: ast.expr, steps: list[Step]) -> None:
             steps.append(Step("number", float(value)))
         case ast.Name(id=name) if name in QUANTITIES:
             steps.append(Step("quantity", name=name))
-        case ast.Name(id=name) if name in CONSTANTS:
+        case ast.Name(id=name) if name in constants:
             steps.append(Step("constant", name=name))
         case ast.Name(id=name):
-            raise ValueError(f"there is no quantity {name!r}; there are {', '.join((*QUANTITIES, *CONSTANTS))}")
+            known = (*QUANTITIES, *CONSTANTS, *sorted(constants - CONSTANTS.keys()))
+            raise ValueError(f"there is no quantity {name!r}; there are {', '.join(known)}")
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            _translate(operand, steps)
+            _translate(operand, steps, constants)
             steps.append(Step("negative"))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            _translate(operand, steps)
+            _translate(operand, steps, constants)
         case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _BINARY:
-            _translate(left, steps)
-            _translate(right, steps)
+            _translate(left, steps, constants)
+            _translate(right, steps, constants)
             steps.append(Step(_BINARY[type(operator)]))
         case ast.Compare(left=left, ops=[comparison], comparators=[right]) if type(comparison) in _COMPARISONS:
-            _translate(left, steps)
-            _translate(right, steps)
+            _translate(left, steps, constants)
+            _translate(right, steps, constants)
             steps.append(Step(_COMPARISONS[type(comparison)]))
         case ast.IfExp(test=test, body=body, orelse=otherwise):
             for part in (test, body, otherwise):
-                _translate(part, steps)
+                _translate(part, steps, constants)
             steps.append(Step("if"))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
             if len(arguments) != FUNCTIONS[name]:
                 raise ValueError(f"{name} takes {FUNCTIONS[name]} values, not {len(arguments)}")
             for argument in arguments:
-                _translate(argument, steps)
+                _translate(argument, steps, constants)
             steps.append(Step(name))
         case ast.Call(func=ast.Name(id=name)):
             raise ValueError(f"there is no function {name!r}; there are {', '.join(FUNCTIONS)}")

@@ -1,0 +1,256 @@
+"""What a policy sees: a list of parts, each some numbers with a meaning (pydantic only).
+
+A part may be seen as it was in the steps before, too: `frames` says at how many moments. An observation holds the newest
+moment of all parts, in the list's order, then what they were a step before, and so on. docs/simulation.md has them all.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from sim.config.base import ADVANCED, Frozen
+
+MAX_PARTS = 16
+"""Parts of one observation, at most."""
+
+MAX_FRAMES = 8
+"""Moments at which a part is seen, at most."""
+
+MAX_NUMBERS = 4_000
+"""Numbers of one observation, at most: all rays of a full scanner at all moments, and some more."""
+
+
+MAX_ACTIONS = 3
+"""Numbers of an action, at most."""
+
+
+def _frames() -> Any:
+    return Field(
+        1,
+        ge=1,
+        le=MAX_FRAMES,
+        title="Frames",
+        description="Moments: now and the steps before.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+class RangesPart(Frozen):
+    """What the LiDAR sees, from right to left: the nearest ray of each batch of neighbours."""
+
+    name: Literal["ranges"] = Field("ranges", title="Ranges")
+    batches: int = Field(
+        10,
+        ge=1,
+        le=360,
+        title="Batches",
+        description="Numbers of each LiDAR's scan; must divide the rays. As many as rays: all of them.",
+        json_schema_extra=ADVANCED,
+    )
+    inverse: bool = Field(
+        True,
+        title="Inverse",
+        description="1 where a collision is, less with distance; otherwise ranges over the LiDAR's.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
+class SpeedsPart(Frozen):
+    """How fast it drove and turned in the last step, as fractions of its limits."""
+
+    name: Literal["speeds"] = Field("speeds", title="Speeds")
+    frames: int = _frames()
+
+
+class ActionsPart(Frozen):
+    """What was commanded last, whether it was followed by then or not, as fractions of the limits."""
+
+    name: Literal["actions"] = Field("actions", title="Last action")
+    frames: int = _frames()
+
+
+class DistancePart(Frozen):
+    """How far the target is."""
+
+    name: Literal["distance"] = Field("distance", title="Distance of the target")
+    scaling: Literal["saturating", "diagonal"] = Field(
+        "saturating",
+        title="Scaling",
+        description="Saturating: d / (d + 1 m). Diagonal: over the arena's, as in the paper.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
+class DirectionPart(Frozen):
+    """Where the target is, in the arena's frame: part of a turn."""
+
+    name: Literal["direction"] = Field("direction", title="Direction of the target")
+    frames: int = _frames()
+
+
+class BearingPart(Frozen):
+    """Where the target is against the heading, left positive."""
+
+    name: Literal["bearing"] = Field("bearing", title="Bearing of the target")
+    encoding: Literal["angle", "sine_cosine"] = Field(
+        "angle",
+        title="Encoding",
+        description="Angle: bearing / pi, which jumps behind the robot. Sine and cosine: two numbers, which do not.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
+class HeadingPart(Frozen):
+    """Where the robot points, in the arena's frame."""
+
+    name: Literal["heading"] = Field("heading", title="Heading")
+    scaling: Literal["signed", "turn"] = Field(
+        "signed",
+        title="Scaling",
+        description="Signed: over pi, left positive. Turn: part of a turn, as in the paper.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
+class DeviationPart(Frozen):
+    """How far the robot is turned away from the target: |bearing| / pi."""
+
+    name: Literal["deviation"] = Field("deviation", title="Heading deviation")
+    frames: int = _frames()
+
+
+ObservationPart = Annotated[
+    RangesPart | SpeedsPart | ActionsPart | DistancePart | DirectionPart | BearingPart | HeadingPart | DeviationPart,
+    Field(discriminator="name"),
+]
+
+ObservationName = Literal["improved", "paper"]
+"""The observations that came first: inverse ranges and a signed bearing, and ranges and angles as published."""
+
+PRESET_TITLES: dict[ObservationName, str] = {"improved": "Improved", "paper": "Paper"}
+
+
+def preset_parts(preset: ObservationName, *, batches: int = 10, frames: int = 1) -> tuple[ObservationPart, ...]:
+    """The parts of one of the first observations: `batches + 6` numbers, at so many moments."""
+    paper = preset == "paper"
+    return (
+        RangesPart(batches=batches, inverse=not paper, frames=frames),
+        SpeedsPart(frames=frames),
+        DistancePart(scaling="diagonal" if paper else "saturating", frames=frames),
+        DirectionPart(frames=frames) if paper else BearingPart(frames=frames),
+        HeadingPart(scaling="turn" if paper else "signed", frames=frames),
+        DeviationPart(frames=frames),
+    )
+
+
+class ObservationConfig(Frozen):
+    """The parts that a policy sees."""
+
+    parts: tuple[ObservationPart, ...] = Field(
+        default_factory=lambda: preset_parts("improved"),
+        min_length=1,
+        max_length=MAX_PARTS,
+        title="Parts",
+        description="What the policy sees. Leave one out to learn what it is worth.",
+        json_schema_extra={
+            "x-ticks": True,
+            "x-presets": {
+                title: [part.model_dump(mode="json") for part in preset_parts(name)] for name, title in PRESET_TITLES.items()
+            },
+        },
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_name(cls, data: Any) -> Any:
+        """One of the first observations by its name, as in files written when there were no parts."""
+        if not isinstance(data, str):
+            return data
+        if data not in PRESET_TITLES:
+            raise ValueError(f"there is no observation {data!r}; by name there are {', '.join(PRESET_TITLES)}")
+        return {"parts": preset_parts(data)}
+
+    @field_validator("parts")
+    @classmethod
+    def _are_told_apart(cls, parts: tuple[ObservationPart, ...]) -> tuple[ObservationPart, ...]:
+        keys = [part_key(part) for part in parts]
+        if twice := sorted({key for key in keys if keys.count(key) > 1}):
+            raise ValueError(f"there is more than one part {', '.join(twice)}: keep one of each")
+        return parts
+
+    @classmethod
+    def preset(cls, preset: ObservationName, *, batches: int = 10, frames: int = 1) -> Self:
+        """One of the first observations, see `preset_parts`."""
+        return cls(parts=preset_parts(preset, batches=batches, frames=frames))
+
+    @property
+    def in_short(self) -> str:
+        """Which of the first observations it is, whatever its batches and frames, or how many parts it has."""
+        settled = tuple(part.model_copy(update={"frames": 1}) for part in self.parts)
+        for name in PRESET_TITLES:
+            if settled == preset_parts(name, batches=self.batches or 1):
+                return name
+        return f"{len(self.parts)} part{'s'[: len(self.parts) > 1]}"
+
+    @property
+    def batches(self) -> int:
+        """Numbers of each LiDAR's scan at one moment; 0 where it is not seen."""
+        return next((part.batches for part in self.parts if isinstance(part, RangesPart)), 0)
+
+    def size(self, actions: int, scanners: int) -> int:
+        """Numbers of all parts at all moments, for a robot with so many numbers in an action and so many LiDARs."""
+        return sum(part.frames * part_size(part, actions, scanners) for part in self.parts)
+
+    @property
+    def frames(self) -> int:
+        """Moments at which anything is seen."""
+        return max(part.frames for part in self.parts)
+
+    def without(self, *names: str) -> Self:
+        """The same without some parts: an ablation.
+
+        Raises:
+            ValidationError: nothing would be left.
+        """
+        return type(self)(parts=tuple(part for part in self.parts if part_key(part) not in names))
+
+
+def part_key(part: ObservationPart) -> str:
+    """The name of a part, unique in its observation."""
+    return part.name
+
+
+def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
+    """Numbers of a part at one moment, for a robot with so many numbers in an action and so many LiDARs."""
+    match part:
+        case RangesPart():
+            return part.batches * scanners
+        case SpeedsPart() | ActionsPart():
+            return actions
+        case BearingPart(encoding="sine_cosine"):
+            return 2
+        case _:
+            return 1
+
+
+def read_first_observations(task: Any) -> Any:
+    """A task's document, in which the first observations stood by name, with batches at the LiDAR and frames at the task."""
+    if not isinstance(task, Mapping):
+        return task
+    name, lidar = task.get("observation", "improved"), task.get("lidar")
+    at_lidar = isinstance(lidar, Mapping) and "batches" in lidar
+    if not isinstance(name, str) or name not in PRESET_TITLES or not ("frames" in task or at_lidar):
+        return task
+    document = {key: value for key, value in task.items() if key != "frames"}
+    parts = [part.model_dump() for part in preset_parts("paper" if name == "paper" else "improved")]
+    if "frames" in task:
+        parts = [part | {"frames": task["frames"]} for part in parts]
+    if isinstance(lidar, Mapping) and at_lidar:
+        document["lidar"] = {key: value for key, value in lidar.items() if key != "batches"}
+        parts[0]["batches"] = lidar["batches"]
+    return document | {"observation": {"parts": parts}}
