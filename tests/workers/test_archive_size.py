@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.config import LidarConfig, TaskConfig
+from sim.config import LidarConfig, ObservationConfig, TaskConfig
 from tests.workers.test_trainer import Recorder
 from workers.archive_size import archive_bytes, refuse_too_large, replay_bytes
 from workers.config import Algorithm, DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, TrainingConfig
@@ -16,7 +16,7 @@ SMALL = MlpNetwork(hidden_sizes=(16,))
 
 def wide(replay_size: int) -> TrainingConfig:
     """Observations of 8 x 126 numbers."""
-    task = TaskConfig(lidar=LidarConfig(rays=360, batches=120), frames=8)
+    task = TaskConfig(lidar=LidarConfig(rays=360), observation=ObservationConfig.preset("improved", batches=120, frames=8))
     return TrainingConfig(task=task, algorithm=SacConfig(replay_size=replay_size))
 
 
@@ -46,7 +46,7 @@ def test_archives_stay_within_what_was_foretold(tmp_path: Path, algorithm: Algor
 def test_a_memory_that_fits_is_named_and_fits() -> None:
     with pytest.raises(MemoryTooLargeError, match="keep at most 104,000 transitions") as refused:
         refuse_too_large(wide(200_000), 512 * 2**20)
-    assert "fewer LiDAR batches" in str(refused.value)
+    assert "fewer batches" in str(refused.value)
     refuse_too_large(wide(104_000), 512 * 2**20)
     refuse_too_large(TrainingConfig(algorithm=SacConfig(replay_size=2_000_000)), 512 * 2**20)
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from workers.frames import Frame, FrameError
+from workers.errors import FrameError
+from workers.frames import Frame
 
 HEADER_BYTES = 1 + 1 + 1 + 2 + 2 + 2 + 8 + 8 + 4
 

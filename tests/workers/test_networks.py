@@ -5,6 +5,7 @@ import pytest
 import torch
 from torch import nn
 
+from tests.heads import head
 from workers.algorithms.flat import FlatParameters
 from workers.config import MlpNetwork, Network, ResBlockNetwork
 from workers.kernels.networks import backward, forward, input_gradient
@@ -41,7 +42,7 @@ def test_resblock_passes_its_input_to_the_head() -> None:
         for parameter in network.parameters():
             parameter.zero_()
         # second concatenation: layer 4 (4), then the first one: layer 2 (2), then the input (2)
-        network.head.weight[0, -2:] = torch.tensor([1.0, 1.0])
+        head(network).weight[0, -2:] = torch.tensor([1.0, 1.0])
         output = network(torch.tensor([[3.0, -2.0]]))
     assert output.item() == pytest.approx(3.0 - 2.0 * 0.01 * 0.01)
 
@@ -52,7 +53,7 @@ def test_mean_actions_are_bounded_and_start_in_the_middle(config: Network) -> No
     observations = torch.randn(256, 16)
     assert torch.allclose(actor(observations), torch.tensor([0.5, 0.0]), atol=0.05)
     with torch.no_grad():
-        actor.network.head.weight.mul_(1e4)
+        head(actor.network).weight.mul_(1e4)
         mean = actor(observations)
     assert mean[:, 0].min() >= 0.0
     assert mean[:, 0].max() <= 1.0

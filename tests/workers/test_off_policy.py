@@ -9,15 +9,17 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.heads import head
 from workers.algorithms import build_algorithm
 from workers.algorithms.ddpg import Ddpg, build_ddpg
 from workers.algorithms.gradients.actor_critic import AutogradActorCritic, WrittenActorCritic
-from workers.algorithms.gradients.sac import AutogradSac, WrittenSac, log_slope
+from workers.algorithms.gradients.sac import AutogradSac, WrittenSac
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.sac import Sac, build_sac
 from workers.algorithms.storage.replay import ReplayBuffer, Transitions
 from workers.algorithms.td3 import Td3, build_td3
 from workers.config import DdpgConfig, MlpNetwork, Network, ResBlockNetwork, SacConfig, Td3Config
+from workers.networks.squashing import log_slope
 from workers.policy import Policy
 
 F = np.float32
@@ -30,7 +32,7 @@ def set_constant(network: torch.nn.Module, value: float) -> None:
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.zero_()
-        network.head.bias.fill_(value)  # type: ignore[operator, union-attr]
+        head(network).bias.fill_(value)
 
 
 def one_batch(pairs: int = 1) -> Transitions:
@@ -114,7 +116,7 @@ def test_the_penalty_moves_an_actor_that_its_critic_cannot_move() -> None:
         ddpg = build_ddpg(DdpgConfig(network=SMALL, actor_learning_rate=0.1, logit_penalty=penalty), 3, 0, CPU)
         set_constant(ddpg.actor.network, 30.0)
         ddpg.learn(one_batch())
-        assert ddpg.actor.network.head.bias.tolist() == pytest.approx([expected, expected])
+        assert head(ddpg.actor.network).bias.tolist() == pytest.approx([expected, expected])
 
 
 def test_learning_rates_fall_linearly() -> None:
@@ -132,7 +134,7 @@ def test_written_out_gradients_equal_autograd(network: Network) -> None:
     reference = AutogradActorCritic(td3.actor, td3.critics, actor, critics, logit_penalty=0.01)
     written = WrittenActorCritic(td3.actor, td3.critics, 32, logit_penalty=0.01)
     with torch.no_grad():
-        td3.actor.network.head.weight.mul_(10.0)
+        head(td3.actor.network).weight.mul_(10.0)
     batch = Transitions(torch.randn(32, 16), torch.rand(32, 2), torch.rand(32, 1), torch.ones(32, 1), torch.randn(32, 16))
     targets = torch.randn(32, 1)
 
@@ -158,7 +160,7 @@ def test_sacs_written_out_gradients_equal_autograd(network: Network) -> None:
     actor, critics = sac.actor_optimizer, sac.critic_optimizer
     reference, written = AutogradSac(sac.actor, sac.critics, actor, critics), WrittenSac(sac.actor, sac.critics, 32)
     with torch.no_grad():
-        sac.actor.head.weight.mul_(10.0)
+        head(sac.actor).weight.mul_(10.0)
     batch = Transitions(torch.randn(32, 16), torch.rand(32, 2), torch.rand(32, 1), torch.ones(32, 1), torch.randn(32, 16))
     targets, noise, alpha = torch.randn(32, 1), torch.randn(32, 2), torch.tensor([0.3])
 
@@ -312,7 +314,7 @@ def test_the_known_best_action_is_found(config: DdpgConfig | Td3Config | SacConf
         algorithm.record(observations, rewards, nothing, nothing, observations)
         algorithm.update(step / steps)
     grid = np.linspace(0.05, 0.95, 19, dtype=F)[:, None]
-    error = np.abs(Policy(config.network, algorithm.policy_weights())(grid) - best(grid))
+    error = np.abs(Policy(config.network, algorithm.policy_weights(), 1)(grid) - best(grid))
     assert error.mean() < 0.06
     assert error.max() < 0.2
 
@@ -322,5 +324,5 @@ def test_sac_exports_the_mean_only() -> None:
     observations = torch.rand(5, 3)
     mean = sac.actor(observations)[:, :2]
     expected = torch.stack((torch.sigmoid(mean[:, 0]), torch.tanh(mean[:, 1])), 1)
-    actions = Policy(SMALL, sac.policy_weights())(observations.numpy())
+    actions = Policy(SMALL, sac.policy_weights(), 3)(observations.numpy())
     np.testing.assert_allclose(actions, expected.detach().numpy(), atol=1e-6)

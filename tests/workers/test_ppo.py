@@ -8,6 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.heads import head
 from workers.algorithms.gradients.ppo import AutogradPpo, WrittenPpo, entropy, log_prob
 from workers.algorithms.ppo import Ppo, build_ppo
 from workers.algorithms.storage.return_scaler import ReturnScaler
@@ -87,7 +88,7 @@ def test_value_targets_by_hand(terminated: bool, truncated: bool, expected: floa
         for parameter in ppo.critic.parameters():
             parameter.zero_()
         ppo.critic.layers[0].weight[0, 0] = 1.0  # type: ignore[union-attr, index]
-        ppo.critic.head.weight[0, 0] = 2.0
+        head(ppo.critic).weight[0, 0] = 2.0
     drive(ppo, [1.0] * 16, [terminated] + [False] * 15, [truncated] + [False] * 15, final=3.0)
     with torch.no_grad():
         values, advantages = ppo._estimate()
@@ -137,7 +138,7 @@ def test_written_out_gradients_equal_autograd(network: Network) -> None:
     config = PpoConfig(network=network, robots=8, rollout_steps=rows // 8, minibatch_size=64, entropy_coefficient=0.01)
     ppo = build_ppo(config, 16, 0, CPU)
     with torch.no_grad():
-        ppo.actor.network.head.weight.normal_(0.0, 0.3)
+        head(ppo.actor.network).weight.normal_(0.0, 0.3)
     generator = torch.Generator().manual_seed(1)
     ratios = (torch.rand(rows, generator=generator) + 0.5).tolist()
     samples = batch_with_ratio(ppo.actor, ratios, torch.randn(rows, generator=generator).tolist())

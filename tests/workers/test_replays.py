@@ -28,7 +28,7 @@ def recording() -> Recording:
 def test_it_ends_as_the_evaluation_did(recording: Recording) -> None:
     manifest, policy = read_policy(POLICY.archive)
     # torch flushes denormal numbers in a training; that this evaluation does not makes no difference to any episode.
-    evaluation = evaluate(torch_policy(policy.network, policy.weights), manifest.training.task, SUITE)
+    evaluation = evaluate(torch_policy(policy), manifest.training.task, SUITE)
     assert recording.evaluation == evaluation
 
 

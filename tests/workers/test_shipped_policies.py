@@ -64,7 +64,7 @@ def test_figures_are_those_of_the_episodes_on_the_suite_of_today(policy: Shipped
 @pytest.mark.parametrize("policy", POLICIES)
 def test_evaluating_a_policy_again_gives_its_recorded_result(policy: ShippedPolicy) -> None:
     manifest, numpy_policy = read_policy(policy.archive)
-    act = torch_policy(numpy_policy.network, numpy_policy.weights)
+    act = torch_policy(numpy_policy)
     name = policy.card.results[0].suite
     again = evaluate(act, manifest.training.task, suite_named(name, manifest.training.task)).episodes
     recorded = policy.evaluation(name).episodes
@@ -88,7 +88,7 @@ def test_baselines_are_those_of_the_suites_of_today() -> None:
     hashes = {name: load_suite(name).hash for name in suite_names()}
     hashes |= {result.suite: result.suite_hash for policy in shipped_policies() for result in policy.card.results}
     for baseline in baselines().baselines:
-        assert {result.suite: result.suite_hash for result in baseline.results} == hashes
+        assert {result.suite: result.suite_hash for result in baseline.results}.items() <= hashes.items()
     task, suite = TaskConfig(), load_suite("complex-200")
     recorded = {baseline.name: baseline.results for baseline in baselines().baselines}["go-to-goal"]
     again = figures(evaluate(go_to_goal(task), task, suite).episodes, task.arrival_distance)

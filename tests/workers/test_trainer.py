@@ -9,7 +9,15 @@ import pytest
 import torch
 
 from sim.arenas import build_arena, with_maps_of
-from sim.config import ArenaConfig, GeneratedArenaConfig, JackalConfig, MoversConfig, RandomisationConfig, TaskConfig
+from sim.config import (
+    ArenaConfig,
+    GeneratedArenaConfig,
+    JackalConfig,
+    MoversConfig,
+    ObservationConfig,
+    RandomisationConfig,
+    TaskConfig,
+)
 from workers.checkpoints import read_checkpoint, read_manifest, read_policy, write_checkpoint
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
@@ -135,7 +143,7 @@ def test_another_robot_among_movers_with_stacked_frames_and_drawn_disturbances_t
     task = TaskConfig(
         arena=ArenaConfig(movers=MoversConfig(count=3)),
         robot=JackalConfig(),
-        frames=3,
+        observation=ObservationConfig.preset("improved", frames=3),
         randomisation=RandomisationConfig(rate=(2.0, 10.0), heading_noise=(0.0, 0.1), command_delay=(0, 2)),
     )
     config = TINY.model_copy(update={"task": task, "steps": 2_000})
@@ -203,7 +211,7 @@ def test_finished_training_can_be_prolonged(whole: Recorder, tmp_path: Path) -> 
 
 
 def test_checkpoint_of_another_training_is_refused(whole: Recorder, tmp_path: Path) -> None:
-    other = TINY.model_copy(update={"task": TaskConfig(observation="paper")})
+    other = TINY.model_copy(update={"task": TaskConfig(observation=ObservationConfig.preset("paper"))})
     for config, seed in ((other, 5), (TINY, 6)):
         with pytest.raises(ArchiveMismatchError, match="its own configuration"):
             train(config, seed, Recorder(), tmp_path, resume=whole.checkpoints[-1][1])

@@ -62,7 +62,7 @@ def test_options_change_the_preset_part_by_part(tmp_path: Path) -> None:
     training = read_manifest(tmp_path / "step-1024.zip").training
     assert isinstance(training.algorithm, DdpgConfig)
     assert training.algorithm.network.name == "resblock"
-    assert (training.task.arena.name, training.task.observation) == ("complex", "paper")
+    assert (training.task.arena.name, training.task.observation.in_short) == ("complex", "paper")
 
 
 def test_evaluate_prints_success_with_its_interval(checkpoint: Path) -> None:

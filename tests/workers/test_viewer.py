@@ -62,19 +62,19 @@ def viewer_threads() -> list[threading.Thread]:
 
 def test_a_quarter_circle() -> None:
     # Radius v / w = 0.5 m, a quarter turn takes pi / 2 seconds at 1 rad/s.
-    pose = along_arc(np.zeros((1, 3), np.float32), np.array([[0.5, 1.0]], np.float32), np.pi / 2)
+    pose = along_arc(np.zeros((1, 3), np.float32), np.array([[0.5, 0.0, 1.0]], np.float32), np.pi / 2)
     np.testing.assert_allclose(pose, [[0.5, 0.5, np.pi / 2]], atol=1e-6)
 
 
 def test_straight_ahead() -> None:
-    pose = along_arc(np.array([[1.0, 2.0, np.pi / 2]], np.float32), np.array([[0.25, 0.0]], np.float32), 4.0)
+    pose = along_arc(np.array([[1.0, 2.0, np.pi / 2]], np.float32), np.array([[0.25, 0.0, 0.0]], np.float32), 4.0)
     np.testing.assert_allclose(pose, [[1.0, 3.0, np.pi / 2]], atol=1e-6)
 
 
 @given(st.floats(0.0, 0.25), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0), st.floats(0.0, 1.0))
 def test_two_parts_of_an_arc_make_the_whole(speed: float, turn: float, heading: float, part: float) -> None:
     start = np.array([[0.3, -0.7, heading]], np.float32)
-    velocities = np.array([[speed, turn]], np.float32)
+    velocities = np.array([[speed, 0.3 * speed, turn]], np.float32)
     in_two = along_arc(along_arc(start, velocities, part), velocities, 1.0 - part)
     whole = along_arc(start, velocities, 1.0)
     np.testing.assert_allclose(in_two[:, :2], whole[:, :2], atol=1e-5)
@@ -86,7 +86,7 @@ def test_between_two_steps_a_robot_is_on_the_arc_that_the_simulation_drives() ->
     env.reset()
     before = env.poses.copy()
     env.step(np.tile(np.array([0.8, -0.6], np.float32), (4, 1)))
-    after = along_arc(before, np.tile(np.array([0.2, -0.6], np.float32), (4, 1)), TASK.control_period)
+    after = along_arc(before, np.tile(np.array([0.2, 0.0, -0.6], np.float32), (4, 1)), TASK.control_period)
     drove = env.outcomes == 0
     assert drove.any()
     np.testing.assert_allclose(after[drove, :2], env.poses[drove, :2], atol=1e-4)

@@ -21,7 +21,7 @@ class Algorithm(Protocol):
     steps_per_update: int
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Exploring actions (robots, 2) for observations (robots, size)."""
+        """Exploring actions (robots, A) for observations (robots, size)."""
 
     def record(
         self,

@@ -10,16 +10,17 @@ import copy
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.gradients.actor_critic import ActorCriticGradients, action_value, fastest_gradients
-from workers.algorithms.off_policy import ACTION_HALF_RANGE, OffPolicyAlgorithm
+from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.storage.replay import Transitions
 from workers.config import DdpgConfig, Td3Config
-from workers.networks.layout import ACTION_SIZE
-from workers.networks.modules import Body, DeterministicActor, build_network
+from workers.networks.inputs import Inputs, as_inputs
+from workers.networks.modules import DeterministicActor, build_network
 
 
 class NoisyPolicy(OffPolicyAlgorithm):
@@ -29,7 +30,7 @@ class NoisyPolicy(OffPolicyAlgorithm):
         self,
         config: DdpgConfig | Td3Config,
         actor: DeterministicActor,
-        critics: tuple[Body, ...],
+        critics: tuple[nn.Module, ...],
         generator: torch.Generator,
     ) -> None:
         self.config, self.actor, self.critics = config, actor, critics
@@ -44,18 +45,19 @@ class NoisyPolicy(OffPolicyAlgorithm):
                 "target_critic": FlatParameters(*self.target_critics),
             },
             observation_size=actor.observation_size,
+            actions=actor.actions,
             generator=generator,
         )
         self.gradients: ActorCriticGradients = fastest_gradients(
             actor, critics, self.actor_optimizer, self.critic_optimizer, config.batch_size, config.logit_penalty
         )
         self._noise = config.exploration_noise
-        self._half_range = ACTION_HALF_RANGE.to(generator.device)
+        self._half_range = torch.tensor(actor.actions.half_spans, device=generator.device)
 
     def explore(self, observations: Tensor) -> Tensor:
         """See `OffPolicyAlgorithm.explore`."""
         actions: Tensor = self.actor(observations)
-        return actions + self._noise * self.normal((len(observations), ACTION_SIZE))
+        return actions + self._noise * self.normal((len(observations), self.action_layout.size))
 
     def normal(self, shape: tuple[int, ...]) -> Tensor:
         """Standard normal noise in halves of the actions' ranges."""
@@ -65,7 +67,8 @@ class NoisyPolicy(OffPolicyAlgorithm):
         """See `OffPolicyAlgorithm.set_progress`."""
         first, last = self.config.exploration_noise, self.config.final_exploration_noise
         self._noise = first + (last - first) * progress
-        return {"policy/std_linear": 0.5 * self._noise, "policy/std_angular": self._noise}
+        layout = self.action_layout
+        return {f"policy/std_{name}": half * self._noise for name, half in zip(layout.names, layout.half_spans, strict=True)}
 
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`."""
@@ -98,17 +101,25 @@ class Ddpg(NoisyPolicy):
 
 
 def build_noisy_networks(
-    config: DdpgConfig | Td3Config, critics: int, observation_size: int, seed: int, device: torch.device
-) -> tuple[DeterministicActor, tuple[Body, ...]]:
+    config: DdpgConfig | Td3Config,
+    critics: int,
+    inputs: Inputs | int,
+    seed: int,
+    device: torch.device,
+    actions: ActionLayout,
+) -> tuple[DeterministicActor, tuple[nn.Module, ...]]:
     """Actor and critics, freshly initialised; the same seed gives the same weights on every device."""
+    inputs = as_inputs(inputs)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(stream_seed(seed, WEIGHTS))
-        actor = DeterministicActor(build_network(config.network, observation_size, ACTION_SIZE), observation_size)
-        networks = [build_network(config.network, observation_size + ACTION_SIZE, 1) for _ in range(critics)]
+        actor = DeterministicActor(build_network(config.network, inputs, actions.size), inputs.size, actions)
+        networks = [build_network(config.network, inputs.and_also(actions.size), 1) for _ in range(critics)]
     return actor.to(device), tuple(network.to(device) for network in networks)
 
 
-def build_ddpg(config: DdpgConfig, observation_size: int, seed: int, device: torch.device) -> Ddpg:
+def build_ddpg(
+    config: DdpgConfig, inputs: Inputs | int, seed: int, device: torch.device, actions: ActionLayout = DEFAULT_ACTIONS
+) -> Ddpg:
     """DDPG with freshly initialised networks."""
-    actor, critics = build_noisy_networks(config, 1, observation_size, seed, device)
+    actor, critics = build_noisy_networks(config, 1, inputs, seed, device, actions)
     return Ddpg(config, actor, critics, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

@@ -8,15 +8,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.actions import ActionLayout
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.storage.replay import ReplayBuffer, Transitions
 from workers.config import OffPolicyConfig
-
-ACTION_LOW = torch.tensor([0.0, -1.0])
-ACTION_HIGH = torch.tensor([1.0, 1.0])
-ACTION_HALF_RANGE = torch.tensor([0.5, 1.0])
-"""Noise is scaled by it, so that the same deviation means as much for both velocities."""
 
 
 class OffPolicyAlgorithm(ABC):
@@ -27,6 +23,7 @@ class OffPolicyAlgorithm(ABC):
         online: what is trained, by the name under which its state is kept.
         targets: slow copies, by name.
         observation_size: numbers in an observation.
+        actions: what an action is.
         generator: of exploration and of sampling, on the same device as the networks.
     """
 
@@ -38,6 +35,7 @@ class OffPolicyAlgorithm(ABC):
         online: dict[str, FlatAdam],
         targets: dict[str, FlatParameters],
         observation_size: int,
+        actions: ActionLayout,
         generator: torch.Generator,
     ) -> None:
         self.robots = config.robots
@@ -46,15 +44,20 @@ class OffPolicyAlgorithm(ABC):
         self._learning_rates = {name: adam.learning_rate for name, adam in online.items()}
         self._generator = generator
         self._device = generator.device
-        self._replay = ReplayBuffer(config.replay_size, config.robots, observation_size, self._device)
+        self._replay = ReplayBuffer(config.replay_size, config.robots, observation_size, self._device, actions.size)
         self._observations = torch.zeros(config.robots, observation_size, device=self._device)
-        self._actions = torch.zeros(config.robots, 2, device=self._device)
+        self._actions = torch.zeros(config.robots, actions.size, device=self._device)
+        self.action_layout = actions
+        self._low, self._high = (
+            torch.tensor(actions.lows, device=self._device),
+            torch.ones(actions.size, device=self._device),
+        )
         self._steps = 0
         self._progress = 0.0
 
     @abstractmethod
     def explore(self, observations: Tensor) -> Tensor:
-        """Exploring actions (robots, 2) for observations (robots, size), not yet clipped."""
+        """Exploring actions (robots, A) for observations (robots, size), not yet clipped."""
 
     @abstractmethod
     def learn(self, batch: Transitions) -> dict[str, Tensor]:
@@ -73,12 +76,11 @@ class OffPolicyAlgorithm(ABC):
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Algorithm.act`."""
         self._observations.copy_(torch.from_numpy(observations))
-        low, high = ACTION_LOW.to(self._device), ACTION_HIGH.to(self._device)
         if self.warming_up:
             uniform = torch.rand(self._actions.shape, generator=self._generator, device=self._device)
-            self._actions.copy_(low + (high - low) * uniform)
+            self._actions.copy_(self._low + (self._high - self._low) * uniform)
         else:
-            torch.clamp(self.explore(self._observations), low, high, out=self._actions)
+            torch.clamp(self.explore(self._observations), self._low, self._high, out=self._actions)
         self._steps += self.robots
         actions: NDArray[np.float32] = self._actions.cpu().numpy()
         return actions

@@ -7,22 +7,25 @@ critic each), returns scaled (continuous control, 3), state-independent deviatio
 layers (14), orthogonal initialisation (2).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
 from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import RolloutStorage, generalized_advantages
-from workers.config import PpoConfig
-from workers.networks.compiled import inference
-from workers.networks.layout import ACTION_SIZE
-from workers.networks.modules import Body, GaussianActor, bound_actions, build_network
+from workers.config import PpoConfig, RecurrentNetworkConfig
+from workers.networks.compiled import inference, is_compiled
+from workers.networks.inputs import Inputs, as_inputs
+from workers.networks.modules import Described, GaussianActor, build_network
+from workers.networks.squashing import bound_actions
 
 # A deviation between 1.8 % and 270 % of the action's unit: beyond either, exploration is none or all.
 LOG_STD_RANGE = (-4.0, 1.0)
@@ -46,7 +49,7 @@ class Ppo:
         self,
         config: PpoConfig,
         actor: GaussianActor,
-        critic: Body,
+        critic: nn.Module,
         storage: RolloutStorage,
         generator: torch.Generator,
         gradients: PpoGradients | None = None,
@@ -66,7 +69,7 @@ class Ppo:
         storage, step = self.storage, self.storage.step
         storage.observations[step] = torch.from_numpy(observations)
         storage.noise[step].normal_(generator=self._generator)
-        mean = bound_actions(self._logits(storage.observations[step]))
+        mean = bound_actions(self._logits(storage.observations[step]), self.actor.actions)
         torch.addcmul(mean, storage.noise[step], torch.exp(self.actor.log_std), out=storage.actions[step])
         actions: NDArray[np.float32] = storage.actions[step].cpu().numpy()
         return actions
@@ -99,8 +102,7 @@ class Ppo:
 
         totals, minibatches = torch.zeros(4, dtype=torch.float64, device=storage.device), 0
         for _ in range(config.epochs):
-            order = torch.randperm(len(samples.returns), generator=self._generator, device=storage.device)
-            for minibatch in order.split(config.minibatch_size):
+            for minibatch in self.minibatches():
                 totals += self._gradients(samples, minibatch)
                 self._optimizer.clip_gradients(config.max_grad_norm)
                 self._optimizer.step()
@@ -109,18 +111,33 @@ class Ppo:
         storage.clear()
 
         policy_loss, value_loss, kl, clip_fraction = (totals / minibatches).tolist()
-        std_linear, std_angular = self.actor.log_std.exp().tolist()
+        deviations = zip(self.actor.actions.names, self.actor.log_std.exp().tolist(), strict=True)
         return {
             "loss/policy": policy_loss,
             "loss/value": value_loss,
             "policy/kl": kl,
             "policy/entropy": entropy(self.actor.log_std).item(),
             "policy/clip_fraction": clip_fraction,
-            "policy/std_linear": std_linear,
-            "policy/std_angular": std_angular,
+            **{f"policy/std_{name}": deviation for name, deviation in deviations},
             "value/explained_variance": explained_variance,
             "optim/learning_rate": self._optimizer.learning_rate,
         }
+
+    def minibatches(self) -> Iterator[torch.Tensor]:
+        """The rows of the rollout's samples once, in a new order."""
+        rows = self.storage.steps * self.storage.robots
+        order = torch.randperm(rows, generator=self._generator, device=self.storage.device)
+        yield from order.split(self.config.minibatch_size)
+
+    def values(self) -> torch.Tensor:
+        """Values (steps + 1, robots) of the rollout's observations."""
+        # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
+        return torch.stack([self._values(observations)[:, 0].clone() for observations in self.storage.observations])
+
+    def final_values(self, observations: torch.Tensor) -> torch.Tensor:
+        """Values (k,) of the observations (k, size) at which the step limit cut episodes."""
+        values: torch.Tensor = self.critic(observations)[:, 0]
+        return values
 
     def _estimate(self) -> tuple[torch.Tensor, torch.Tensor]:
         """Values (steps + 1, robots) and advantages (steps, robots) of the rollout, in scaled rewards."""
@@ -131,9 +148,8 @@ class Ppo:
         rewards = storage.rewards * np.float32(scale)
         steps, robots, final_observations = storage.truncations()
         if steps.size:
-            rewards[steps, robots] += np.float32(config.gamma) * self.critic(final_observations)[:, 0].cpu().numpy()
-        # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
-        values = torch.stack([self._values(observations)[:, 0].clone() for observations in storage.observations])
+            rewards[steps, robots] += np.float32(config.gamma) * self.final_values(final_observations).cpu().numpy()
+        values = self.values()
         advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.ends, config.gamma, config.gae_lambda)
         return values, torch.from_numpy(advantages).to(storage.device)
 
@@ -167,21 +183,38 @@ class Ppo:
         self.storage.clear()
 
 
-def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: Body) -> PpoGradients:
-    """Written out on a CPU; by autograd elsewhere."""
-    if actor.log_std.device.type == "cpu":
+def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: nn.Module) -> PpoGradients:
+    """Written out where compiled passes are known; by autograd elsewhere."""
+    if is_compiled(actor.network, critic):
         return WrittenPpo(actor, critic, config.clip_range, config.entropy_coefficient)
     return AutogradPpo(actor, critic, config.clip_range, config.entropy_coefficient)
 
 
-def build_ppo(config: PpoConfig, observation_size: int, seed: int, device: torch.device) -> Ppo:
+def initial_deviations(config: PpoConfig, actions: ActionLayout) -> tuple[float, ...]:
+    """Of each component's exploration, in fractions of its limit: that of a speed is for a range of 1, and grows with it."""
+    return tuple(
+        config.initial_std_angular if component.turns else component.span * config.initial_std_linear
+        for component in actions.components
+    )
+
+
+def build_ppo(
+    config: PpoConfig, inputs: Inputs | int, seed: int, device: torch.device, actions: ActionLayout = DEFAULT_ACTIONS
+) -> Ppo:
     """PPO with freshly initialised networks; the same seed gives the same weights on every device."""
+    inputs = as_inputs(inputs)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(stream_seed(seed, WEIGHTS))
         actor = GaussianActor(
-            build_network(config.network, observation_size, ACTION_SIZE),
-            (config.initial_std_linear, config.initial_std_angular),
+            build_network(config.network, inputs, actions.size), initial_deviations(config, actions), actions
         ).to(device)
-        critic = build_network(config.network, observation_size, 1).to(device)
-    storage = RolloutStorage(config.rollout_steps, config.robots, observation_size, device)
-    return Ppo(config, actor, critic, storage, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))
+        critic = build_network(config.network, inputs, 1).to(device)
+    storage = RolloutStorage(config.rollout_steps, config.robots, inputs.size, actions.size, device)
+    generator = torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION))
+    if isinstance(config.network, RecurrentNetworkConfig):
+        # Only now: it is made of this.
+        from workers.algorithms.recurrent_ppo import RecurrentPpo
+
+        assert isinstance(critic, Described)
+        return RecurrentPpo(config, actor, critic, storage, generator)
+    return Ppo(config, actor, critic, storage, generator)

@@ -1,8 +1,8 @@
 """Soft Actor-Critic with a learned temperature (Haarnoja et al. 2018, 'Soft actor-critic algorithms and applications').
 
-The lines of its Algorithm 1 are named in `Sac.learn`. The policy squashes a normal variable u by a sigmoid for the linear
-and a tanh for the angular velocity; its deterministic form squashes the mean, so that the exported policy is a network
-with the same heads as every other algorithm's.
+The lines of its Algorithm 1 are named in `Sac.learn`. The policy squashes a normal variable u as `bound_actions`
+does; its deterministic form squashes the mean, so that the exported policy is a network with the same heads as every other
+algorithm's.
 """
 
 import copy
@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.gradients.actor_critic import action_value
@@ -20,8 +21,10 @@ from workers.algorithms.gradients.sac import SacGradients, fastest_gradients, sq
 from workers.algorithms.off_policy import OffPolicyAlgorithm
 from workers.algorithms.storage.replay import Transitions
 from workers.config import SacConfig
-from workers.networks.layout import ACTION_SIZE
-from workers.networks.modules import Body, build_network
+from workers.errors import NetworkError
+from workers.networks.inputs import Inputs, as_inputs
+from workers.networks.layout import policy_shapes
+from workers.networks.modules import build_network
 
 
 class Temperature(nn.Module):
@@ -37,16 +40,24 @@ class Sac(OffPolicyAlgorithm):
 
     Args:
         config: hyperparameters.
-        actor: observations (n, size) to mean and logarithm of the deviation of u, (n, 4).
+        actor: observations (n, size) to mean and logarithm of the deviation of u, (n, 2 A).
         critics: two networks of observation and action.
-        observation_size: numbers in an observation.
+        inputs: what an observation is.
+        actions: what an action is.
         generator: of exploration and of sampling.
     """
 
     def __init__(
-        self, config: SacConfig, actor: Body, critics: tuple[Body, ...], observation_size: int, generator: torch.Generator
+        self,
+        config: SacConfig,
+        actor: nn.Module,
+        critics: tuple[nn.Module, ...],
+        inputs: Inputs,
+        actions: ActionLayout,
+        generator: torch.Generator,
     ) -> None:
         self.config, self.actor, self.critics = config, actor, critics
+        self._policy_shapes = policy_shapes(config.network, inputs, actions)
         self.temperature = Temperature(config.initial_temperature).to(generator.device)
         self.target_critics = copy.deepcopy(critics)
         self.actor_optimizer = FlatAdam(actor, learning_rate=config.actor_learning_rate)
@@ -60,16 +71,17 @@ class Sac(OffPolicyAlgorithm):
                 "temperature": self.temperature_optimizer,
             },
             targets={"target_critic": FlatParameters(*self.target_critics)},
-            observation_size=observation_size,
+            observation_size=inputs.size,
+            actions=actions,
             generator=generator,
         )
         self.gradients: SacGradients = fastest_gradients(
-            actor, critics, self.actor_optimizer, self.critic_optimizer, config.batch_size
+            actor, critics, self.actor_optimizer, self.critic_optimizer, config.batch_size, actions
         )
 
     def sample(self, observations: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (n, 2) of observations (n, size), and their log densities (n, 1)."""
-        return squashed_sample(self.actor(observations), self._noise(len(observations)))
+        """Actions (n, A) of observations (n, size), and their log densities (n, 1)."""
+        return squashed_sample(self.actor(observations), self._noise(len(observations)), self.action_layout)
 
     def explore(self, observations: Tensor) -> Tensor:
         """See `OffPolicyAlgorithm.explore`."""
@@ -109,7 +121,7 @@ class Sac(OffPolicyAlgorithm):
         }
 
     def _noise(self, rows: int) -> Tensor:
-        return torch.randn((rows, ACTION_SIZE), generator=self._generator, device=self._device)
+        return torch.randn((rows, self.action_layout.size), generator=self._generator, device=self._device)
 
     def set_progress(self, progress: float) -> dict[str, float]:
         """See `OffPolicyAlgorithm.set_progress`: the temperature sees to exploration."""
@@ -117,14 +129,23 @@ class Sac(OffPolicyAlgorithm):
 
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`: without the head's rows that make the deviation."""
-        weights = {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.state_dict().items()}
-        return weights | {name: weights[name][:ACTION_SIZE].copy() for name in ("head.weight", "head.bias")}
+        weights = {name: tensor.cpu().numpy() for name, tensor in self.actor.state_dict().items()}
+        return {name: weights[name][: shape[0]].copy() for name, shape in self._policy_shapes.items()}
 
 
-def build_sac(config: SacConfig, observation_size: int, seed: int, device: torch.device) -> Sac:
+def build_sac(
+    config: SacConfig, inputs: Inputs | int, seed: int, device: torch.device, actions: ActionLayout = DEFAULT_ACTIONS
+) -> Sac:
     """SAC with freshly initialised networks; the same seed gives the same weights on every device."""
+    inputs = as_inputs(inputs)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(stream_seed(seed, WEIGHTS))
-        actor = build_network(config.network, observation_size, 2 * ACTION_SIZE).to(device)
-        critics = tuple(build_network(config.network, observation_size + ACTION_SIZE, 1).to(device) for _ in range(2))
-    return Sac(config, actor, critics, observation_size, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))
+        actor = build_network(config.network, inputs, 2 * actions.size).to(device)
+        critics = tuple(build_network(config.network, inputs.and_also(actions.size), 1).to(device) for _ in range(2))
+    for name, shape in policy_shapes(config.network, inputs, actions).items():
+        if tuple(actor.get_parameter(name).shape[1:]) != shape[1:]:
+            raise NetworkError(
+                f"SAC needs a network whose last layer alone depends on its outputs, unlike {name} of this one"
+            )
+    generator = torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION))
+    return Sac(config, actor, critics, inputs, actions, generator)

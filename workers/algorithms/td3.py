@@ -8,13 +8,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from sim.streams import EXPLORATION, stream_seed
 from workers.algorithms.base import Arrays
 from workers.algorithms.ddpg import NoisyPolicy, build_noisy_networks
 from workers.algorithms.gradients.actor_critic import action_value
-from workers.algorithms.off_policy import ACTION_HIGH, ACTION_LOW
 from workers.algorithms.storage.replay import Transitions
 from workers.config import Td3Config
+from workers.networks.inputs import Inputs
 
 
 class Td3(NoisyPolicy):
@@ -31,7 +32,7 @@ class Td3(NoisyPolicy):
             limit = config.target_noise_clip * self._half_range
             noise = torch.clamp(config.target_noise * self.normal(tuple(batch.actions.shape)), -limit, limit)
             next_actions = self.target_actor(batch.next_observations) + noise
-            next_actions = torch.clamp(next_actions, ACTION_LOW.to(self._device), ACTION_HIGH.to(self._device))
+            next_actions = torch.clamp(next_actions, self._low, self._high)
             # y <- r + gamma min_{i=1,2} Q'_i(s', a~)
             following = torch.minimum(
                 *(action_value(critic, batch.next_observations, next_actions) for critic in self.target_critics)
@@ -64,7 +65,9 @@ class Td3(NoisyPolicy):
         self._updates = int(state["updates"])
 
 
-def build_td3(config: Td3Config, observation_size: int, seed: int, device: torch.device) -> Td3:
+def build_td3(
+    config: Td3Config, inputs: Inputs | int, seed: int, device: torch.device, actions: ActionLayout = DEFAULT_ACTIONS
+) -> Td3:
     """TD3 with freshly initialised networks."""
-    actor, critics = build_noisy_networks(config, 2, observation_size, seed, device)
+    actor, critics = build_noisy_networks(config, 2, inputs, seed, device, actions)
     return Td3(config, actor, critics, torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION)))

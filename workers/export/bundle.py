@@ -13,6 +13,7 @@ from workers.export.graph import observation_graph, scan_graph
 from workers.export.readme import readme
 from workers.export.ros2.mapless_navigator.navigator import Safety
 from workers.export.ros2.mapless_navigator.policy import (
+    GRAPH,
     SPECIFICATION,
     WEIGHTS,
     Specification,
@@ -41,7 +42,7 @@ class Export:
         specification: `policy.json`.
         weights: `policy.safetensors`.
         by_observation: the ONNX graph on observations.
-        by_scan: the ONNX graph on scan, pose, target and last action.
+        by_scan: the ONNX graph on what the observation is made of: scan, pose, target and so on.
         report: what the check found.
     """
 
@@ -62,11 +63,11 @@ def export_checkpoint(archive: Path) -> Export:
     """
     manifest, policy = read_policy(archive)
     weights = pack_weights(policy.weights)
-    specification = specify(manifest, weights)
+    specification = specify(manifest, policy.description, weights)
     by_observation = observation_graph(policy, specification, manifest)
     by_scan = scan_graph(policy, specification, manifest)
-    shipped = ShippedPolicy(specification, read_safetensors(weights))
-    trained = torch_policy(policy.network, policy.weights)
+    shipped = ShippedPolicy(specification, read_safetensors(weights), by_observation)
+    trained = torch_policy(policy)
     report = check_export(trained, shipped, manifest, by_observation, by_scan)
     return Export(manifest, specification, weights, by_observation, by_scan, report)
 
@@ -84,6 +85,8 @@ def bundle(export: Export) -> bytes:
     }
     for directory in (f"{_ROOT}/policy", f"{_PACKAGE}/policy"):
         files |= {f"{directory}/{SPECIFICATION}": specification, f"{directory}/{WEIGHTS}": export.weights}
+        if not export.specification.formula:
+            files[f"{directory}/{GRAPH}"] = export.by_observation
     for path in ROS2_PACKAGE.rglob("*"):
         if path.is_file() and path.suffix in _SHIPPED:
             files[f"{_PACKAGE}/{path.relative_to(ROS2_PACKAGE).as_posix()}"] = path.read_bytes()
@@ -96,7 +99,7 @@ def _parameters(safety: Safety) -> str:
     numbers = "\n".join(line if "." in line or "e" in line.split(": ")[1] else f"{line}.0" for line in lines)
     return (
         "# Lengths in metres, angles in radians, times in seconds; mapless_navigator/navigator.py says what each one does.\n"
-        f"mapless_navigator:\n  ros__parameters:\n    stamped_twist: false\n{numbers}\n"
+        f"mapless_navigator:\n  ros__parameters:\n    stamped_twist: false\n    measured_speeds: true\n{numbers}\n"
     )
 
 

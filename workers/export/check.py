@@ -7,12 +7,25 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from sim.arrays import PolicyFunction
 from workers.errors import ExportError
-from workers.export.graph import ACTION, LAST_ACTION, OBSERVATION, POSE, PREVIOUS, RANGES, TARGET, VELOCITY
+from workers.export.graph import (
+    ACTION,
+    LAST_ACTION,
+    MEMORY,
+    NEXT_MEMORY,
+    OBSERVATION,
+    POSE,
+    PREVIOUS,
+    RANGES,
+    SPEEDS,
+    TARGET,
+    VELOCITY,
+    scan_inputs,
+)
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
 from workers.manifest import Manifest
+from workers.policy import TorchPolicy
 
 TOLERANCE = 1e-5
 _ROWS = 1000
@@ -30,7 +43,7 @@ class CheckReport:
 
 
 def check_export(
-    trained: PolicyFunction, shipped: ShippedPolicy, manifest: Manifest, by_observation: bytes, by_scan: bytes
+    trained: TorchPolicy, shipped: ShippedPolicy, manifest: Manifest, by_observation: bytes, by_scan: bytes
 ) -> CheckReport:
     """Compares both ONNX graphs and the NumPy runner with a trained policy over random observations and random scenes.
 
@@ -39,7 +52,7 @@ def check_export(
         shipped: the same as the bundle's own code read it.
         manifest: the checkpoint's.
         by_observation: the ONNX graph on observations.
-        by_scan: the ONNX graph on scan, pose, target and last action.
+        by_scan: the ONNX graph on what the observation is made of.
 
     Raises:
         ExportError: an observation or an action differs by more than `TOLERANCE`.
@@ -48,22 +61,29 @@ def check_export(
     numbers = manifest.observation.numbers
     low, high = np.array([number.low for number in numbers]), np.array([number.high for number in numbers])
     observations = rng.uniform(low, high, (_ROWS, len(numbers))).astype(np.float32)
-    graph = run_graph(by_observation, {OBSERVATION: observations})
-    expected = trained(observations)
-    limits = np.array([shipped.specification.max_linear_speed, shipped.specification.max_angular_speed])
+    remembered = rng.uniform(-1.0, 1.0, (_ROWS, trained.memory_size)).astype(np.float32)
+    memory = {MEMORY: remembered} if trained.memory_size else {}
+    graph = run_graph(by_observation, {OBSERVATION: observations, **memory})
+    expected, following = trained.step(observations, remembered)
+    ran, ran_following = shipped.step(observations, remembered)
+    limits = np.array(shipped.specification.action_limits)
 
     scene = _scene(rng, shipped)
-    by_scene = run_graph(by_scan, scene)
-    seen = observe(shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION])
-    if PREVIOUS in scene:
-        seen = np.concatenate((seen, scene[PREVIOUS]), axis=1)
+    by_scene = run_graph(by_scan, {name: scene[name] for name in scan_inputs(shipped.specification)} | memory)
+    seen = observe(
+        shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION], scene[SPEEDS]
+    )  # fmt: skip
+    seen = np.concatenate((seen, scene[PREVIOUS]), axis=1)
     policy_difference = max(
         _difference(graph[ACTION], expected, "the ONNX graph's actions"),
         _difference(graph[VELOCITY] / limits, expected, "the ONNX graph's velocities, as fractions of their limits,"),
-        _difference(shipped.actions(observations), expected, "the NumPy runner's actions"),
+        _difference(ran, expected, "the NumPy runner's actions"),
         # On its own observation: how far that one is off is the next line's business.
-        _difference(by_scene[ACTION], trained(by_scene[OBSERVATION]), "the scan graph's actions"),
+        _difference(by_scene[ACTION], trained.step(by_scene[OBSERVATION], remembered)[0], "the scan graph's actions"),
     )
+    if trained.memory_size:
+        _difference(graph[NEXT_MEMORY], following, "the ONNX graph's memories")
+        _difference(ran_following, following, "the NumPy runner's memories")
     return CheckReport(_ROWS, policy_difference, _difference(by_scene[OBSERVATION], seen, "the scan graph's observations"))
 
 
@@ -82,14 +102,13 @@ def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats
     specification = shipped.specification
     half = specification.diagonal / np.sqrt(8.0)
     scene = {
-        RANGES: rng.uniform(0.0, 2.0 * specification.range, (_ROWS, specification.rays)),
+        RANGES: rng.uniform(0.0, 2.0 * specification.range, (_ROWS, specification.scan_size)),
         POSE: rng.uniform((-half, -half, -7.0), (half, half, 7.0), (_ROWS, 3)),
         TARGET: rng.uniform(-half, half, (_ROWS, 2)),
-        LAST_ACTION: rng.uniform((0.0, -1.0), (1.0, 1.0), (_ROWS, 2)),
+        LAST_ACTION: rng.uniform(specification.action_lows, 1.0, (_ROWS, len(specification.action_limits))),
+        SPEEDS: rng.uniform(specification.action_lows, 1.0, (_ROWS, len(specification.action_limits))),
+        PREVIOUS: rng.uniform(0.0, 1.0, (_ROWS, len(specification.carried))),
     }
-    if specification.frames > 1:
-        earlier = specification.observation_size - specification.frame_size
-        scene[PREVIOUS] = rng.uniform(0.0, 1.0, (_ROWS, earlier))
     cast = {name: values.astype(np.float32) for name, values in scene.items()}
     cast[RANGES] = np.minimum(cast[RANGES], np.float32(specification.range))
     return cast

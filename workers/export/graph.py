@@ -3,27 +3,35 @@
 | graph       | inputs                                                      | outputs                             |
 |-------------|-------------------------------------------------------------|-------------------------------------|
 | observation | `observation` (n, size) as the manifest describes it         | `action`, `velocity`                |
-| scan        | `ranges` (n, rays), `pose` (n, 3), `target` (n, 2),          | `observation`, `action`, `velocity` |
-|             | `last_action` (n, 2); with stacked frames `previous`,        |                                     |
-|             | all but the last frame of the last `observation`             |                                     |
+| scan        | what the observation is made of, of `ranges` (n, scan),     | `observation`, `action`, `velocity` |
+|             | `pose` (n, 3), `target` (n, 2), `speeds` (n, A) and         |                                     |
+|             | `last_action` (n, A); where earlier moments are seen        |                                     |
+|             | `previous`, see `Specification.carried`                     |                                     |
 
-`action` (n, 2) is in [0, 1] and [-1, 1]; `velocity` (n, 2) in m/s and rad/s, cut at the robot's limits. All numbers are
-float32. The manifest is in the file's metadata.
+A policy that remembers has one more input, `memory` (n, m), zeros where a robot begins, and one more output, `next_memory`,
+which is the next step's. The nodes of a network that ships are those of its formula; another's are what PyTorch makes of
+its module.
+
+`action` (n, A) is in fractions of the limits, as the manifest describes it; `velocity` (n, A) in m/s and rad/s, of an
+Ackermann drive m/s and the steering angle in rad, cut at the robot's limits. All numbers are float32. The manifest is in
+the file's metadata.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import onnx
+import onnx.compose
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from workers.config import ResBlockNetwork
-from workers.export.ros2.mapless_navigator.policy import Specification
+from sim.actions import ActionComponent
+from workers.export.ros2.mapless_navigator.policy import Forward, Part, Specification
+from workers.export.tracing import trace
+from workers.kernels.constants import LEAKY_SLOPE
 from workers.manifest import Manifest
-from workers.networks.layout import ACTION_SIZE, LEAKY_SLOPE, layout
 from workers.policy import Policy
 
 # Old enough for every runtime that robots carry; every operator used here is older still.
@@ -31,7 +39,20 @@ OPSET = 17
 IR_VERSION = 8
 
 OBSERVATION, ACTION, VELOCITY = "observation", "action", "velocity"
-RANGES, POSE, TARGET, LAST_ACTION, PREVIOUS = "ranges", "pose", "target", "last_action", "previous"
+RANGES, POSE, TARGET, PREVIOUS = "ranges", "pose", "target", "previous"
+SPEEDS, LAST_ACTION = "speeds", "last_action"
+
+MEMORY, NEXT_MEMORY = "memory", "next_memory"
+
+# Operators of a formula that are operators of ONNX by another name.
+_OPERATORS = {
+    "relu": "Relu",
+    "tanh": "Tanh",
+    "sigmoid": "Sigmoid",
+    "add": "Add",
+    "subtract": "Sub",
+    "multiply": "Mul",
+}
 
 # Keeps a quotient finite; far below any distance that matters.
 _TINY = 1e-12
@@ -40,33 +61,45 @@ _TINY = 1e-12
 def observation_graph(policy: Policy, specification: Specification, manifest: Manifest) -> bytes:
     """The policy on its observation, as an ONNX file."""
     graph = _Graph(policy)
-    graph.act(OBSERVATION, specification)
+    graph.act(OBSERVATION)
     return graph.model({OBSERVATION: specification.observation_size}, (ACTION, VELOCITY), manifest)
 
 
 def scan_graph(policy: Policy, specification: Specification, manifest: Manifest) -> bytes:
-    """The policy on scan, pose, target and its last action, as an ONNX file that makes the observation itself."""
+    """The policy on what its observation is made of, as an ONNX file that makes the observation itself."""
     graph = _Graph(policy)
     graph.observe(specification)
-    graph.act(OBSERVATION, specification)
-    inputs = {RANGES: specification.rays, POSE: 3, TARGET: 2, LAST_ACTION: ACTION_SIZE}
-    if specification.frames > 1:
-        inputs[PREVIOUS] = specification.observation_size - specification.frame_size
-    return graph.model(inputs, (OBSERVATION, ACTION, VELOCITY), manifest)
+    graph.act(OBSERVATION)
+    return graph.model(scan_inputs(specification), (OBSERVATION, ACTION, VELOCITY), manifest)
+
+
+def scan_inputs(specification: Specification) -> dict[str, int]:
+    """The inputs of a scan graph, and how many columns each has: what this policy's observation is made of."""
+    kinds = {part.kind for part in specification.parts}
+    actions = len(specification.action_limits)
+    inputs = {RANGES: specification.scan_size} if kinds & {"ranges", "inverse_ranges"} else {}
+    if kinds - {"ranges", "inverse_ranges", "speeds", "actions"}:
+        inputs |= {POSE: 3, TARGET: 2}
+    inputs |= {SPEEDS: actions} if "speeds" in kinds else {}
+    inputs |= {LAST_ACTION: actions} if "actions" in kinds else {}
+    return inputs | ({PREVIOUS: len(specification.carried)} if specification.carried else {})
 
 
 class _Graph:
     """Nodes and arrays of the graph under construction; each method returns the name of its result."""
 
     def __init__(self, policy: Policy) -> None:
-        self._network = policy.network
-        self._layout = layout(policy.network)
+        self._policy, self._actions = policy, policy.actions
         self._nodes: list[onnx.NodeProto] = []
-        self._arrays = [numpy_helper.from_array(array, name) for name, array in sorted(policy.weights.items())]
+        self._arrays: list[onnx.TensorProto] = []
+        if policy.description is not None:
+            self._arrays += [numpy_helper.from_array(array, name) for name, array in sorted(policy.weights.items())]
 
     def model(self, inputs: dict[str, int], outputs: Sequence[str], manifest: Manifest) -> bytes:
         """The finished file; `inputs` maps each one's name to its columns."""
-        sizes = {OBSERVATION: len(manifest.observation.numbers), ACTION: ACTION_SIZE, VELOCITY: ACTION_SIZE}
+        sizes = {OBSERVATION: len(manifest.observation.numbers), ACTION: self._actions.size, VELOCITY: self._actions.size}
+        if memory := self._policy.memory_size:
+            inputs, outputs, sizes[NEXT_MEMORY] = {**inputs, MEMORY: memory}, (*outputs, NEXT_MEMORY), memory
         model = helper.make_model(
             helper.make_graph(
                 self._nodes,
@@ -84,46 +117,78 @@ class _Graph:
         data: bytes = model.SerializeToString()
         return data
 
-    def act(self, observation: str, specification: Specification) -> None:
+    def act(self, observation: str) -> None:
         """The network, the bounds of its outputs, and the robot's limits."""
-        resblock = isinstance(self._network, ResBlockNetwork)
-        logits = self._resblock(observation) if resblock else self._mlp(observation)
-        bounded = self._node("Sigmoid", self._columns(logits, 0, 1)), self._node("Tanh", self._columns(logits, 1, 2))
+        description = self._policy.description
+        if description is None:
+            logits = self._traced(observation)
+        else:
+            values = Forward(description.lines).run({"x": observation, "h": MEMORY}, self._apply)
+            logits = values["y"]
+            if description.memory:
+                self._node("Identity", values["h"], name=NEXT_MEMORY)
+        bounded = [
+            self._bounded(self._columns(logits, index, index + 1), component)
+            for index, component in enumerate(self._actions.components)
+        ]
         self._node("Concat", *bounded, name=ACTION, axis=1)
-        limits = np.array([specification.max_linear_speed, specification.max_angular_speed], np.float32)
+        limits = np.array(self._actions.limits, np.float32)
         scaled = self._node("Mul", ACTION, self._constant(limits))
         # Rounding may not push a velocity past its limit, whatever the runtime's sigmoid and tanh are made of.
         capped = self._node("Min", scaled, self._constant(limits))
-        self._node("Max", capped, self._constant(limits * np.array([0.0, -1.0], np.float32)), name=VELOCITY)
+        self._node("Max", capped, self._constant(limits * np.array(self._actions.lows, np.float32)), name=VELOCITY)
+
+    def _bounded(self, logit: str, component: ActionComponent) -> str:
+        """A column of logits as fractions of a limit."""
+        if component.symmetric:
+            return self._node("Tanh", logit)
+        sigmoid = self._node("Sigmoid", logit)
+        if component.low == 0.0:
+            return sigmoid
+        return self._node("Add", self._node("Mul", sigmoid, self._number(component.span)), self._number(component.low))
 
     def observe(self, specification: Specification) -> None:
         """The observation; `ros2/mapless_navigator/observation.py` has the same in NumPy, with its table."""
-        scan = self._node("Min", RANGES, self._number(specification.range))
-        batches = np.array([-1, specification.batches, specification.rays // specification.batches], np.int64)
-        nearest = self._node("ReduceMin", self._node("Reshape", scan, self._constant(batches)), axes=[2], keepdims=0)
+        told: dict[str, Callable[[], str]] = {"speeds": lambda: SPEEDS, "actions": lambda: LAST_ACTION}
+        if POSE in scan_inputs(specification):
+            told |= self._of_the_target(specification)
+        columns = [
+            self._seen(specification, part) if part.kind in ("ranges", "inverse_ranges") else told[part.kind]()
+            for part in specification.parts
+        ]
+        earlier = (PREVIOUS,) if specification.carried else ()
+        self._node("Concat", *columns, *earlier, name=OBSERVATION, axis=1)
+
+    def _of_the_target(self, specification: Specification) -> dict[str, Callable[[], str]]:
+        """The parts that pose and target are needed for."""
         offset = self._node("Sub", TARGET, self._columns(POSE, 0, 2))
         distance = self._node("ReduceL2", offset, axes=[1], keepdims=1)
         direction = self._direction(offset, distance)
         heading = self._wrap(self._columns(POSE, 2, 3))
         bearing = self._wrap(self._node("Sub", direction, heading))
-        if specification.observation == "paper":
-            seen = self._node("Div", nearest, self._number(specification.range))
-            goal = (
-                self._node("Div", distance, self._number(specification.diagonal)),
-                self._part_of_turn(direction),
-                self._part_of_turn(heading),
-            )
-        else:
-            near = self._number(specification.near)
-            seen = self._node("Div", near, self._node("Max", nearest, near))
-            goal = (
-                self._node("Div", distance, self._node("Add", distance, self._number(1.0))),
-                self._node("Div", bearing, self._number(math.pi)),
-                self._node("Div", heading, self._number(math.pi)),
-            )
-        deviation = self._node("Div", self._node("Abs", bearing), self._number(math.pi))
-        earlier = (PREVIOUS,) if specification.frames > 1 else ()
-        self._node("Concat", seen, LAST_ACTION, *goal, deviation, *earlier, name=OBSERVATION, axis=1)
+        one, pi = self._number(1.0), self._number(math.pi)
+        return {
+            "distance": lambda: self._node("Div", distance, self._node("Add", distance, one)),
+            "distance_of_diagonal": lambda: self._node("Div", distance, self._number(specification.diagonal)),
+            "direction": lambda: self._part_of_turn(direction),
+            "bearing": lambda: self._node("Div", bearing, pi),
+            "bearing_sine_cosine": lambda: self._node(
+                "Concat", self._node("Sin", bearing), self._node("Cos", bearing), axis=1
+            ),
+            "heading": lambda: self._node("Div", heading, pi),
+            "heading_turn": lambda: self._part_of_turn(heading),
+            "deviation": lambda: self._node("Div", self._node("Abs", bearing), pi),
+        }
+
+    def _seen(self, specification: Specification, part: Part) -> str:
+        """The scan as the policy sees it."""
+        scan = self._node("Min", RANGES, self._number(specification.range))
+        batches = np.array([-1, part.size, specification.scan_size // part.size], np.int64)
+        nearest = self._node("ReduceMin", self._node("Reshape", scan, self._constant(batches)), axes=[2], keepdims=0)
+        if part.kind == "ranges":
+            return self._node("Div", nearest, self._number(specification.range))
+        near = self._number(specification.near)
+        return self._node("Div", near, self._node("Max", nearest, near))
 
     def _direction(self, offset: str, distance: str) -> str:
         """atan2(dy, dx), which ONNX lacks, as 2 atan(dy / (d + dx)), or 2 atan((d - dx) / dy) where d + dx would cancel."""
@@ -146,25 +211,38 @@ class _Graph:
         turns = self._node("Div", angle, self._number(2.0 * math.pi))
         return self._node("Sub", turns, self._node("Floor", turns))
 
-    def _mlp(self, values: str) -> str:
-        *hidden, head = self._layout.layers
-        operator = "Relu" if self._layout.activation == "relu" else "Tanh"
-        for layer in hidden:
-            values = self._node(operator, self._linear(layer, values))
-        return self._linear(head, values)
+    def _apply(self, name: str, *arguments: Any) -> str:
+        """An operator or a layer of a formula, see `Forward`."""
+        if name in _OPERATORS:
+            return self._node(_OPERATORS[name], *arguments)
+        match name:
+            case "leaky_relu":
+                return self._node("LeakyRelu", *arguments, alpha=LEAKY_SLOPE)
+            case "concatenate":
+                return self._node("Concat", *arguments, axis=1)
+            case "columns":
+                return self._columns(*arguments)
+            case "channels":
+                values, count = arguments
+                return self._node("Reshape", values, self._constant(np.array([0, count, -1], np.int64)))
+            case "flatten":
+                return self._node("Flatten", *arguments, axis=1)
+        values, *numbers = arguments
+        weight, bias = f"{name}.weight", f"{name}.bias"
+        if not numbers:
+            return self._node("Gemm", values, weight, bias, transB=1)
+        stride, padding = numbers
+        return self._node("Conv", values, weight, bias, strides=[stride], pads=[padding, padding])
 
-    def _resblock(self, inputs: str) -> str:
-        hidden = self._linear("layer2", self._leaky(self._linear("layer1", inputs)))
-        first = self._leaky(self._node("Concat", hidden, inputs, axis=1))
-        hidden = self._leaky(self._linear("layer4", self._leaky(self._linear("layer3", first))))
-        second = self._leaky(self._node("Concat", hidden, first, axis=1))
-        return self._linear("head", second)
-
-    def _linear(self, layer: str, inputs: str) -> str:
-        return self._node("Gemm", inputs, f"{layer}.weight", f"{layer}.bias", transB=1)
-
-    def _leaky(self, values: str) -> str:
-        return self._node("LeakyRelu", values, alpha=LEAKY_SLOPE)
+    def _traced(self, observation: str) -> str:
+        """The nodes that torch makes of a module."""
+        model = onnx.load_model_from_string(trace(self._policy))
+        prefixed = onnx.compose.add_prefix(model, "network/").graph
+        (given,), (made,) = prefixed.input, prefixed.output
+        self._nodes.append(helper.make_node("Identity", [observation], [given.name]))
+        self._nodes += prefixed.node
+        self._arrays += prefixed.initializer
+        return str(made.name)
 
     def _columns(self, values: str, start: int, end: int) -> str:
         bounds = (self._constant(np.array([bound], np.int64)) for bound in (start, end, 1))

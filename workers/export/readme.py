@@ -3,6 +3,7 @@
 import math
 
 from workers.export.check import CheckReport
+from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
 from workers.export.ros2.mapless_navigator.policy import Specification
 from workers.manifest import Manifest
 
@@ -15,26 +16,32 @@ from mapless_navigator.observation import Frames, observe
 from mapless_navigator.policy import Policy
 
 policy = Policy.load("policy")
-ranges = [[3.5] * policy.specification.rays]  # metres, from right to left
+ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
 frames = Frames(policy.specification)  # of one robot, from start to target
-observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[0.0, 0.0]]))
-linear, angular = policy.velocities(observation)[0]
-print(f"{linear:.3f} m/s, {angular:.3f} rad/s")
+observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[ZEROS]]))
+NAMES = policy.velocities(observation)[0]
+print(f"FORMAT")
 """
 
 _ONNX_EXAMPLE = """\
-import numpy as np
+IMPORTimport numpy as np
 import onnxruntime
 
 session = onnxruntime.InferenceSession("policy_from_scan.onnx")
 inputs = {
-    "ranges": np.full((1, RAYS), 3.5, np.float32),
-    "pose": np.zeros((1, 3), np.float32),  # x, y, heading
-    "target": np.array([[2.0, 1.0]], np.float32),
-    "last_action": np.zeros((1, 2), np.float32),  # the `action` of the step before
+INPUTS
 }
 PREVIOUSaction, velocity = session.run(["action", "velocity"], inputs)
-print(f"{velocity[0, 0]:.3f} m/s, {velocity[0, 1]:.3f} rad/s")
+NAMES = velocity[0]
+print(f"FORMAT")
+"""
+
+
+_PREVIOUS = """\
+with open("policy/policy.json") as file:
+    specification = json.load(file)
+first = session.run(["observation"], inputs)[0]
+inputs["previous"] = first[:, specification["repeated"]]  # later: observation[:, specification["carried"]], of the last one
 """
 
 
@@ -46,22 +53,41 @@ def readme(manifest: Manifest, specification: Specification, report: CheckReport
             _files(report),
             _contract(manifest, specification),
             _ros(specification),
-            "## Python, without ROS\n\nWith NumPy alone:\n\n```python\n" + _NUMPY_EXAMPLE + "```\n",
+            f"## Python, without ROS\n\nWith NumPy alone:\n\n```python\n{_filled(_NUMPY_EXAMPLE, specification)}```\n",
             f"With onnxruntime:\n\n```python\n{_onnx_example(specification)}```\n",
         )
     )
 
 
 def _onnx_example(specification: Specification) -> str:
-    previous = ""
-    if specification.frames > 1:
-        size, earlier = specification.frame_size, specification.frames - 1
-        previous = (
-            f'inputs["previous"] = np.zeros((1, {earlier * size}), np.float32)\n'
-            f'first = session.run(["observation"], inputs)[0][:, :{size}]\n'
-            f'inputs["previous"] = np.tile(first, (1, {earlier}))  # later: observation[:, :-{size}] of the step before\n'
-        )
-    return _ONNX_EXAMPLE.replace("RAYS", str(specification.rays)).replace("PREVIOUS", previous)
+    lines = {
+        RANGES: f"np.full((1, {specification.scan_size}), 3.5, np.float32),  # metres, from right to left",
+        POSE: "np.zeros((1, 3), np.float32),  # x, y, heading",
+        TARGET: "np.array([[2.0, 1.0]], np.float32),",
+        SPEEDS: "np.zeros((1, COUNT), np.float32),  # as measured, over their limits, or the `action` of the step before",
+        LAST_ACTION: "np.zeros((1, COUNT), np.float32),  # the `action` of the step before",
+        PREVIOUS: f"np.zeros((1, {len(specification.carried)}), np.float32),  # see below",
+    }
+    inputs = "\n".join(f'    "{name}": {lines[name]}' for name in scan_inputs(specification))
+    earlier = bool(specification.carried)
+    example = _ONNX_EXAMPLE.replace("INPUTS", inputs).replace("PREVIOUS", _PREVIOUS if earlier else "")
+    return _filled(example.replace("IMPORT", "import json\n\n" if earlier else ""), specification)
+
+
+def _filled(example: str, specification: Specification) -> str:
+    """An example with the numbers of this policy's action."""
+    units = {"linear": "m/s", "lateral": "m/s to the left", "angular": "rad/s", "steering": "rad of steering"}
+    names = {
+        "differential": ("linear", "angular"),
+        "omnidirectional": ("linear", "lateral", "angular"),
+        "ackermann": ("linear", "steering"),
+    }[specification.drive]
+    return (
+        example.replace("NAMES", ", ".join(names))
+        .replace("FORMAT", ", ".join(f"{{{name}:.3f}} {units[name]}" for name in names))
+        .replace("ZEROS", ", ".join(["0.0"] * len(names)))
+        .replace("COUNT", str(len(names)))
+    )
 
 
 def _head(manifest: Manifest) -> str:
@@ -85,7 +111,7 @@ def _files(report: CheckReport) -> str:
 |---|---|
 | `manifest.json` | all about the policy: training, observation number by number, network, versions |
 | `policy.onnx` | observation in, action and velocities out |
-| `policy_from_scan.onnx` | scan, pose, target and last action in; makes the observation itself |
+| `policy_from_scan.onnx` | scan, pose, target and the like in; makes the observation itself |
 | `policy/` | the weights as safetensors, and what it takes to run them |
 | `run_policy.py` | runs `policy/` with NumPy alone: one file to copy |
 | `ros2/mapless_navigator/` | a ROS 2 package with the policy in it |
@@ -103,10 +129,9 @@ def _contract(manifest: Manifest, specification: Specification) -> str:
     return f"""\
 ## What the policy expects
 
-A differential-drive robot with {_body(specification)}, a new command every
-{specification.control_period:g} s, 0 to {specification.max_linear_speed:g} m/s forwards and
-{specification.max_angular_speed:g} rad/s to either side. A LiDAR with {specification.rays} rays over
-{math.degrees(specification.field_of_view):g} degrees, symmetric about the heading, from right to left, cut at
+{_drive(specification)} with {_body(specification)}, a new command every
+{specification.control_period:g} s: {_speeds(specification)}. {_lidars(specification)} with {specification.rays} rays over
+{math.degrees(specification.field_of_view):g} degrees, symmetric about where it looks, from right to left, cut at
 {specification.range:g} m. Pose and target in one fixed frame.
 
 | number | name | meaning | range |
@@ -115,13 +140,39 @@ A differential-drive robot with {_body(specification)}, a new command every
 """
 
 
+def _drive(specification: Specification) -> str:
+    if specification.drive == "ackermann":
+        return f"A robot with steered front wheels, the axles {specification.wheel_base:g} m apart,"
+    return "An omnidirectional robot" if specification.drive == "omnidirectional" else "A differential-drive robot"
+
+
+def _speeds(specification: Specification) -> str:
+    speeds = [f"0 to {specification.max_linear_speed:g} m/s forwards"]
+    if specification.reverse:
+        speeds.append(f"{specification.reverse * specification.max_linear_speed:g} m/s backwards")
+    if specification.sideways:
+        speeds.append(f"{specification.sideways * specification.max_linear_speed:g} m/s and")
+    if specification.drive == "ackermann":
+        speeds.append(f"{math.degrees(specification.steering_limit):g} degrees of steering, at most")
+    return ", ".join(speeds) + f" {specification.max_angular_speed:g} rad/s to either side"
+
+
+def _lidars(specification: Specification) -> str:
+    if specification.mounts == ((0.0, 0.0, 0.0),):
+        return "A LiDAR in its middle that looks ahead,"
+    places = " and ".join(
+        f"{x:g} m ahead and {y:g} m to the left of its middle, turned by {math.degrees(yaw):g} degrees"
+        for x, y, yaw in specification.mounts
+    )
+    return (
+        f"A LiDAR {places}," if len(specification.mounts) == 1 else f"Two LiDARs, {places}, one scan after the other, each"
+    )
+
+
 def _body(specification: Specification) -> str:
     if not specification.robot_length:
         return f"a round body of radius {specification.robot_radius:g} m"
-    return (
-        f"a rectangular body {specification.robot_length:g} m long and {specification.robot_width:g} m wide, "
-        "the LiDAR in its middle"
-    )
+    return f"a rectangular body {specification.robot_length:g} m long and {specification.robot_width:g} m wide"
 
 
 def _cell(text: str) -> str:
@@ -130,6 +181,8 @@ def _cell(text: str) -> str:
 
 
 def _ros(specification: Specification) -> str:
+    second = ", `scan_second`" if len(specification.mounts) > 1 else ""
+    topic = "`ackermann_cmd` (ackermann_msgs/AckermannDriveStamped)" if specification.drive == "ackermann" else "`cmd_vel`"
     return f"""\
 ## ROS 2
 
@@ -140,10 +193,11 @@ ros2 launch mapless_navigator navigator.launch.xml
 ros2 topic pub --once goal_pose geometry_msgs/PoseStamped '{{header: {{frame_id: odom}}, pose: {{position: {{x: 1.0}}}}}}'
 ```
 
-It reads `scan`, `odom` and `goal_pose`, and writes `cmd_vel` every {specification.control_period:g} s while it has a goal
+It reads `scan`{second}, `odom` and `goal_pose`, and writes {topic} every
+{specification.control_period:g} s while it has a goal
 (launch arguments of these names give other topics). It stops when the scan or the odometry is stale, when the scan
 leaves a part of the field of view unknown, when something is nearer than {specification.collision_distance:g} m ahead or
 touches the body beside or behind, and within {specification.arrival_distance:g} m of the goal. The goal must be in the
-odometry's frame. Parameters are in `config/navigator.yaml`: mind `sensor_yaw` where the LiDAR is not mounted straight.
+odometry's frame. Parameters are in `config/navigator.yaml`: mind `sensor_yaw` where a LiDAR is not turned as in training.
 Lift the wheels off the ground for the first start, and keep a hand on the emergency stop.
 """

@@ -8,11 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save as save_safetensors
 
+from sim.actions import action_layout
 from sim.arenas import build_arena
-from sim.observations import near_distance
+from sim.config import (
+    AckermannDrive,
+    BearingPart,
+    DistancePart,
+    HeadingPart,
+    ObservationPart,
+    OmnidirectionalDrive,
+    RangesPart,
+    TaskConfig,
+)
+from sim.config.observation import part_size
+from sim.observations import near_distance, observation_layout
 from workers.errors import ExportError
-from workers.export.ros2.mapless_navigator.policy import Specification
+from workers.export.ros2.mapless_navigator.policy import Part, Specification
 from workers.manifest import Manifest
+from workers.networks.description import Description
 
 
 def pack_weights(weights: Mapping[str, NDArray[np.float32]]) -> bytes:
@@ -20,32 +33,42 @@ def pack_weights(weights: Mapping[str, NDArray[np.float32]]) -> bytes:
     return save_safetensors({name: np.ascontiguousarray(weights[name]) for name in sorted(weights)})
 
 
-def specify(manifest: Manifest, packed_weights: bytes) -> Specification:
+def specify(manifest: Manifest, description: Description | None, packed_weights: bytes) -> Specification:
     """The specification that ships with these weights.
 
     Raises:
         ExportError: the shipped code can't make this policy's observation.
     """
     task, observation = manifest.training.task, manifest.observation
-    if (observation.name, observation.version) not in (("improved", 1), ("paper", 1)):
+    if observation.version != 1:
         raise ExportError(
             f"the observation {observation.name!r} version {observation.version} can't be made on a robot: "
             "export with the release that trained this policy"
         )
+    actions = action_layout(task.robot).size
+    repeated, carried = earlier_places(task)
     arena = build_arena(task.arena, 0)
+    drive = task.robot.drive
     half_length, half_width = task.robot.half_extents or (0.0, 0.0)
     return Specification(
         format="mapless-deployment",
-        version=2,
-        observation=observation.name,
-        observation_version=observation.version,
+        version=4,
+        parts=tuple(
+            Part(_kind(part), part_size(part, actions, len(task.lidar.mount.places))) for part in task.observation.parts
+        ),
+        repeated=repeated,
+        carried=carried,
         rays=task.lidar.rays,
-        batches=task.lidar.batches,
-        frames=task.frames,
+        mounts=task.lidar.mount.places,
         field_of_view=math.radians(task.lidar.field_of_view),
         range=task.lidar.range,
         near=near_distance(task),
         diagonal=2.0 * math.hypot(arena.half_width, arena.half_height),
+        drive=drive.name,
+        reverse=drive.reverse,
+        sideways=drive.sideways if isinstance(drive, OmnidirectionalDrive) else 0.0,
+        wheel_base=drive.wheel_base if isinstance(drive, AckermannDrive) else 0.0,
+        steering_limit=math.radians(drive.steering_limit) if isinstance(drive, AckermannDrive) else 0.0,
         max_linear_speed=task.robot.max_linear_speed,
         max_angular_speed=task.robot.max_angular_speed,
         control_period=task.control_period,
@@ -55,7 +78,31 @@ def specify(manifest: Manifest, packed_weights: bytes) -> Specification:
         robot_length=2.0 * half_length,
         robot_width=2.0 * half_width,
         network=manifest.network.name,
-        layers=manifest.network.layers,
-        activation=manifest.network.activation,
+        formula=() if description is None else description.lines,
+        memory=0 if description is None else description.memory,
         weights_sha256=hashlib.sha256(packed_weights).hexdigest(),
     )
+
+
+def _kind(part: ObservationPart) -> str:
+    """What the shipped code calls a part."""
+    match part:
+        case RangesPart(inverse=True):
+            return "inverse_ranges"
+        case DistancePart(scaling="diagonal"):
+            return "distance_of_diagonal"
+        case BearingPart(encoding="sine_cosine"):
+            return "bearing_sine_cosine"
+        case HeadingPart(scaling="turn"):
+            return "heading_turn"
+        case _:
+            return part.name
+
+
+def earlier_places(task: TaskConfig) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Where the numbers of earlier moments come from: places in the newest moment, and in the observation a step before."""
+    blocks = observation_layout(task).blocks
+    places = {(block.key, block.age): range(block.place.start, block.place.stop) for block in blocks}
+    repeated = (place for block in blocks if block.age for place in places[block.key, 0])
+    carried = (place for block in blocks if block.age for place in places[block.key, block.age - 1])
+    return tuple(repeated), tuple(carried)

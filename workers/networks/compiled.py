@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from workers.kernels.networks import RELU, RESBLOCK, TANH, Passes, backward, forward, input_gradient
-from workers.networks.modules import Body, ResBlock
+from workers.networks.config import MlpNetwork, ResBlockNetwork
+from workers.networks.modules import Described
 
 ROWS_AT_ONCE = 128
 """Rows that go through a network at once where there are more: a core's cache keeps their activations until they go back.
@@ -21,11 +22,23 @@ Half or twice as many change the time of PPO's gradients by 4 % at most, of all 
 """
 
 
-def passes_of(network: Body, rows: int) -> Passes:
+def is_compiled(*networks: nn.Module) -> bool:
+    """Whether compiled passes are known for all of these networks, and they are on a CPU."""
+    return all(
+        isinstance(network, Described)
+        and isinstance(network.config, ResBlockNetwork | MlpNetwork)
+        and next(network.parameters()).device.type == "cpu"
+        for network in networks
+    )
+
+
+def passes_of(network: nn.Module, rows: int) -> Passes:
     """A network for compiled code, with buffers for so many rows.
 
     Its parameters and their gradients must be parts of two vectors and stay there: `FlatParameters` sees to both.
     """
+    config = network.config if isinstance(network, Described) else None
+    assert isinstance(config, ResBlockNetwork | MlpNetwork), "others go by autograd"
     linear = [module for module in network.modules() if isinstance(module, nn.Linear)]
     weights = [layer.weight.numel() for layer in linear]
     layers = [
@@ -33,12 +46,12 @@ def passes_of(network: Body, rows: int) -> Passes:
         for layer, start in zip(linear, accumulate(weights, initial=0), strict=False)
     ]
     columns = [layer.out_features for layer in linear]
-    if isinstance(network, ResBlock):
+    if isinstance(config, ResBlockNetwork):
         kind = RESBLOCK
-        width1, width2 = network.layer2.out_features, network.layer4.out_features
+        width1, width2 = linear[1].out_features, linear[3].out_features
         columns += [2 * width1, 2 * width2, width1, width2]
     else:
-        kind = TANH if network.activation == "tanh" else RELU
+        kind = TANH if config.activation == "tanh" else RELU
     columns.append(linear[0].in_features)
     starts = accumulate((rows * count for count in columns), initial=0)
     values, gradients = _vector(linear[0].weight), _vector(linear[0].weight.grad)
@@ -57,7 +70,7 @@ def passes_of(network: Body, rows: int) -> Passes:
 class TensorPasses:
     """A network's passes for CPU tensors of any layout; results are buffers that the next call overwrites."""
 
-    def __init__(self, network: Body, rows: int) -> None:
+    def __init__(self, network: nn.Module, rows: int) -> None:
         self._passes = passes_of(network, rows)
         self._inputs: NDArray[np.float32]
 
@@ -75,10 +88,9 @@ class TensorPasses:
         return torch.from_numpy(input_gradient(self._passes, _contiguous(by_output)))
 
 
-def inference(network: Body, rows: int) -> Callable[[Tensor], Tensor]:
+def inference(network: nn.Module, rows: int) -> Callable[[Tensor], Tensor]:
     """The fastest way from (n, inputs) to (n, outputs), n at most `rows`; a result may be overwritten by the next call's."""
-    on_cpu = next(network.parameters()).device.type == "cpu"
-    return TensorPasses(network, rows).forward if on_cpu else network
+    return TensorPasses(network, rows).forward if is_compiled(network) else network
 
 
 def _contiguous(tensor: Tensor) -> NDArray[np.float32]:

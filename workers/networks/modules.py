@@ -1,13 +1,22 @@
-"""The networks: the paper's ResBlock network, a plain MLP, and the actor that turns either into bounded actions."""
+"""The networks as modules, and the actors that turn any of them into bounded actions."""
 
-from itertools import pairwise
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from workers.config import MlpNetwork, Network, ResBlockNetwork
-from workers.networks.layout import LEAKY_SLOPE, RESBLOCK_WIDTH
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
+from workers.errors import NetworkError
+from workers.export.ros2.mapless_navigator.policy import Forward, evaluate
+from workers.kernels.constants import LEAKY_SLOPE
+from workers.networks.config import GruNetwork, NetworkConfig
+from workers.networks.description import Description, describe
+from workers.networks.gates import GruGates
+from workers.networks.inputs import Inputs, as_inputs
+from workers.networks.registry import build_of
+from workers.networks.squashing import bound_actions
 
 # A policy head this small starts every training at the middle of the actions, whatever the observation.
 _POLICY_HEAD_SCALE = 0.01
@@ -16,65 +25,168 @@ _POLICY_HEAD_SCALE = 0.01
 _DETERMINISTIC_HEAD_SCALE = 0.1
 
 
-class ResBlock(nn.Module):
-    """The paper's network: two blocks whose shortcut is a concatenation (tables 'PPO Critic network structure details').
+class Described(nn.Module):
+    """A network that ships: runs the lines of its description on tensors.
 
-    With 16 inputs: 16 -> 512 -> 16, concatenated with the input to 32; -> 512 -> 32, concatenated with those 32 to 64;
-    -> outputs. LeakyReLU where the tables have it: on layers 1, 3 and 4 and on both concatenations, so that the half of
-    the second one that comes from layer 4 goes through it twice. With one output 50,289 parameters, with two 50,354.
+    Attributes:
+        config: its configuration.
+        memory_size: numbers that it remembers of a robot, 0 where it remembers nothing.
     """
 
-    def __init__(self, inputs: int, outputs: int) -> None:
+    def __init__(self, config: NetworkConfig, description: Description) -> None:
         super().__init__()
-        self.layer1 = nn.Linear(inputs, RESBLOCK_WIDTH)
-        self.layer2 = nn.Linear(RESBLOCK_WIDTH, inputs)
-        self.layer3 = nn.Linear(2 * inputs, RESBLOCK_WIDTH)
-        self.layer4 = nn.Linear(RESBLOCK_WIDTH, 2 * inputs)
-        self.head = nn.Linear(4 * inputs, outputs)
+        self.config, self.memory_size = config, description.memory
+        for name, shape in description.layers.items():
+            self._place(name, nn.Linear(shape[1], shape[0]) if len(shape) == 2 else nn.Conv1d(shape[1], shape[0], shape[2]))
+        lines = Forward(description.lines).lines
+        # Only what lies between goes step by step: not what comes before memory is looked at or after it is known.
+        uses = [index for index, (_, expression) in enumerate(lines) if _mentions(expression, "h")]
+        made = [index for index, (name, _) in enumerate(lines) if name == "h"]
+        first, last = (uses[0], made[-1] + 1) if made else (len(lines), len(lines))
+        self._before, self._steps, self._after = lines[:first], lines[first:last], lines[last:]
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """(n, inputs) to (n, outputs), the last layer linear."""
-        hidden = self.layer2(_leaky(self.layer1(inputs)))
-        first = _leaky(torch.cat((hidden, inputs), dim=1))
-        hidden = _leaky(self.layer4(_leaky(self.layer3(first))))
-        second = _leaky(torch.cat((hidden, first), dim=1))
-        output: Tensor = self.head(second)
+    def forward(self, inputs: Tensor, memory: Tensor | None = None) -> Tensor | tuple[Tensor, Tensor]:
+        """(n, inputs) to (n, outputs); with a memory (n, memory_size) to these and the next memory.
+
+        Without one, every row begins an episode.
+        """
+        start = inputs.new_zeros(len(inputs), self.memory_size) if memory is None else memory
+        values: dict[str, Any] = {"x": inputs, "h": start}
+        for part in (self._before, self._steps, self._after):
+            self._run(part, values)
+        return values["y"] if memory is None else (values["y"], values["h"])
+
+    def unroll(self, inputs: Tensor, memory: Tensor, keep: Tensor) -> Tensor:
+        """Outputs (steps, n, outputs) of sequences.
+
+        Args:
+            inputs: (steps, n, inputs).
+            memory: (n, memory_size), what is remembered from before the first step.
+            keep: (steps, n, 1), 0 where an episode begins, so that memory is forgotten, else 1.
+        """
+        steps, rows = inputs.shape[:2]
+        given: dict[str, Any] = {"x": inputs.flatten(0, 1)}
+        self._run(self._before, given)
+        at_steps = {name: value.view(steps, rows, -1).unbind(0) for name, value in given.items() if name != "x"}
+        memories = []
+        for step in range(steps):
+            memory = memory * keep[step]
+            if isinstance(self.config, GruNetwork):
+                memory = GruGates.apply(at_steps["i"][step], self.get_submodule("memory")(memory), memory)
+            else:
+                values = {name: value[step] for name, value in at_steps.items()} | {"h": memory}
+                self._run(self._steps, values)
+                memory = values["h"]
+            memories.append(memory)
+        given["h"] = torch.cat(memories)
+        self._run(self._after, given)
+        outputs: Tensor = given["y"]
+        return outputs.view(steps, rows, -1)
+
+    def _run(self, lines: Sequence[tuple[str, Any]], values: dict[str, Any]) -> None:
+        for name, expression in lines:
+            values[name] = evaluate(expression, values, self._compute)
+
+    def _compute(self, name: str, *arguments: Any) -> Tensor:
+        operator = _OPERATORS.get(name)
+        if operator is not None:
+            return operator(*arguments)
+        layer = self.get_submodule(name)
+        if isinstance(layer, nn.Conv1d):
+            values, stride, padding = arguments
+            return functional.conv1d(values, layer.weight, layer.bias, stride, padding)
+        output: Tensor = layer(*arguments)
         return output
 
-
-class Mlp(nn.Module):
-    """Fully connected layers with one activation between them; the last one is linear."""
-
-    def __init__(self, inputs: int, outputs: int, config: MlpNetwork) -> None:
-        super().__init__()
-        sizes = (inputs, *config.hidden_sizes)
-        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(sizes))
-        self.head = nn.Linear(sizes[-1], outputs)
-        self.activation = config.activation
-
-    def forward(self, inputs: Tensor) -> Tensor:
-        """(n, inputs) to (n, outputs), the last layer linear."""
-        activate = torch.relu if self.activation == "relu" else torch.tanh
-        hidden = inputs
-        for layer in self.layers:
-            hidden = activate(layer(hidden))
-        output: Tensor = self.head(hidden)
-        return output
+    def _place(self, name: str, layer: nn.Module) -> None:
+        """Under 'name', or in the list 'name' of 'name.0', 'name.1'."""
+        group, _, index = name.partition(".")
+        if not index:
+            self.add_module(name, layer)
+            return
+        if not hasattr(self, group):
+            self.add_module(group, nn.ModuleList())
+        layers = getattr(self, group)
+        layers.append(layer)
 
 
-Body = ResBlock | Mlp
+def _mentions(expression: Any, name: str) -> bool:
+    if isinstance(expression, tuple):
+        return any(_mentions(argument, name) for argument in expression[1])
+    return bool(expression == name)
 
 
-def build_network(config: Network, inputs: int, outputs: int) -> Body:
-    """The network of a configuration, freshly initialised from torch's global generator."""
-    if isinstance(config, ResBlockNetwork):
-        return ResBlock(inputs, outputs)
-    return Mlp(inputs, outputs, config)
+_OPERATORS: dict[str, Callable[..., Tensor]] = {
+    "relu": torch.relu,
+    "leaky_relu": lambda values: functional.leaky_relu(values, LEAKY_SLOPE),
+    "tanh": torch.tanh,
+    "sigmoid": torch.sigmoid,
+    "add": torch.add,
+    "subtract": torch.sub,
+    "multiply": torch.mul,
+    "concatenate": lambda *parts: torch.cat(parts, dim=1),
+    "columns": lambda values, start, end: values[:, start:end],
+    "channels": lambda values, count: values.reshape(len(values), count, -1),
+    "flatten": lambda values: values.flatten(1),
+}
 
 
-def bound_actions(logits: Tensor) -> Tensor:
-    """(n, 2) network outputs to (n, 2) actions: a sigmoid for the linear, a tanh for the angular velocity."""
-    return torch.cat((torch.sigmoid(logits[:, :1]), torch.tanh(logits[:, 1:])), dim=1)
+def build_network(config: NetworkConfig, inputs: Inputs | int, outputs: int) -> nn.Module:
+    """The network of a configuration, freshly initialised from torch's global generator.
+
+    Args:
+        config: of a registered network.
+        inputs: what it is given, or how many numbers.
+        outputs: how many numbers come out.
+
+    Raises:
+        NetworkError: the module is not one that can be trained, saved and resumed.
+    """
+    description = describe(config, as_inputs(inputs), outputs)
+    if description is not None:
+        return Described(config, description)
+    if config.recurrent:
+        raise NetworkError(f"the network {config.name!r} is recurrent: those that others bring must remember nothing")
+    network: nn.Module = build_of(config)(config, as_inputs(inputs), outputs)
+    _refuse_unfit(config, network, as_inputs(inputs).size, outputs)
+    return network
+
+
+def fresh_network(config: NetworkConfig, inputs: Inputs | int, outputs: int) -> nn.Module:
+    """The same, leaving torch's global generator as it was: for whoever brings the weights along."""
+    with torch.random.fork_rng(devices=[]):
+        return build_network(config, inputs, outputs)
+
+
+@torch.no_grad()
+def _refuse_unfit(config: NetworkConfig, network: nn.Module, inputs: int, outputs: int) -> None:
+    parameters = dict(network.named_parameters())
+    if not parameters or any(parameter.dtype != torch.float32 for parameter in parameters.values()):
+        raise NetworkError(f"the network {config.name!r} must have parameters, all of them float32")
+    if others := network.state_dict().keys() - parameters.keys():
+        raise NetworkError(
+            f"the network {config.name!r} keeps {', '.join(sorted(others))} beside its parameters, which a "
+            "checkpoint does not hold: use layers without running averages (LayerNorm in place of BatchNorm)"
+        )
+    found = tuple(network(torch.zeros(3, inputs)).shape)
+    if found != (3, outputs):
+        raise NetworkError(f"the network {config.name!r} makes {found} of (3, {inputs}), not (3, {outputs})")
+
+
+def head_of(network: nn.Module) -> nn.Linear | None:
+    """The layer that makes a network's outputs: its last linear one, if there is any."""
+    linear = [module for module in network.modules() if isinstance(module, nn.Linear)]
+    return linear[-1] if linear else None
+
+
+def _scale_head(network: nn.Module, scale: float) -> None:
+    head = head_of(network)
+    if head is None:
+        return
+    with torch.no_grad():
+        head.weight.mul_(scale)
+        if head.bias is not None:
+            head.bias.zero_()
 
 
 class GaussianActor(nn.Module):
@@ -83,34 +195,28 @@ class GaussianActor(nn.Module):
     Samples are not bounded; the environment clips them.
     """
 
-    def __init__(self, network: Body, initial_std: tuple[float, float]) -> None:
+    def __init__(self, network: nn.Module, initial_std: Sequence[float], actions: ActionLayout = DEFAULT_ACTIONS) -> None:
         super().__init__()
         self.network = network
+        self.actions = actions
         self.log_std = nn.Parameter(torch.log(torch.tensor(initial_std)))
-        with torch.no_grad():
-            network.head.weight.mul_(_POLICY_HEAD_SCALE)
-            network.head.bias.zero_()
+        _scale_head(network, _POLICY_HEAD_SCALE)
 
     def forward(self, observations: Tensor) -> Tensor:
-        """The mean action (n, 2) for observations (n, size): also the deterministic policy."""
-        return bound_actions(self.network(observations))
+        """The mean action (n, A) for observations (n, size): also the deterministic policy."""
+        return bound_actions(self.network(observations), self.actions)
 
 
 class DeterministicActor(nn.Module):
     """Observations to bounded actions."""
 
-    def __init__(self, network: Body, observation_size: int) -> None:
+    def __init__(self, network: nn.Module, observation_size: int, actions: ActionLayout = DEFAULT_ACTIONS) -> None:
         super().__init__()
         self.network = network
+        self.actions = actions
         self.observation_size = observation_size
-        with torch.no_grad():
-            network.head.weight.mul_(_DETERMINISTIC_HEAD_SCALE)
-            network.head.bias.zero_()
+        _scale_head(network, _DETERMINISTIC_HEAD_SCALE)
 
     def forward(self, observations: Tensor) -> Tensor:
-        """Actions (n, 2) for observations (n, size)."""
-        return bound_actions(self.network(observations))
-
-
-def _leaky(values: Tensor) -> Tensor:
-    return functional.leaky_relu(values, LEAKY_SLOPE)
+        """Actions (n, A) for observations (n, size)."""
+        return bound_actions(self.network(observations), self.actions)

@@ -84,8 +84,13 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
 
     twist = _message(linear=vector, angular=vector)
     stamped = _message(header=header, twist=twist)
+    steered = _message(header=header, drive=lambda: SimpleNamespace(speed=0.0, steering_angle=0.0))
     goal = _message(header=header, pose=pose)
-    odometry = _message(header=header, pose=lambda: SimpleNamespace(pose=pose()))
+    odometry = _message(
+        header=header,
+        pose=lambda: SimpleNamespace(pose=pose()),
+        twist=lambda: SimpleNamespace(twist=twist()),
+    )
     scan = _message(
         header=header,
         angle_min=float,
@@ -100,6 +105,8 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
         _module("rclpy.node", Node=FakeNode),
         _module("rclpy.qos", qos_profile_sensor_data="sensor data"),
         _module("rclpy.signals", SignalHandlerOptions=SimpleNamespace(NO="no handlers")),
+        _module("ackermann_msgs"),
+        _module("ackermann_msgs.msg", AckermannDriveStamped=steered),
         _module("geometry_msgs"),
         _module("geometry_msgs.msg", PoseStamped=goal, Twist=twist, TwistStamped=stamped),
         _module("nav_msgs"),

@@ -23,7 +23,7 @@ from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.training.trainer import train
 
 # A full circle of one beam a degree, first beam ahead, then to the left: the LDS-01 of a TurtleBot3.
-SENSOR = LidarConfig(rays=360, batches=10, field_of_view=360.0)
+SENSOR = LidarConfig(rays=360, field_of_view=360.0)
 SENSOR_YAW = math.pi  # its first ray here points backwards
 
 
@@ -79,7 +79,8 @@ def test_a_trained_policy_arrives_through_the_code_that_ships(tmp_path: Path) ->
         commands = np.zeros((robots, 2), np.float32)
         for robot, navigator in enumerate(navigators):
             navigator.set_scan(now, sensed(scans[robot], rng))
-            navigator.set_odometry(now, *map(float, env.poses[robot]))
+            x, y, heading = map(float, env.poses[robot])
+            navigator.set_odometry(now, x, y, heading)
             command = navigator.command(now)
             commands[robot] = np.array([command.linear, command.angular]) / limits
             arrived[robot] |= command.state is State.ARRIVED

@@ -14,7 +14,22 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from sim.config import BurgerConfig, JackalConfig, LidarConfig, TaskConfig
+from sim.actions import action_layout
+from sim.config import (
+    ActionsPart,
+    BearingPart,
+    BurgerConfig,
+    DifferentialDrive,
+    DoubleMount,
+    JackalConfig,
+    LidarConfig,
+    ObservationConfig,
+    RacecarConfig,
+    RangesPart,
+    RidgebackConfig,
+    SpeedsPart,
+    TaskConfig,
+)
 from workers.checkpoints import read_policy
 from workers.config import MlpNetwork, Network, ResBlockNetwork
 from workers.errors import ArchiveFormatError, ExportError
@@ -28,19 +43,54 @@ from workers.manifest import Manifest
 from workers.policy import torch_policy
 
 NETWORKS: list[Network] = [ResBlockNetwork(), MlpNetwork(), MlpNetwork(hidden_sizes=(8, 4, 4), activation="tanh")]
+TWO = DoubleMount(x=0.2, y=0.1, yaw=30.0, second_x=-0.2, second_y=-0.1, second_yaw=-150.0)
 TASKS = [
     TaskConfig(),
-    TaskConfig(observation="paper"),
+    TaskConfig(observation=ObservationConfig.preset("paper")),
     TaskConfig(
-        lidar=LidarConfig(rays=24, batches=24, field_of_view=360.0, range=5.0),
+        lidar=LidarConfig(rays=24, field_of_view=360.0, range=5.0),
+        observation=ObservationConfig.preset("improved", batches=24),
         robot=BurgerConfig(max_linear_speed=0.5, max_angular_speed=2.5),
     ),
-    TaskConfig(frames=3),
+    TaskConfig(observation=ObservationConfig.preset("improved", frames=3)),
+    TaskConfig(robot=BurgerConfig(drive=DifferentialDrive(reverse=0.4))),
+    TaskConfig(robot=RidgebackConfig()),
+    TaskConfig(robot=RacecarConfig(), observation=ObservationConfig.preset("improved", frames=2)),
+    TaskConfig(
+        robot=JackalConfig(),
+        lidar=LidarConfig(rays=12, mount=TWO),
+        observation=ObservationConfig.preset("improved", batches=6),
+    ),
+    TaskConfig(
+        observation=ObservationConfig(
+            parts=(
+                BearingPart(encoding="sine_cosine", frames=2),
+                RangesPart(batches=30, inverse=False, frames=3),
+                ActionsPart(frames=4),
+            )
+        )
+    ),
+    TaskConfig(observation=ObservationConfig(parts=(SpeedsPart(), RangesPart()))),
 ]
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=repr)
-@pytest.mark.parametrize("task", TASKS, ids=["improved", "paper", "full circle", "stacked"])
+@pytest.mark.parametrize(
+    "task",
+    TASKS,
+    ids=[
+        "improved",
+        "paper",
+        "full circle",
+        "stacked",
+        "reverse",
+        "omnidirectional",
+        "ackermann",
+        "two LiDARs",
+        "parts",
+        "no target",
+    ],
+)
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
     archive = make_checkpoint(network, task)
     exported = export_checkpoint(archive)
@@ -50,15 +100,23 @@ def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: 
     _, policy = read_policy(archive)
     size = len(exported.manifest.observation.numbers)
     observations = np.random.default_rng(1).normal(size=(300, size)).astype(np.float32)
-    expected = torch_policy(policy.network, policy.weights)(observations)
+    expected = torch_policy(policy)(observations)
     found = run_graph(exported.by_observation, {"observation": observations})
     np.testing.assert_allclose(found["action"], expected, rtol=0, atol=1e-5)
-    limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)
+    limits = np.array(action_layout(task.robot).limits, np.float32)
+    assert exported.specification.action_limits == pytest.approx(limits)
+    assert exported.specification.action_lows == action_layout(task.robot).lows
     np.testing.assert_allclose(found["velocity"], expected * limits, rtol=0, atol=1e-5)
 
 
 def test_the_bundle_says_which_body_the_policy_was_trained_for(make_checkpoint: Callable[..., Path]) -> None:
-    for robot, words in ((BurgerConfig(), "round body of radius 0.105 m"), (JackalConfig(), "0.508 m long and 0.43 m wide")):
+    for robot, words in (
+        (BurgerConfig(), "A differential-drive robot with a round body of radius 0.105 m"),
+        (BurgerConfig(drive=DifferentialDrive(reverse=0.5)), "0.125 m/s backwards"),
+        (JackalConfig(), "0.508 m long and 0.43 m wide"),
+        (RidgebackConfig(), "An omnidirectional robot"),
+        (RacecarConfig(), "axles 0.3302 m apart"),
+    ):
         exported = export_checkpoint(make_checkpoint(task=TaskConfig(robot=robot)))
         assert words in readme(exported.manifest, exported.specification, exported.report)
 
@@ -81,7 +139,7 @@ def test_graph_carries_its_manifest(make_checkpoint: Callable[..., Path]) -> Non
 def test_an_export_that_differs_is_refused(make_checkpoint: Callable[..., Path]) -> None:
     exported = export_checkpoint(make_checkpoint())
     manifest, policy = read_policy(make_checkpoint())
-    trained = torch_policy(policy.network, policy.weights)
+    trained = torch_policy(policy)
     shipped = Policy(exported.specification, read_safetensors(exported.weights))
     policy.weights["head.bias"] = policy.weights["head.bias"] + np.float32(1e-3)
     wrong = observation_graph(policy, exported.specification, manifest)
@@ -96,7 +154,7 @@ def test_an_export_that_is_not_a_number_is_refused(make_checkpoint: Callable[...
     policy.weights["head.bias"] = np.full_like(policy.weights["head.bias"], np.nan)
     broken = observation_graph(policy, exported.specification, manifest)
     with pytest.raises(ExportError, match="nan off"):
-        check_export(torch_policy(policy.network, policy.weights), shipped, manifest, broken, exported.by_scan)
+        check_export(torch_policy(policy), shipped, manifest, broken, exported.by_scan)
 
 
 def unpack(archive: Path, directory: Path) -> Path:
@@ -117,7 +175,10 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
 
 @pytest.mark.parametrize("frames", [1, 4])
 def test_readme_examples_run_and_agree(make_checkpoint: Callable[..., Path], tmp_path: Path, frames: int) -> None:
-    unpacked = unpack(make_checkpoint(ResBlockNetwork(), TaskConfig(frames=frames)), tmp_path)
+    unpacked = unpack(
+        make_checkpoint(ResBlockNetwork(), TaskConfig(observation=ObservationConfig.preset("improved", frames=frames))),
+        tmp_path,
+    )
     readme = (unpacked / "README.md").read_text()
     numpy_example, onnx_example = (part.split("```")[0] for part in readme.split("```python\n")[1:])
 
@@ -173,7 +234,7 @@ def test_what_is_not_a_float32_safetensors_file_is_refused(data: bytes) -> None:
 
 def test_a_specification_of_another_version_is_refused(unpacked: Path) -> None:
     path = unpacked / "policy" / "policy.json"
-    path.write_text(path.read_text().replace('"observation_version": 1', '"observation_version": 2'))
+    path.write_text(path.read_text().replace('"kind": "inverse_ranges"', '"kind": "smells"'))
     with pytest.raises(PolicyFileError, match="another version"):
         Policy.load(unpacked / "policy")
 

@@ -8,7 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.config import ArenaConfig, TaskConfig
+from sim.config import (
+    AckermannDrive,
+    AnyDrive,
+    ArenaConfig,
+    BurgerConfig,
+    DifferentialDrive,
+    DoubleMount,
+    JackalConfig,
+    LidarConfig,
+    ObservationConfig,
+    OmnidirectionalDrive,
+    SingleMount,
+    TaskConfig,
+)
 from sim.envs.vector import NavigationVectorEnv
 from workers.export.bundle import export_checkpoint
 from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, State
@@ -47,9 +60,64 @@ def test_it_drives_when_all_is_well(navigator: Navigator) -> None:
     assert abs(command.angular) <= 1.0
 
 
-@pytest.mark.parametrize("frames", [1, 3])
-def test_it_commands_what_the_policy_does_in_the_simulator(make_checkpoint: Callable[..., Path], frames: int) -> None:
-    task = TaskConfig(arena=ArenaConfig(name="complex"), frames=frames)
+def test_two_lidars_make_the_scan_that_the_simulator_makes(make_checkpoint: Callable[..., Path]) -> None:
+    mount = DoubleMount(x=0.2, y=-0.15, yaw=-45.0, second_x=-0.2, second_y=0.15, second_yaw=135.0)
+    task = TaskConfig(
+        arena=ArenaConfig(name="complex"),
+        robot=JackalConfig(),
+        lidar=LidarConfig(rays=45, field_of_view=270.0, mount=mount),
+        observation=ObservationConfig.preset("improved", batches=9),
+    )
+    exported = export_checkpoint(make_checkpoint(task=task))
+    policy = Policy(exported.specification, read_safetensors(exported.weights))
+    env = NavigationVectorEnv(task, 1, seed=3)
+    observations, _ = env.reset(seed=3)
+    safety = replace(Safety.of(policy.specification), stop_distance=0.0, body_distance=0.0, goal_tolerance=0.0)
+    assert (safety.sensor_yaw, safety.second_sensor_yaw) == pytest.approx((-math.pi / 4, 0.75 * math.pi))
+    navigator = Navigator(policy, safety)
+    angles = ray_angles(policy.specification)
+    navigator.set_odometry(0.0, *env.poses[0].astype(np.float64))
+    navigator.set_goal(*env.targets[0].astype(np.float64))
+    for lidar, ranges in enumerate(env.ranges[0].astype(np.float64).reshape(2, -1)):
+        assert navigator.command(0.0).state is State.NO_SCAN
+        navigator.set_scan(0.0, Scan(angles[0], angles[1] - angles[0], 0.0, 3.5, ranges), lidar)
+    command = navigator.command(0.0)
+    np.testing.assert_allclose((command.linear, command.angular), policy.velocities(observations)[0], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("distance", "state"), [(0.25, State.TOO_NEAR), (0.35, State.DRIVING)])
+def test_what_is_too_near_is_measured_from_the_middle_of_the_body(
+    make_checkpoint: Callable[..., Path], distance: float, state: State
+) -> None:
+    # A LiDAR 0.08 m behind the middle of a Burger: what it sees at 0.33 m straight ahead is 0.25 m from the middle.
+    lidar = LidarConfig(mount=SingleMount(x=-0.08))
+    exported = export_checkpoint(make_checkpoint(task=TaskConfig(lidar=lidar, collision_distance=0.3)))
+    policy = Policy(exported.specification, read_safetensors(exported.weights))
+    navigator = Navigator(policy, Safety.of(policy.specification))
+    navigator.set_scan(10.0, scan(3.0, at_0=distance + 0.08))
+    navigator.set_odometry(10.0, 0.0, 0.0, 0.0)
+    navigator.set_goal(2.0, 0.5)
+    assert navigator.command(10.0).state is state
+
+
+@pytest.mark.parametrize(
+    ("frames", "drive"),
+    [
+        (1, DifferentialDrive()),
+        (3, DifferentialDrive()),
+        (1, DifferentialDrive(reverse=0.5)),
+        (1, OmnidirectionalDrive()),
+        (1, AckermannDrive()),
+    ],
+)
+def test_it_commands_what_the_policy_does_in_the_simulator(
+    make_checkpoint: Callable[..., Path], frames: int, drive: AnyDrive
+) -> None:
+    task = TaskConfig(
+        arena=ArenaConfig(name="complex"),
+        observation=ObservationConfig.preset("improved", frames=frames),
+        robot=BurgerConfig(drive=drive),
+    )
     exported = export_checkpoint(make_checkpoint(task=task))
     policy = Policy(exported.specification, read_safetensors(exported.weights))
     env = NavigationVectorEnv(task, 1, seed=3)
@@ -64,10 +132,18 @@ def test_it_commands_what_the_policy_does_in_the_simulator(make_checkpoint: Call
         navigator.set_odometry(now, *env.poses[0].astype(np.float64))
         navigator.set_goal(*env.targets[0].astype(np.float64))
         command = navigator.command(now)
-        np.testing.assert_allclose((command.linear, command.angular), policy.velocities(observations)[0], rtol=0, atol=1e-5)
+        commanded = policy.velocities(observations)[0]
+        if isinstance(drive, AckermannDrive) and abs(command.angular) < 1.0 - 1e-6:
+            assert command.steering == pytest.approx(commanded[1], abs=1e-5)
         observations, _, terminations, truncations, _ = env.step(policy.actions(observations))
         if terminations[0] or truncations[0]:
             break
+        # What the robot is sent moves it as the simulator's has just been moved, but for where its middle is.
+        forwards, aside, turn = env.twists()[0]
+        sideways = 0.0 if isinstance(drive, AckermannDrive) else aside
+        np.testing.assert_allclose(
+            (command.linear, command.lateral, command.angular), (forwards, sideways, turn), rtol=0, atol=1e-5
+        )
     assert step > 5
 
 

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from sim.config import AckermannDrive, BurgerConfig, TaskConfig
 from workers.export.bundle import bundle, export_checkpoint
 
 MODULE = "workers.export.ros2.mapless_navigator.node"
@@ -45,6 +46,7 @@ def receive(node: Any, ros: SimpleNamespace, *, age: float = 0.0, nearest: float
     odometry = ros.Odometry()
     odometry.header.stamp, odometry.header.frame_id = stamp, frame
     odometry.pose.pose.position.x = 0.5
+    odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = 0.2, -0.5
     odometry.pose.pose.orientation.z, odometry.pose.pose.orientation.w = math.sin(0.4), math.cos(0.4)
     node.subscriptions["odom"][1](odometry)
 
@@ -94,7 +96,7 @@ def test_pose_and_goal_reach_the_policy_unchanged(node: Any, ros: SimpleNamespac
     receive(node, ros)
     send_goal(node, ros, 2.0, 1.0)
     policy = Policy.load(node.parameters["policy_directory"])
-    observation = observe(policy.specification, [[3.0] * 30], [[0.5, 0.0, 0.8]], [[2.0, 1.0]], [[0.0, 0.0]])
+    observation = observe(policy.specification, [[3.0] * 30], [[0.5, 0.0, 0.8]], [[2.0, 1.0]], [[0.8, -0.5]])
     np.testing.assert_allclose(tick(node), policy.velocities(observation), rtol=0, atol=1e-6)
 
 
@@ -155,6 +157,25 @@ def test_parameters_change_what_it_does(ros: SimpleNamespace, package: Path) -> 
     assert message.header.stamp.sec == 1000
 
 
+def test_an_ackermann_drive_is_sent_its_speed_and_its_steering_angle(
+    make_checkpoint: Callable[..., Path], tmp_path: Path, ros: SimpleNamespace
+) -> None:
+    task = TaskConfig(robot=BurgerConfig(drive=AckermannDrive(wheel_base=0.2, steering_limit=20.0)))
+    with zipfile.ZipFile(io.BytesIO(bundle(export_checkpoint(make_checkpoint(task=task))))) as archive:
+        archive.extractall(tmp_path)
+    directory = tmp_path / "mapless-policy" / "ros2" / "mapless_navigator" / "policy"
+    ros.Node.parameters = {"policy_directory": str(directory)}
+    node = importlib.import_module(MODULE).NavigatorNode()
+    receive(node, ros)
+    send_goal(node, ros, 2.0, 1.0)
+    node.timers[0][1]()
+    topic, message = node.published[-1]
+    assert topic == "ackermann_cmd"
+    assert message.drive.speed != 0.0
+    assert 0.0 < abs(message.drive.steering_angle) <= math.radians(20.0)
+    assert message.header.stamp.sec == 1000
+
+
 def test_the_node_stops_the_robot_when_it_ends(ros: SimpleNamespace, package: Path, monkeypatch: Any) -> None:
     ros.Node.parameters = {"policy_directory": str(package / "policy")}
     nodes = []
@@ -179,7 +200,7 @@ def test_the_node_stops_the_robot_when_it_ends(ros: SimpleNamespace, package: Pa
 
 def test_the_packages_own_parameters_are_the_nodes_defaults(node: Any, package: Path) -> None:
     written = dict(re.findall(r"^    (\w+): (\S+)$", (package / "config" / "navigator.yaml").read_text(), re.MULTILINE))
-    assert written.pop("stamped_twist") == "false"
+    assert (written.pop("stamped_twist"), written.pop("measured_speeds")) == ("false", "true")
     defaults = vars(node._navigator._safety)
     assert {name: float(value) for name, value in written.items()} == pytest.approx(defaults)
     assert all(re.search(r"[.e]", value) for value in written.values())  # ROS refuses an integer for a float
@@ -192,4 +213,4 @@ def test_package_description_names_what_the_node_imports(package: Path) -> None:
     assert {name for name in imported if name.endswith("_msgs") or name in ("rclpy", "ament_index_python")} <= named
     launch = ElementTree.parse(package / "launch" / "navigator.launch.xml").getroot()
     remapped = {element.get("from") for element in launch.iter("remap")}
-    assert remapped == {"scan", "odom", "goal_pose", "cmd_vel"}
+    assert remapped == {"scan", "scan_second", "odom", "goal_pose", "cmd_vel", "ackermann_cmd"}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.config import ArenaConfig, LidarConfig, TaskConfig
+from sim.config import ArenaConfig, LidarConfig, ObservationConfig, TaskConfig
 from sim.envs.vector import NavigationVectorEnv
 from sim.lidar import ray_angles as simulated_ray_angles
 from workers.export.bundle import export_checkpoint
@@ -19,9 +19,11 @@ from workers.export.ros2.mapless_navigator.policy import Specification
 
 TASKS = {
     "improved": TaskConfig(arena=ArenaConfig(name="complex")),
-    "paper": TaskConfig(arena=ArenaConfig(name="complex"), observation="paper"),
+    "paper": TaskConfig(arena=ArenaConfig(name="complex"), observation=ObservationConfig.preset("paper")),
     "full circle": TaskConfig(
-        arena=ArenaConfig(name="complex"), lidar=LidarConfig(rays=40, batches=20, field_of_view=360.0)
+        arena=ArenaConfig(name="complex"),
+        lidar=LidarConfig(rays=40, field_of_view=360.0),
+        observation=ObservationConfig.preset("improved", batches=20),
     ),
 }
 
@@ -46,7 +48,7 @@ def test_observation_equals_the_simulators(make_checkpoint: Callable[..., Path],
             "ranges": np.array(env.ranges, np.float32),
             "pose": np.array(env.poses, np.float32),
             "target": np.array(env.targets, np.float32),
-            "last_action": last.astype(np.float32),
+            "speeds": last.astype(np.float32),
         }
         made = observe(exported.specification, *scene.values())
         np.testing.assert_allclose(made, observations, rtol=0, atol=1e-5)
@@ -56,7 +58,7 @@ def test_observation_equals_the_simulators(make_checkpoint: Callable[..., Path],
 
 
 def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path]) -> None:
-    task = TaskConfig(arena=ArenaConfig(name="complex"), frames=3)
+    task = TaskConfig(arena=ArenaConfig(name="complex"), observation=ObservationConfig.preset("improved", frames=3))
     exported = export_checkpoint(make_checkpoint(task=task))
     specification = exported.specification
     env = NavigationVectorEnv(task, 1, seed=5)
@@ -68,7 +70,7 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
     for _ in range(300):
         made = frames.push(observe(specification, env.ranges, env.poses, env.targets, last))
         np.testing.assert_allclose(made, observations, rtol=0, atol=1e-5)
-        scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets, "last_action": last}
+        scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets, "speeds": last}
         scene["previous"] = observations[:, 16:]
         by_scan = run_graph(exported.by_scan, {name: np.array(array) for name, array in scene.items()})
         np.testing.assert_allclose(by_scan["observation"], observations, rtol=0, atol=1e-5)

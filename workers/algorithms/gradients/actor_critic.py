@@ -15,8 +15,9 @@ from torch import Tensor, nn
 
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.storage.replay import Transitions
-from workers.networks.compiled import TensorPasses
-from workers.networks.modules import Body, DeterministicActor, bound_actions
+from workers.networks.compiled import TensorPasses, is_compiled
+from workers.networks.modules import DeterministicActor
+from workers.networks.squashing import bound_actions, multiply_by_slope
 
 
 class ActorCriticGradients(Protocol):
@@ -30,14 +31,14 @@ class ActorCriticGradients(Protocol):
 
 
 def action_value(critic: nn.Module, observations: Tensor, actions: Tensor) -> Tensor:
-    """Q (n, 1) of observations (n, size) and actions (n, 2)."""
+    """Q (n, 1) of observations (n, size) and actions (n, A)."""
     value: Tensor = critic(torch.cat((observations, actions), dim=1))
     return value
 
 
 @torch.enable_grad()
 def differentiate_critics(
-    critics: Sequence[Body], parameters: FlatParameters, batch: Transitions, targets: Tensor
+    critics: Sequence[nn.Module], parameters: FlatParameters, batch: Transitions, targets: Tensor
 ) -> Tensor:
     """Overwrites the critics' gradients by autograd, given targets (n, 1); returns the loss."""
     errors = [action_value(critic, batch.observations, batch.actions) - targets for critic in critics]
@@ -59,12 +60,12 @@ def write_critic_gradients(critics: Sequence[TensorPasses], batch: Transitions, 
 
 
 class AutogradActorCritic:
-    """The reference."""
+    """By autograd: of any network, on any device."""
 
     def __init__(
         self,
         actor: DeterministicActor,
-        critics: Sequence[Body],
+        critics: Sequence[nn.Module],
         actor_parameters: FlatParameters,
         critic_parameters: FlatParameters,
         logit_penalty: float,
@@ -80,16 +81,18 @@ class AutogradActorCritic:
     def actor(self, observations: Tensor) -> Tensor:
         """See `ActorCriticGradients.actor`."""
         logits = self._actor.network(observations)
-        value = action_value(self._critics[0], observations, bound_actions(logits)).mean()
+        value = action_value(self._critics[0], observations, bound_actions(logits, self._actor.actions)).mean()
         self._actor_parameters.differentiate(self._penalty * logits.square().sum(dim=1).mean() - value)
         return -value.detach()
 
 
 class WrittenActorCritic:
-    """The same gradients without autograd, on a CPU; a test compares them with `AutogradActorCritic`'s."""
+    """The same gradients where compiled passes are known; a test compares them with `AutogradActorCritic`'s."""
 
-    def __init__(self, actor: DeterministicActor, critics: Sequence[Body], batch_size: int, logit_penalty: float) -> None:
-        self._penalty = logit_penalty
+    def __init__(
+        self, actor: DeterministicActor, critics: Sequence[nn.Module], batch_size: int, logit_penalty: float
+    ) -> None:
+        self._penalty, self._layout = logit_penalty, actor.actions
         self._actor = TensorPasses(actor.network, batch_size)
         self._critics = [TensorPasses(critic, batch_size) for critic in critics]
 
@@ -102,13 +105,11 @@ class WrittenActorCritic:
         """See `ActorCriticGradients.actor`."""
         rows, size = observations.shape
         logits = self._actor.forward(observations)
-        actions = bound_actions(logits)
+        actions = bound_actions(logits, self._layout)
         values = self._critics[0].forward(torch.cat((observations, actions), dim=1))
         by_actions = self._critics[0].input_gradient(torch.full_like(values, -1.0 / rows))[:, size:]
-        # Through sigmoid (s (1 - s)) and tanh (1 - t^2).
         by_logits = by_actions.contiguous()
-        by_logits[:, 0].mul_(actions[:, 0] * (1.0 - actions[:, 0]))
-        by_logits[:, 1].mul_(1.0 - actions[:, 1].square())
+        multiply_by_slope(by_logits, actions, self._layout)
         if self._penalty:
             by_logits.add_(logits, alpha=2.0 * self._penalty / rows)
         self._actor.backward(by_logits)
@@ -117,13 +118,13 @@ class WrittenActorCritic:
 
 def fastest_gradients(
     actor: DeterministicActor,
-    critics: Sequence[Body],
+    critics: Sequence[nn.Module],
     actor_parameters: FlatParameters,
     critic_parameters: FlatParameters,
     batch_size: int,
     logit_penalty: float,
 ) -> ActorCriticGradients:
-    """Written out on a CPU; by autograd elsewhere."""
-    if actor_parameters.values.device.type == "cpu":
+    """Written out where compiled passes are known; by autograd elsewhere."""
+    if is_compiled(actor.network, *critics):
         return WrittenActorCritic(actor, critics, batch_size, logit_penalty)
     return AutogradActorCritic(actor, critics, actor_parameters, critic_parameters, logit_penalty)

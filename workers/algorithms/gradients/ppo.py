@@ -12,13 +12,12 @@ from typing import Protocol
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from workers.algorithms.storage.rollout import Samples
 from workers.kernels.ppo import LOG_SQRT_2PI, STATISTICS, differentiate
 from workers.networks.compiled import ROWS_AT_ONCE, passes_of
-from workers.networks.layout import ACTION_SIZE
-from workers.networks.modules import Body, GaussianActor
+from workers.networks.modules import GaussianActor
 
 
 class PpoGradients(Protocol):
@@ -29,7 +28,7 @@ class PpoGradients(Protocol):
 
         Args:
             samples: a rollout's.
-            rows: (n,) int64, those that are in the minibatch.
+            rows: (n,) int64, those that are in the minibatch; with recurrent networks (steps, sequences).
 
         Returns:
             (4,): policy loss (without the entropy bonus), value loss, estimate of KL(old, new), clipped fraction.
@@ -37,7 +36,7 @@ class PpoGradients(Protocol):
 
 
 def log_prob(noise: Tensor, log_std: Tensor) -> Tensor:
-    """Log density (n,) of a diagonal normal at mean + std * noise, for standard normal `noise` (n, 2)."""
+    """Log density (n,) of a diagonal normal at mean + std * noise, for standard normal `noise` (n, A)."""
     return (-0.5 * noise.square() - log_std - LOG_SQRT_2PI).sum(-1)
 
 
@@ -47,50 +46,56 @@ def entropy(log_std: Tensor) -> Tensor:
 
 
 class AutogradPpo:
-    """The reference."""
+    """By autograd: of any network, on any device."""
 
-    def __init__(self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float) -> None:
+    def __init__(self, actor: GaussianActor, critic: nn.Module, clip_range: float, entropy_coefficient: float) -> None:
         self._actor, self._critic = actor, critic
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
 
     @torch.enable_grad()
     def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
-        batch = Samples(*(column[rows] for column in samples))
+        batch = Samples(*(column[rows.flatten()] for column in samples))
         for parameter in (*self._actor.parameters(), *self._critic.parameters()):
             if parameter.grad is not None:
                 parameter.grad.zero_()
         log_std = self._actor.log_std
-        noise = (batch.actions - self._actor(batch.observations)) / torch.exp(log_std)
+        mean, values = self.predict(batch.observations, rows)
+        noise = (batch.actions - mean) / torch.exp(log_std)
         log_ratio = log_prob(noise, log_std) - batch.log_probs
         ratio = torch.exp(log_ratio)
         clipped = ratio.clamp(1.0 - self._clip_range, 1.0 + self._clip_range)
         policy_loss = -torch.min(ratio * batch.advantages, clipped * batch.advantages).mean()
-        value_loss = (self._critic(batch.observations)[:, 0] - batch.returns).square().mean()
+        value_loss = (values - batch.returns).square().mean()
         (policy_loss - self._entropy_coefficient * entropy(log_std) + value_loss).backward()
         with torch.no_grad():
             kl = (ratio - 1.0 - log_ratio).mean()
             clip_fraction = (ratio != clipped).float().mean()
             return torch.stack((policy_loss, value_loss, kl, clip_fraction))
 
+    def predict(self, observations: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean actions (n, A) and values (n,) of observations (n, size), which are these rows of the rollout."""
+        return self._actor(observations), self._critic(observations)[:, 0]
+
 
 class WrittenPpo:
-    """The same gradients without autograd, on a CPU; a test compares them with `AutogradPpo`'s."""
+    """The same gradients where compiled passes are known; a test compares them with `AutogradPpo`'s."""
 
-    def __init__(self, actor: GaussianActor, critic: Body, clip_range: float, entropy_coefficient: float) -> None:
+    def __init__(self, actor: GaussianActor, critic: nn.Module, clip_range: float, entropy_coefficient: float) -> None:
         log_std = actor.log_std
         assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
         self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
+        self._lows = np.array(actor.actions.lows, np.float32)
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
         self._actor, self._critic = passes_of(actor.network, ROWS_AT_ONCE), passes_of(critic, ROWS_AT_ONCE)
 
     def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
-        statistics, by_log_std = np.zeros(STATISTICS), np.full(ACTION_SIZE, -self._entropy_coefficient)
+        statistics, by_log_std = np.zeros(STATISTICS), np.full(len(self._lows), -self._entropy_coefficient)
         arrays = tuple(column.numpy() for column in samples)
         differentiate(
             self._actor, self._critic, arrays, rows.numpy(), ROWS_AT_ONCE,
-            self._log_std, self._clip_range, by_log_std, statistics,
+            self._log_std, self._lows, self._clip_range, by_log_std, statistics,
         )  # fmt: skip
         self._by_log_std[:] = by_log_std
         return torch.from_numpy(statistics)

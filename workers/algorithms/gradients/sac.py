@@ -4,21 +4,19 @@ critics  L = sum_i 1/N sum (y - Q_i(s, a))^2
 actor    J = 1/N sum (alpha log pi(a|s) - min_i Q_i(s, a)), a = squash(u), u = mean(s) + std(s) noise      its Eq. 9 and 10
 """
 
-import math
 from collections.abc import Sequence
 from typing import Protocol
 
 import torch
-from torch import Tensor
-from torch.nn import functional
+from torch import Tensor, nn
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from workers.algorithms.flat import FlatParameters
 from workers.algorithms.gradients.actor_critic import action_value, differentiate_critics, write_critic_gradients
 from workers.algorithms.gradients.ppo import log_prob
 from workers.algorithms.storage.replay import Transitions
-from workers.networks.compiled import TensorPasses
-from workers.networks.layout import ACTION_SIZE
-from workers.networks.modules import Body, bound_actions
+from workers.networks.compiled import TensorPasses, is_compiled
+from workers.networks.squashing import bound_actions, log_slope, multiply_by_slope
 
 # Deviations of u from 0.7 % to 740 %: outside of it gradients vanish or samples saturate.
 _LOW, _HIGH = -5.0, 2.0
@@ -36,7 +34,7 @@ class SacGradients(Protocol):
 
         Args:
             observations: (n, size).
-            noise: (n, 2), standard normal, of the actions to try.
+            noise: (n, A), standard normal, of the actions to try.
             alpha: scalar or (1,), the weight of entropy.
 
         Returns:
@@ -44,35 +42,26 @@ class SacGradients(Protocol):
         """
 
 
-def squashed_sample(outputs: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
-    """Actions (n, 2) and their log densities (n, 1), from the actor's outputs (n, 4) and standard normal noise (n, 2)."""
-    mean, raw = outputs.split(ACTION_SIZE, dim=1)
+def squashed_sample(outputs: Tensor, noise: Tensor, actions: ActionLayout = DEFAULT_ACTIONS) -> tuple[Tensor, Tensor]:
+    """Actions (n, A) and their log densities (n, 1), from the actor's outputs (n, 2 A) and standard normal noise (n, A)."""
+    mean, raw = outputs.split(actions.size, dim=1)
     log_std = _LOW + _HALF * (torch.tanh(raw) + 1.0)
     u = mean + torch.exp(log_std) * noise
-    return bound_actions(u), (log_prob(noise, log_std) - log_slope(u)).unsqueeze(1)
-
-
-def log_slope(u: Tensor) -> Tensor:
-    """Log of the derivative of `bound_actions` by u, summed over both actions: (n, 2) to (n,).
-
-    sigmoid'(u) = sigmoid(u) sigmoid(-u), tanh'(u) = 4 sigmoid(2 u) sigmoid(-2 u): exact where 1 - tanh(u)^2 would cancel.
-    """
-    linear, angular = u[:, 0], 2.0 * u[:, 1]
-    return (
-        functional.logsigmoid(linear)
-        + functional.logsigmoid(-linear)
-        + functional.logsigmoid(angular)
-        + functional.logsigmoid(-angular)
-        + math.log(4.0)
-    )
+    return bound_actions(u, actions), (log_prob(noise, log_std) - log_slope(u, actions)).unsqueeze(1)
 
 
 class AutogradSac:
-    """The reference."""
+    """By autograd: of any network, on any device."""
 
     def __init__(
-        self, actor: Body, critics: Sequence[Body], actor_parameters: FlatParameters, critic_parameters: FlatParameters
+        self,
+        actor: nn.Module,
+        critics: Sequence[nn.Module],
+        actor_parameters: FlatParameters,
+        critic_parameters: FlatParameters,
+        actions: ActionLayout = DEFAULT_ACTIONS,
     ) -> None:
+        self._layout = actions
         self._actor, self._critics = actor, critics
         self._actor_parameters, self._critic_parameters = actor_parameters, critic_parameters
 
@@ -83,7 +72,7 @@ class AutogradSac:
     @torch.enable_grad()
     def actor(self, observations: Tensor, noise: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
         """See `SacGradients.actor`."""
-        actions, log_probs = squashed_sample(self._actor(observations), noise)
+        actions, log_probs = squashed_sample(self._actor(observations), noise, self._layout)
         values = torch.minimum(*(action_value(critic, observations, actions) for critic in self._critics))
         loss = (alpha * log_probs - values).mean()
         self._actor_parameters.differentiate(loss)
@@ -91,9 +80,12 @@ class AutogradSac:
 
 
 class WrittenSac:
-    """The same gradients without autograd, on a CPU; a test compares them with `AutogradSac`'s."""
+    """The same gradients where compiled passes are known; a test compares them with `AutogradSac`'s."""
 
-    def __init__(self, actor: Body, critics: Sequence[Body], batch_size: int) -> None:
+    def __init__(
+        self, actor: nn.Module, critics: Sequence[nn.Module], batch_size: int, actions: ActionLayout = DEFAULT_ACTIONS
+    ) -> None:
+        self._layout = actions
         self._actor = TensorPasses(actor, batch_size)
         self._critics = [TensorPasses(critic, batch_size) for critic in critics]
 
@@ -105,12 +97,13 @@ class WrittenSac:
     def actor(self, observations: Tensor, noise: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
         """See `SacGradients.actor`."""
         rows, size = observations.shape
-        mean, raw = self._actor.forward(observations).split(ACTION_SIZE, dim=1)
+        mean, raw = self._actor.forward(observations).split(self._layout.size, dim=1)
         bent = torch.tanh(raw)
         log_std = _LOW + _HALF * (bent + 1.0)
         spread = torch.exp(log_std) * noise
         u = mean + spread
-        actions, log_probs = bound_actions(u), (log_prob(noise, log_std) - log_slope(u)).unsqueeze(1)
+        actions = bound_actions(u, self._layout)
+        log_probs = (log_prob(noise, log_std) - log_slope(u, self._layout)).unsqueeze(1)
 
         inputs = torch.cat((observations, actions), dim=1)
         first, second = (critic.forward(inputs) for critic in self._critics)
@@ -120,24 +113,22 @@ class WrittenSac:
         for critic, by_value in zip(self._critics, (by_first, -1.0 / rows - by_first), strict=True):
             by_u += critic.input_gradient(by_value)[:, size:]
 
-        # Through sigmoid (s (1 - s)) and tanh (1 - t^2), whose log slopes have derivatives 1 - 2 s and -2 t.
         weight = alpha / rows
-        linear, angular = actions[:, 0], actions[:, 1]
-        by_u[:, 0].mul_(linear * (1.0 - linear)).add_(weight * (2.0 * linear - 1.0))
-        by_u[:, 1].mul_(1.0 - angular.square()).add_(weight * (2.0 * angular))
+        multiply_by_slope(by_u, actions, self._layout, weight)
         by_raw = (by_u * spread - weight) * (_HALF * (1.0 - bent.square()))
         self._actor.backward(torch.cat((by_u, by_raw), dim=1))
         return (alpha * log_probs - torch.minimum(first, second)).mean(), log_probs
 
 
 def fastest_gradients(
-    actor: Body,
-    critics: Sequence[Body],
+    actor: nn.Module,
+    critics: Sequence[nn.Module],
     actor_parameters: FlatParameters,
     critic_parameters: FlatParameters,
     batch_size: int,
+    actions: ActionLayout = DEFAULT_ACTIONS,
 ) -> SacGradients:
-    """Written out on a CPU; by autograd elsewhere."""
-    if actor_parameters.values.device.type == "cpu":
-        return WrittenSac(actor, critics, batch_size)
-    return AutogradSac(actor, critics, actor_parameters, critic_parameters)
+    """Written out where compiled passes are known; by autograd elsewhere."""
+    if is_compiled(actor, *critics):
+        return WrittenSac(actor, critics, batch_size, actions)
+    return AutogradSac(actor, critics, actor_parameters, critic_parameters, actions)

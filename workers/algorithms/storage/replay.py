@@ -9,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.actions import DEFAULT_ACTIONS
 from workers.algorithms.base import Arrays
-from workers.networks.layout import ACTION_SIZE
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Transitions:
 
     Attributes:
         observations: (n, size).
-        actions: (n, 2) as the environment executed them.
+        actions: (n, A) as the environment executed them.
         rewards: (n, 1).
         continues: (n, 1), 0 where the episode ended for good and nothing followed, else 1 (also at time-outs).
         next_observations: (n, size), what followed; where the step limit cut the episode, its last observation.
@@ -42,12 +42,20 @@ class ReplayBuffer:
         robots: transitions a step.
         observation_size: numbers in an observation.
         device: where the memory lives.
+        action_size: numbers in an action.
     """
 
-    def __init__(self, capacity: int, robots: int, observation_size: int, device: torch.device) -> None:
+    def __init__(
+        self,
+        capacity: int,
+        robots: int,
+        observation_size: int,
+        device: torch.device,
+        action_size: int = DEFAULT_ACTIONS.size,
+    ) -> None:
         self._slots = -(-capacity // robots)
         self._robots = robots
-        sizes = (observation_size, ACTION_SIZE, 1, 1, observation_size)
+        sizes = (observation_size, action_size, 1, 1, observation_size)
         bounds = np.cumsum((0, *sizes))
         self._columns = tuple(slice(int(a), int(b)) for a, b in pairwise(bounds))
         self._memory = torch.zeros(self._slots, robots, int(bounds[-1]), device=device)

@@ -7,15 +7,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.networks.layout import ACTION_SIZE
-
 
 class Samples(NamedTuple):
     """What PPO learns from, a row for each step of each robot.
 
     Attributes:
         observations: (n, size).
-        actions: (n, 2) as sampled, before the environment clipped them.
+        actions: (n, A) as sampled, before the environment clipped them.
         log_probs: (n,) under the policy that sampled them.
         advantages: (n,) normalised over the rollout.
         returns: (n,) the critic's targets.
@@ -33,16 +31,16 @@ class RolloutStorage:
 
     Attributes:
         observations: (steps + 1, robots, size); the last one is what followed the last action.
-        actions, noise: (steps, robots, 2); the sampled actions and the standard normal noise in them.
+        actions, noise: (steps, robots, A); the sampled actions and the standard normal noise in them.
         rewards: (steps, robots) float32.
         ends: (steps, robots) bool, terminated or truncated.
     """
 
-    def __init__(self, steps: int, robots: int, observation_size: int, device: torch.device) -> None:
+    def __init__(self, steps: int, robots: int, observation_size: int, action_size: int, device: torch.device) -> None:
         self.steps, self.robots, self.device = steps, robots, device
         self.observations = torch.zeros(steps + 1, robots, observation_size, device=device)
-        self.actions = torch.zeros(steps, robots, ACTION_SIZE, device=device)
-        self.noise = torch.zeros(steps, robots, ACTION_SIZE, device=device)
+        self.actions = torch.zeros(steps, robots, action_size, device=device)
+        self.noise = torch.zeros(steps, robots, action_size, device=device)
         self.rewards = np.zeros((steps, robots), np.float32)
         self.ends = np.zeros((steps, robots), np.bool_)
         self._truncations: list[tuple[int, NDArray[np.intp], NDArray[np.float32]]] = []

@@ -3,12 +3,13 @@
 Times are seconds of one clock of the caller's choice; lengths metres, angles radians.
 """
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from .observation import Frames, Reals, Scan, observe, ray_angles, resample
+from .observation import Frames, Reals, Scan, observe, resample, wrap
 from .policy import Floats, Policy, Specification
 
 
@@ -39,7 +40,7 @@ class Safety:
         scan_timeout, odometry_timeout: seconds after which the newest message is stale.
         goal_tolerance: distance to the goal that counts as arrived.
         max_linear_speed, max_angular_speed: limits below the policy's slow it down on the same arc.
-        sensor_yaw: of the LiDAR against the heading.
+        sensor_yaw, second_sensor_yaw: of the x axis of each LiDAR's scan against the heading.
         max_gap: largest angle between a ray of the policy and the beam that stands for it.
     """
 
@@ -52,6 +53,7 @@ class Safety:
     max_linear_speed: float
     max_angular_speed: float
     sensor_yaw: float = 0.0
+    second_sensor_yaw: float = 0.0
     max_gap: float = 0.0873  # 5 degrees
 
     @classmethod
@@ -66,16 +68,20 @@ class Safety:
             goal_tolerance=specification.arrival_distance,
             max_linear_speed=specification.max_linear_speed,
             max_angular_speed=specification.max_angular_speed,
+            sensor_yaw=specification.mounts[0][2],
+            second_sensor_yaw=specification.mounts[-1][2] if len(specification.mounts) > 1 else 0.0,
         )
 
 
 @dataclass(frozen=True)
 class Command:
-    """Velocities to send, m/s and rad/s, and why."""
+    """Velocities to send, m/s and rad/s, and why; of an Ackermann drive the steering angle too, rad."""
 
     linear: float
     angular: float
     state: State
+    lateral: float = 0.0
+    steering: float = 0.0
 
 
 def outline(specification: Specification, angles: Reals) -> Reals:
@@ -97,22 +103,27 @@ class Navigator:
 
     def __init__(self, policy: Policy, safety: Safety) -> None:
         self._policy, self._safety = policy, safety
-        self._rays = ray_angles(policy.specification)
-        self._scan: tuple[float, Scan] | None = None
+        self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
+        self._yaws = (safety.sensor_yaw, safety.second_sensor_yaw)[: len(self._scans)]
         self._pose: tuple[float, tuple[float, float, float]] | None = None
+        self._velocities: tuple[float, float, float] | None = None
         self._goal: tuple[float, float] | None = None
         self._arrived = False
         self._too_near = False
-        self._last_action = np.zeros(2, np.float32)
+        self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
         self._frames = Frames(policy.specification)
+        self._memory = policy.memory(1)
 
-    def set_scan(self, at: float, scan: Scan) -> None:
-        """A scan, measured at that time."""
-        self._scan = (at, scan)
+    def set_scan(self, at: float, scan: Scan, lidar: int = 0) -> None:
+        """A scan of one of the LiDARs, measured at that time."""
+        self._scans[lidar] = (at, scan)
 
-    def set_odometry(self, at: float, x: float, y: float, heading: float) -> None:
-        """The robot's pose in the goal's frame, measured at that time."""
+    def set_odometry(
+        self, at: float, x: float, y: float, heading: float, velocities: tuple[float, float, float] | None = None
+    ) -> None:
+        """The robot's pose in the goal's frame then, and how fast it drives forwards, to the left and turns, if measured."""
         self._pose = (at, (x, y, heading))
+        self._velocities = velocities
 
     def set_goal(self, x: float, y: float) -> None:
         """Where to go."""
@@ -127,7 +138,8 @@ class Navigator:
         state, observation = self._look(now)
         if observation is None:
             return self._stop(state)
-        action = self._policy.actions(observation)[0]
+        actions, self._memory = self._policy.step(observation, self._memory)
+        action = actions[0]
         if not np.isfinite(action).all():
             return self._stop(State.NOT_FINITE)
         return self._drive(action)
@@ -141,52 +153,89 @@ class Navigator:
             return State.NO_ODOMETRY, None
         if now - self._pose[0] > safety.odometry_timeout:
             return State.STALE_ODOMETRY, None
-        if self._scan is None:
-            return State.NO_SCAN, None
-        if now - self._scan[0] > safety.scan_timeout:
-            return State.STALE_SCAN, None
-        pose, goal, scan = np.array(self._pose[1]), np.array(self._goal), self._scan[1]
-        if not (np.isfinite(pose).all() and np.isfinite(goal).all()):
+        scans: list[Scan] = []
+        for newest in self._scans:
+            if newest is None:
+                return State.NO_SCAN, None
+            if now - newest[0] > safety.scan_timeout:
+                return State.STALE_SCAN, None
+            scans.append(newest[1])
+        pose, goal = np.array(self._pose[1]), np.array(self._goal)
+        if not (np.isfinite(pose).all() and np.isfinite(goal).all() and np.isfinite(self._speeds()).all()):
             return State.NOT_FINITE, None
         if np.hypot(*(goal - pose[:2])) < safety.goal_tolerance:
             self._goal, self._arrived = None, True
             return State.ARRIVED, None
-        self._too_near = self._is_too_near(scan)
+        self._too_near = any(self._is_too_near(scan, lidar) for lidar, scan in enumerate(scans))
         if self._too_near:
             return State.TOO_NEAR, None
         specification = self._policy.specification
-        ranges = resample(scan, specification, safety.sensor_yaw, safety.max_gap)
+        ranges = np.concatenate(
+            [resample(scan, specification, self._yaws[lidar], safety.max_gap, lidar) for lidar, scan in enumerate(scans)]
+        )
         if np.isnan(ranges).any():
             return State.BLIND, None
-        frame = observe(specification, ranges[None], pose[None], goal[None], self._last_action[None])
-        return State.DRIVING, self._frames.push(frame)
+        moment = observe(specification, ranges[None], pose[None], goal[None], self._last_action[None], self._speeds()[None])
+        return State.DRIVING, self._frames.push(moment)
 
-    def _is_too_near(self, scan: Scan) -> bool:
-        """Whether a beam is shorter than it may be; once it was, all must clear a margin more."""
+    def _speeds(self) -> Floats:
+        """What the robot does as fractions of its limits, (A,): its speeds as measured, else as last commanded."""
+        if self._velocities is None:
+            return self._last_action
+        forwards, aside, turn = self._velocities
+        specification = self._policy.specification
+        measured = np.array((forwards, turn) if specification.drive == "differential" else (forwards, aside, turn))
+        if specification.drive == "ackermann":  # odometry tells no steering angle
+            measured = np.array((forwards, self._last_action[1] * specification.steering_limit))
+        return np.clip(measured / specification.action_limits, specification.action_lows, 1.0).astype(np.float32)
+
+    def _is_too_near(self, scan: Scan, lidar: int) -> bool:
+        """Whether a beam meets something nearer to the body than may be; once one did, all must clear a margin more."""
         safety = self._safety
         margin = safety.resume_margin if self._too_near else 0.0
-        specification, angles = self._policy.specification, scan.angles(safety.sensor_yaw)
-        ahead = np.abs(angles) <= specification.field_of_view / 2.0 + 1e-6
+        specification, angles = self._policy.specification, scan.angles(self._yaws[lidar])
+        x, y, yaw = specification.mounts[lidar]
+        ahead = np.abs(wrap(angles - yaw)) <= specification.field_of_view / 2.0 + 1e-6
+        distances = scan.distances()
+        if x or y:
+            # As seen from the middle of the body; what is infinitely far stays so.
+            met = np.isfinite(distances)
+            reach = np.where(met, distances, 0.0)
+            meets_x, meets_y = x + reach * np.cos(angles), y + reach * np.sin(angles)
+            angles = np.where(met, np.arctan2(meets_y, meets_x), angles)
+            distances = np.where(met, np.hypot(meets_x, meets_y), distances)
         allowed = np.where(ahead, safety.stop_distance, safety.body_distance)
         if specification.robot_length:
             allowed = np.maximum(allowed, safety.body_distance / specification.robot_radius * outline(specification, angles))
         allowed = allowed + margin
         # Comparisons with nan, an unknown distance, are false.
-        return bool((scan.distances() < allowed).any())
+        return bool((distances < allowed).any())
 
     def _drive(self, action: Floats) -> Command:
+        """The action as velocities, slower on the same arc where a limit asks for it."""
         specification, safety = self._policy.specification, self._safety
-        linear = float(action[0]) * specification.max_linear_speed
-        angular = float(action[1]) * specification.max_angular_speed
+        commands = action.astype(np.float64) * specification.action_limits
+        linear, steering = float(commands[0]), 0.0
+        lateral = float(commands[1]) if specification.drive == "omnidirectional" else 0.0
+        angular = float(commands[-1])
+        if specification.drive == "ackermann":
+            curvature = math.tan(angular) / specification.wheel_base
+            # As in training it steers less where it would turn faster than it may.
+            curvature *= min(1.0, specification.max_angular_speed / max(abs(curvature * linear), 1e-9))
+            angular, steering = linear * curvature, math.atan(curvature * specification.wheel_base)
         slower = min(
             1.0,
-            safety.max_linear_speed / max(linear, 1e-9),
+            safety.max_linear_speed / max(abs(linear), abs(lateral), 1e-9),
             safety.max_angular_speed / max(abs(angular), 1e-9),
         )
-        self._last_action = (action * np.float32(slower)).astype(np.float32)
-        return Command(linear * slower, angular * slower, State.DRIVING)
+        followed = np.full(len(action), slower, np.float32)
+        if specification.drive == "ackermann":
+            followed[1] = 1.0  # an angle, and no speed
+        self._last_action = (action * followed).astype(np.float32)
+        return Command(linear * slower, angular * slower, State.DRIVING, lateral * slower, steering)
 
     def _stop(self, state: State) -> Command:
         self._frames.clear()
-        self._last_action = np.zeros(2, np.float32)
+        self._memory = self._policy.memory(1)
+        self._last_action = np.zeros_like(self._last_action)
         return Command(0.0, 0.0, state)

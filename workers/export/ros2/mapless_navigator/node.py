@@ -1,11 +1,15 @@
-"""The ROS 2 node: LaserScan, Odometry and a goal PoseStamped in, Twist out.
+"""The ROS 2 node: LaserScan, Odometry and a goal PoseStamped in, Twist or AckermannDriveStamped out.
 
 | topic         | type                        |                                                                  |
 |---------------|-----------------------------|------------------------------------------------------------------|
 | `scan`        | sensor_msgs/LaserScan       | in                                                               |
-| `odom`        | nav_msgs/Odometry           | in: the robot's pose                                             |
+| `scan_second` | sensor_msgs/LaserScan       | in: the second LiDAR's, where the policy has two                 |
+| `odom`        | nav_msgs/Odometry           | in: the robot's pose, and its velocities (`measured_speeds`)     |
 | `goal_pose`   | geometry_msgs/PoseStamped   | in: only its position counts; its frame must be the odometry's   |
 | `cmd_vel`     | geometry_msgs/Twist         | out, once per control period while a goal is set, then one stop  |
+
+A policy of an Ackermann drive speaks on `ackermann_cmd` instead, an ackermann_msgs/AckermannDriveStamped: the speed of the
+rear axle and the steering angle.
 
 Everything that is decided is decided in `navigator`; this file translates messages.
 """
@@ -37,18 +41,28 @@ class NavigatorNode(Node):
     def __init__(self) -> None:
         super().__init__("mapless_navigator")
         policy = Policy.load(self._parameter("policy_directory", "") or default_policy_directory())
+        self._measured_speeds = bool(self._parameter("measured_speeds", True))
         self._stamped = bool(self._parameter("stamped_twist", False))
         self._navigator = Navigator(policy, self._safety(Safety.of(policy.specification)))
         self._frame = ""
         self._state: State | None = None
-        message = TwistStamped if self._stamped else Twist
-        self._publisher = self.create_publisher(message, "cmd_vel", 1)
+        self._steers = policy.specification.drive == "ackermann"
+        if self._steers:
+            self._publisher = self.create_publisher(ackermann_message(), "ackermann_cmd", 1)
+        else:
+            self._publisher = self.create_publisher(TwistStamped if self._stamped else Twist, "cmd_vel", 1)
         self.create_subscription(LaserScan, "scan", self.on_scan, qos_profile_sensor_data)
+        if len(policy.specification.mounts) > 1:
+            self.create_subscription(LaserScan, "scan_second", self.on_second_scan, qos_profile_sensor_data)
         self.create_subscription(Odometry, "odom", self.on_odometry, qos_profile_sensor_data)
         self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 1)
         self.create_timer(policy.specification.control_period, self.on_timer)
 
-    def on_scan(self, message: Any) -> None:
+    def on_second_scan(self, message: Any) -> None:
+        """A `LaserScan` of the second LiDAR."""
+        self.on_scan(message, lidar=1)
+
+    def on_scan(self, message: Any, lidar: int = 0) -> None:
         """A `LaserScan`."""
         scan = Scan(
             angle_min=message.angle_min,
@@ -57,13 +71,17 @@ class NavigatorNode(Node):
             range_max=message.range_max,
             ranges=np.asarray(message.ranges, np.float64),
         )
-        self._navigator.set_scan(self._measured_at(message.header.stamp), scan)
+        self._navigator.set_scan(self._measured_at(message.header.stamp), scan, lidar)
 
     def on_odometry(self, message: Any) -> None:
         """An `Odometry`."""
         self._frame = message.header.frame_id
         position, orientation = message.pose.pose.position, message.pose.pose.orientation
-        self._navigator.set_odometry(self._measured_at(message.header.stamp), position.x, position.y, yaw_of(orientation))
+        twist = message.twist.twist
+        velocities = (twist.linear.x, twist.linear.y, twist.angular.z) if self._measured_speeds else None
+        self._navigator.set_odometry(
+            self._measured_at(message.header.stamp), position.x, position.y, yaw_of(orientation), velocities
+        )
 
     def on_goal(self, message: Any) -> None:
         """A goal `PoseStamped`; one in another frame than the odometry's is refused."""
@@ -87,8 +105,14 @@ class NavigatorNode(Node):
 
     def send(self, command: Command) -> None:
         """Publish velocities."""
+        if self._steers:
+            steered = ackermann_message()()
+            steered.header.stamp = self.get_clock().now().to_msg()
+            steered.drive.speed, steered.drive.steering_angle = command.linear, command.steering
+            self._publisher.publish(steered)
+            return
         twist = Twist()
-        twist.linear.x, twist.angular.z = command.linear, command.angular
+        twist.linear.x, twist.linear.y, twist.angular.z = command.linear, command.lateral, command.angular
         if self._stamped:
             stamped = TwistStamped()
             stamped.header.stamp = self.get_clock().now().to_msg()
@@ -112,6 +136,13 @@ class NavigatorNode(Node):
         """When a message was measured: its stamp, unless that is not set or lies ahead of our clock."""
         now, stamped = self._now(), stamp.sec + stamp.nanosec * 1e-9
         return min(now, stamped) if stamped > 0.0 else now
+
+
+def ackermann_message() -> Any:
+    """The type of what an Ackermann drive is sent, from a package that no other robot needs."""
+    from ackermann_msgs.msg import AckermannDriveStamped
+
+    return AckermannDriveStamped
 
 
 def default_policy_directory() -> Path:

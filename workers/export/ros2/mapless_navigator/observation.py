@@ -1,16 +1,22 @@
 """Makes the policy's observation from a scan, a pose and a target: the numbers that the simulator gave it in training.
 
-| numbers     | 'improved'                                       | 'paper'                              |
-|-------------|--------------------------------------------------|--------------------------------------|
-| 0 ...       | near / max(nearest ray of the batch, near)       | nearest ray of the batch / range     |
-| batches     | last linear velocity / its limit                 | the same                             |
-| batches + 1 | last angular velocity / its limit                | the same                             |
-| batches + 2 | d / (d + 1), d the distance to the target        | d / diagonal of the arena            |
-| batches + 3 | bearing / pi (target against heading, left +)    | (direction mod 2 pi) / 2 pi          |
-| batches + 4 | heading / pi                                     | (heading mod 2 pi) / 2 pi            |
-| batches + 5 | |bearing| / pi                                   | the same                             |
+| part                   | its numbers, newest moment                                                 |
+|------------------------|----------------------------------------------------------------------------|
+| `ranges`               | nearest ray of each batch / range                                          |
+| `inverse_ranges`       | near / max(nearest ray of each batch, near)                                |
+| `speeds`               | each velocity, or the steering angle, in the last step / its limit         |
+| `actions`              | the same as it was commanded last                                          |
+| `distance`             | d / (d + 1), d the distance to the target                                  |
+| `distance_of_diagonal` | d / diagonal of the arena                                                  |
+| `direction`            | (direction mod 2 pi) / 2 pi                                                |
+| `bearing`              | bearing / pi (target against heading, left +)                              |
+| `bearing_sine_cosine`  | sine and cosine of the bearing                                             |
+| `heading`              | heading / pi                                                               |
+| `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
+| `deviation`            | |bearing| / pi                                                             |
 
-Rays go from right to left. Poses and targets stand in one fixed frame (the odometry's), whose x axis is heading 0.
+Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
+x axis is heading 0.
 """
 
 from dataclasses import dataclass
@@ -18,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .policy import Floats, Specification
+from .policy import Floats, Part, Specification
 
 Reals = NDArray[np.float64]
 
@@ -32,7 +38,7 @@ def wrap(angles: ArrayLike) -> Reals:
 
 
 def ray_angles(specification: Specification) -> Reals:
-    """Angles of the policy's rays against the heading, (rays,) radians, from right to left.
+    """Angles of the policy's rays against where a LiDAR looks, (rays,) radians, from right to left.
 
     The first and the last stand on the edges of the field of view; in a full circle, where both edges are one direction, the
     last is left out.
@@ -43,57 +49,80 @@ def ray_angles(specification: Specification) -> Reals:
 
 
 def observe(
-    specification: Specification, ranges: ArrayLike, poses: ArrayLike, targets: ArrayLike, last_actions: ArrayLike
+    specification: Specification,
+    ranges: ArrayLike,
+    poses: ArrayLike,
+    targets: ArrayLike,
+    last_actions: ArrayLike,
+    speeds: ArrayLike | None = None,
 ) -> Floats:
-    """What n robots see at one moment: the whole observation where no frames are stacked, else see `Frames`.
+    """What n robots see at one moment: the whole observation where nothing earlier is seen, else see `Frames`.
 
     Args:
         specification: the policy's.
-        ranges: (n, rays) metres along `ray_angles`, at most the policy's range.
+        ranges: (n, scan) metres along `ray_angles` of each LiDAR, at most the policy's range.
         poses: (n, 3) x, y in metres and heading in radians.
         targets: (n, 2) x, y in metres, in the same frame.
-        last_actions: (n, 2) what was last commanded, as fractions of the speed limits.
+        last_actions: (n, A) what was last commanded, as fractions of the limits.
+        speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
 
     Returns:
-        (n, batches + 6).
+        (n, numbers of the newest moment).
     """
     pose, target = np.asarray(poses, np.float64), np.asarray(targets, np.float64)
-    scan = np.asarray(ranges, np.float64)
-    nearest = scan.reshape(len(scan), specification.batches, -1).min(axis=2)
     offset = target - pose[:, :2]
     distance = np.hypot(offset[:, 0], offset[:, 1])
     direction = np.arctan2(offset[:, 1], offset[:, 0])
     heading = wrap(pose[:, 2])
     bearing = wrap(direction - heading)
-    if specification.observation == "paper":
-        seen = nearest / specification.range
-        goal = (distance / specification.diagonal, direction % _TURN / _TURN, heading % _TURN / _TURN)
-    else:
-        seen = specification.near / np.maximum(nearest, specification.near)
-        goal = (distance / (distance + 1.0), bearing / np.pi, heading / np.pi)
-    columns = (seen, np.asarray(last_actions, np.float64), np.stack((*goal, np.abs(bearing) / np.pi), axis=1))
-    return np.concatenate(columns, axis=1).astype(np.float32)
+    told = {
+        "speeds": np.asarray(last_actions if speeds is None else speeds, np.float64),
+        "actions": np.asarray(last_actions, np.float64),
+        "distance": distance / (distance + 1.0),
+        "distance_of_diagonal": distance / specification.diagonal,
+        "direction": direction % _TURN / _TURN,
+        "bearing": bearing / np.pi,
+        "bearing_sine_cosine": np.stack((np.sin(bearing), np.cos(bearing)), axis=1),
+        "heading": heading / np.pi,
+        "heading_turn": heading % _TURN / _TURN,
+        "deviation": np.abs(bearing) / np.pi,
+    }
+    scan = np.asarray(ranges, np.float64)
+    columns = [
+        _seen(specification, part, scan) if part.kind in ("ranges", "inverse_ranges") else told[part.kind]
+        for part in specification.parts
+    ]
+    return np.concatenate([column.reshape(len(pose), -1) for column in columns], axis=1).astype(np.float32)
+
+
+def _seen(specification: Specification, part: Part, scan: Reals) -> Reals:
+    """A scan (n, rays) as the policy sees it, (n, batches)."""
+    nearest: Reals = scan.reshape(len(scan), part.size, -1).min(axis=2)
+    if part.kind == "ranges":
+        return nearest / specification.range
+    return specification.near / np.maximum(nearest, specification.near)
 
 
 class Frames:
-    """Stacks what was seen at the latest moments, the newest first; a way begins with its first frame repeated.
+    """Puts what was seen at earlier moments behind the newest; a way begins with its first moment repeated.
 
     Args:
         specification: the policy's.
     """
 
     def __init__(self, specification: Specification) -> None:
-        self._frames = specification.frames
-        self._seen: list[Floats] = []
+        self._repeated, self._carried = list(specification.repeated), list(specification.carried)
+        self._last: Floats | None = None
 
-    def push(self, frame: Floats) -> Floats:
-        """The observation (n, frames * size) after the newest frame (n, size), one control period after the last."""
-        self._seen = [frame, *(self._seen or [frame] * self._frames)][: self._frames]
-        return np.concatenate(self._seen, axis=1)
+    def push(self, newest: Floats) -> Floats:
+        """The observation (n, size) after the newest moment (n, its numbers), one control period after the last."""
+        earlier = newest[:, self._repeated] if self._last is None else self._last[:, self._carried]
+        self._last = np.concatenate((newest, earlier), axis=1)
+        return self._last
 
     def clear(self) -> None:
         """Forget what was seen: a new way begins."""
-        self._seen = []
+        self._last = None
 
 
 @dataclass(frozen=True)
@@ -129,7 +158,7 @@ class Scan:
         return np.where(np.isneginf(ranges), 0.0, distances)
 
 
-def resample(scan: Scan, specification: Specification, sensor_yaw: float, max_gap: float) -> Reals:
+def resample(scan: Scan, specification: Specification, sensor_yaw: float, max_gap: float, lidar: int = 0) -> Reals:
     """The policy's rays (rays,), each the known beam nearest to it in angle, cut at the policy's range.
 
     Args:
@@ -137,10 +166,11 @@ def resample(scan: Scan, specification: Specification, sensor_yaw: float, max_ga
         specification: the policy's.
         sensor_yaw: of the sensor against the heading, radians.
         max_gap: largest angle between a ray and its beam, radians; a ray without a beam that near is nan.
+        lidar: which of the policy's LiDARs the sensor stands for.
     """
     angles, distances = scan.angles(sensor_yaw), scan.distances()
     known = ~np.isnan(distances)
-    rays = ray_angles(specification)
+    rays = ray_angles(specification) + specification.mounts[lidar][2]
     if not known.any():
         return np.full(len(rays), np.nan)
     order = np.argsort(angles[known], kind="stable")
