@@ -2,11 +2,13 @@
 
 from math import prod
 
+from sim.actions import action_layout
 from sim.observations import observation_size
 from workers.checkpoints import MAX_STATE_BYTES
 from workers.config import OffPolicyConfig, TrainingConfig
 from workers.errors import MemoryTooLargeError
-from workers.networks.layout import ACTION_SIZE, weight_shapes
+from workers.networks.inputs import inputs_of
+from workers.networks.layout import known_shapes
 
 _NUMBER_BYTES = 4
 # A reward, and whether something followed.
@@ -30,9 +32,10 @@ def replay_bytes(training: TrainingConfig) -> int:
 
 
 def archive_bytes(training: TrainingConfig) -> int:
-    """Bytes of the training's largest archive, at most."""
-    shapes = weight_shapes(training.algorithm.network, observation_size(training.task) + ACTION_SIZE)
-    networks = _NETWORK_COPIES * _NUMBER_BYTES * sum(map(prod, shapes.values()))
+    """Bytes of the training's largest archive, at most; without the weights of a network that only its module knows."""
+    actions = action_layout(training.task.robot)
+    shapes = known_shapes(training.algorithm.network, inputs_of(training.task).and_also(actions.size), actions)
+    networks = _NETWORK_COPIES * _NUMBER_BYTES * sum(map(prod, (shapes or {}).values()))
     return replay_bytes(training) + networks + _FIXED_BYTES + _ROBOT_BYTES * training.algorithm.robots
 
 
@@ -53,11 +56,11 @@ def refuse_too_large(training: TrainingConfig, max_bytes: int = MAX_STATE_BYTES)
     fits = max(0, limit - (archive_bytes(training) - replay)) // _transition_bytes(training) // 1_000 * 1_000
     raise MemoryTooLargeError(
         f"checkpoints with this memory may have {archive_bytes(training) / 2**20:,.0f} MiB, {limit / 2**20:,.0f} are taken: "
-        f"keep at most {fits:,} transitions, or make observations smaller (fewer LiDAR batches, fewer frames)"
+        f"keep at most {fits:,} transitions, or make observations smaller (fewer batches of rays, fewer frames)"
     )
 
 
 def _transition_bytes(training: TrainingConfig) -> int:
     observation = observation_size(training.task)
-    row = _NUMBER_BYTES * (observation + ACTION_SIZE + _OUTCOME_NUMBERS) + 1
+    row = _NUMBER_BYTES * (observation + action_layout(training.task.robot).size + _OUTCOME_NUMBERS) + 1
     return row + -(-_NUMBER_BYTES * observation // _STEPS_PER_EPISODE)

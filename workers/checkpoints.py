@@ -15,6 +15,7 @@ compressed (nothing can inflate), known by name, bounded in size, and compared w
 
 import errno
 import hashlib
+import json
 import os
 import struct
 import tempfile
@@ -27,14 +28,17 @@ from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
 
-from workers.errors import ArchiveFormatError, ArchiveIntegrityError
+from sim.actions import action_layout
+from sim.extending.discovery import UsedExtension, missing, versions, wording
+from workers.errors import ArchiveExtensionError, ArchiveFormatError, ArchiveIntegrityError
 from workers.manifest import MANIFEST, POLICY, STATE_ARRAYS, STATE_COUNTERS, FileEntry, Manifest, TrainingCounters
-from workers.networks.layout import weight_shapes
+from workers.networks.inputs import inputs_of
+from workers.networks.layout import policy_shapes
 from workers.policy import Policy
 
 Arrays = Mapping[str, NDArray[np.generic]]
@@ -43,6 +47,8 @@ Arrays = Mapping[str, NDArray[np.generic]]
 MAX_STATE_BYTES = 2**31
 """What only a resume needs, a replay memory above all, at most."""
 _SIZE_LIMITS = {MANIFEST: 2**20, POLICY: 2**26, STATE_ARRAYS: MAX_STATE_BYTES, STATE_COUNTERS: 2**16}
+
+_EXTENSIONS = TypeAdapter(tuple[UsedExtension, ...])
 
 _BLOCK = 256 * 1024
 
@@ -128,7 +134,9 @@ def read_policy(path: Path) -> tuple[Manifest, Policy]:
     """
     with _open(path, path.name) as archive:
         manifest = _manifest(archive)
-        return manifest, Policy(manifest.training.algorithm.network, _weights(archive, manifest))
+        training, actions = manifest.training, action_layout(manifest.training.task.robot)
+        weights = _weights(archive, manifest)
+        return manifest, Policy(training.algorithm.network, weights, inputs_of(training.task), actions)
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -197,12 +205,26 @@ def _open(source: Path | IO[bytes], name: str) -> Iterator[zipfile.ZipFile]:
 
 
 def _manifest(archive: zipfile.ZipFile) -> Manifest:
+    document = archive.read(MANIFEST)
     try:
-        return Manifest.model_validate_json(archive.read(MANIFEST))
+        return Manifest.model_validate_json(document)
     except ValidationError as error:
+        if lacking := missing(_extensions_in(document), versions()):
+            sources = "".join(f" ({one.source})" for one in lacking if one.source)
+            raise ArchiveExtensionError(
+                f"this policy needs {wording(lacking)}, which is not installed here: install it{sources}, and try again"
+            ) from None
         raise ArchiveFormatError(
             f"{MANIFEST} is not as this release knows it; a newer release may have written it: {error}"
         ) from error
+
+
+def _extensions_in(document: bytes) -> tuple[UsedExtension, ...]:
+    """The extensions that a manifest names, whatever else cannot be read of it."""
+    try:
+        return _EXTENSIONS.validate_python(json.loads(document)["training"]["extensions"])
+    except (ValidationError, ValueError, LookupError, TypeError):
+        return ()
 
 
 def _member(archive: zipfile.ZipFile, manifest: Manifest, name: str) -> bytes:
@@ -225,7 +247,8 @@ def _arrays(data: bytes, name: str) -> dict[str, NDArray[np.generic]]:
 
 def _weights(archive: zipfile.ZipFile, manifest: Manifest) -> dict[str, NDArray[np.float32]]:
     weights = _arrays(_member(archive, manifest, POLICY), POLICY)
-    expected = weight_shapes(manifest.training.algorithm.network, len(manifest.observation.numbers))
+    training, actions = manifest.training, action_layout(manifest.training.task.robot)
+    expected = policy_shapes(training.algorithm.network, inputs_of(training.task), actions)
     found = {name: array.shape for name, array in weights.items()}
     if found != expected or any(array.dtype != np.float32 for array in weights.values()):
         raise ArchiveIntegrityError(f"{POLICY} does not hold the float32 arrays of its network: {expected}")

@@ -116,7 +116,7 @@ def train(
     observation: Annotated[str | None, typer.Option(help="improved or paper.")] = None,
     reward: Annotated[str | None, typer.Option(help="basic, clearance or alignment.")] = None,
     algorithm: Annotated[str | None, typer.Option(help="ppo, ddpg, td3 or sac.")] = None,
-    network: Annotated[str | None, typer.Option(help="mlp or resblock.")] = None,
+    network: Annotated[str | None, typer.Option(help="mlp, resblock, or another that is known.")] = None,
     steps: Annotated[int | None, typer.Option(help="Environment steps of all robots together.")] = None,
     seed: Annotated[int, typer.Option(help="Of weights, exploration and environment.")] = 0,
     out: Annotated[Path, typer.Option(help="Directory for the checkpoints.")] = Path("checkpoints"),
@@ -141,7 +141,7 @@ def train(
         with Progress(BarColumn(), *map(TextColumn, columns), TimeRemainingColumn(), console=_console) as progress:
             reporter = ConsoleReporter(progress, training.steps)
             signal.signal(signal.SIGINT, reporter.request_stop)
-            outcome = run(training, seed, reporter, out, resume)
+            outcome = run(training.as_installed(), seed, reporter, out, resume)
     except ValidationError as error:
         lines = (f"  {'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
         _fail("\n".join(("not a valid training:", *lines)))
@@ -152,23 +152,35 @@ def train(
 
 @app.command()
 def evaluate(
-    checkpoints: Annotated[list[Path], typer.Argument(help="Checkpoint archives.", exists=True, dir_okay=False)],
+    checkpoints: Annotated[
+        list[Path] | None, typer.Argument(help="Checkpoint archives.", exists=True, dir_okay=False)
+    ] = None,
     suite: Annotated[
         str | None, typer.Option(help="A suite by name; that of each checkpoint's own task without it.")
     ] = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(help="In place of checkpoints: random, go-to-goal, dynamic-window, or one of an extension's."),
+    ] = None,
 ) -> None:
-    """Drive each checkpoint's policy through a frozen suite and print how it did.
+    """Drive each checkpoint's policy, or a baseline, through a frozen suite and print how it did.
 
     The 95 % interval of a checkpoint is over the episodes of its one policy (exact). Where the checkpoints are several seeds
     of one training, a last line has the interval over seeds (Student's t), of the newest checkpoint of each.
     """
+    if (baseline is None) == (not checkpoints):
+        _fail("name checkpoints, or a --baseline and its --suite")
     try:
+        if baseline is not None:
+            _evaluate_baseline(baseline, suite or "complex-200")
+            return
         from sim.suites import load_suite, suite_for
         from workers.checkpoints import read_policy
         from workers.training.evaluation import evaluate as run
 
         newest: dict[int, tuple[int, EvaluationResult]] = {}
         alike = set()
+        assert checkpoints
         for checkpoint in checkpoints:
             manifest, policy = read_policy(checkpoint)
             task = manifest.training.task
@@ -181,11 +193,25 @@ def evaluate(
         if len(alike) == 1 and len(newest) > 1:
             seeds = [result for _, (_, result) in sorted(newest.items())]
             _console.print(describe_seeds(seeds), highlight=False, markup=False, soft_wrap=True)
+    except ValidationError as error:
+        _fail("\n".join(problem["msg"] for problem in error.errors()))
     except (WorkerError, SimError, KeyError) as error:
         _fail(str(error.args[0]))
 
 
 app.command()(reproduce)
+
+
+def _evaluate_baseline(name: str, suite: str) -> None:
+    """A baseline with its defaults and the default robot, on a frozen suite."""
+    from sim.baselines.named import BASELINES, controller_of
+    from sim.config import TaskConfig
+    from sim.suites import load_suite, run_controller
+    from workers.training.evaluation import to_result
+
+    task, places = TaskConfig(), load_suite(suite)
+    table = run_controller(controller_of(BASELINES.validate_python({"name": name}), task), task, places)
+    _console.print(describe(to_result(table, places)), highlight=False, markup=False, soft_wrap=True)
 
 
 def _changes(

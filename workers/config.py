@@ -1,40 +1,19 @@
 """What a training is: algorithm, network and budget, from the form to the file inside a checkpoint (pydantic only)."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from sim.config import ADVANCED, HIDDEN, Frozen, TaskConfig
-
-
-class ResBlockNetwork(Frozen):
-    """The paper's network (tables 'PPO Critic network structure details'): two residual concatenations, 512 wide."""
-
-    name: Literal["resblock"] = Field("resblock", title="ResBlock")
-
-
-class MlpNetwork(Frozen):
-    """A plain multi-layer perceptron."""
-
-    name: Literal["mlp"] = Field("mlp", title="MLP")
-    hidden_sizes: tuple[int, ...] = Field(
-        (64, 64),
-        min_length=1,
-        max_length=4,
-        title="Hidden layers",
-        description="Units of each hidden layer, 4 to 1024.",
-        json_schema_extra=ADVANCED,
-    )
-    activation: Literal["relu", "tanh"] = Field("relu", title="Activation", json_schema_extra=ADVANCED)
-
-    @model_validator(mode="after")
-    def _sizes_in_range(self) -> "MlpNetwork":
-        if any(not 4 <= size <= 1024 for size in self.hidden_sizes):
-            raise ValueError("every hidden layer needs between 4 and 1024 units")
-        return self
-
-
-Network = Annotated[ResBlockNetwork | MlpNetwork, Field(discriminator="name")]
+from sim.extending.discovery import MAX_EXTENSIONS, UsedExtension, added, complete, used_by, with_added
+from workers.extending.parts import Algorithm as AddedAlgorithm
+from workers.networks.config import ConvNetwork as ConvNetwork
+from workers.networks.config import GruNetwork as GruNetwork
+from workers.networks.config import MlpNetwork as MlpNetwork
+from workers.networks.config import Network as Network
+from workers.networks.config import NetworkConfig as NetworkConfig
+from workers.networks.config import RecurrentNetworkConfig as RecurrentNetworkConfig
+from workers.networks.config import ResBlockNetwork as ResBlockNetwork
 
 
 class PpoConfig(Frozen):
@@ -57,6 +36,7 @@ class PpoConfig(Frozen):
         title="Rollout",
         description="Steps of each robot between two updates.",
         json_schema_extra=ADVANCED,
+        validate_default=True,
     )
     epochs: int = Field(6, ge=1, le=50, title="Epochs", description="Passes over each rollout.", json_schema_extra=ADVANCED)
     minibatch_size: int = Field(1024, ge=16, le=65_536, title="Minibatch", json_schema_extra=ADVANCED, validate_default=True)
@@ -82,6 +62,14 @@ class PpoConfig(Frozen):
         json_schema_extra=ADVANCED,
     )
 
+    @field_validator("rollout_steps")
+    @classmethod
+    def _is_whole_sequences(cls, value: int, info: ValidationInfo) -> int:
+        network = info.data.get("network")
+        if isinstance(network, RecurrentNetworkConfig) and value % network.sequence_length:
+            raise ValueError(f"with this network a multiple of its sequences, of {network.sequence_length} steps each")
+        return value
+
     @field_validator("minibatch_size")
     @classmethod
     def _fits_into_a_rollout(cls, value: int, info: ValidationInfo) -> int:
@@ -91,6 +79,9 @@ class PpoConfig(Frozen):
                 f"at most {robots * steps} here, which is a whole rollout ({robots} robots x {steps} steps): "
                 "lower it, or take more robots or a longer rollout"
             )
+        network = info.data.get("network")
+        if isinstance(network, RecurrentNetworkConfig) and value < network.sequence_length:
+            raise ValueError(f"at least {network.sequence_length} here, which is a sequence of this network")
         return value
 
 
@@ -140,6 +131,15 @@ class OffPolicyConfig(Frozen):
     reward_scale: float = Field(
         0.01, gt=0.0, le=100.0, title="Reward scale", description="Multiplies rewards.", json_schema_extra=ADVANCED
     )
+
+    @field_validator("network")
+    @classmethod
+    def _remembers_nothing(cls, value: NetworkConfig) -> NetworkConfig:
+        if value.recurrent:
+            raise ValueError(
+                "recurrent networks are for PPO: what this algorithm replays has no memory; take another network"
+            )
+        return value
 
 
 class _DeterministicConfig(OffPolicyConfig):
@@ -200,7 +200,30 @@ class SacConfig(OffPolicyConfig):
     )
 
 
-Algorithm = Annotated[PpoConfig | DdpgConfig | Td3Config | SacConfig, Field(discriminator="name")]
+class AddedAlgorithmConfig(AddedAlgorithm):
+    """What every algorithm of an extension has besides its own fields."""
+
+    network: Network = Field(default_factory=MlpNetwork, title="Network")
+    robots: int = Field(
+        64,
+        ge=1,
+        le=4096,
+        title="Robots",
+        description="Robots that collect experience side by side.",
+        json_schema_extra=ADVANCED,
+    )
+
+
+if TYPE_CHECKING:
+    Algorithm = PpoConfig | DdpgConfig | Td3Config | SacConfig | AddedAlgorithmConfig
+else:
+    Algorithm = Annotated[
+        with_added(
+            PpoConfig | DdpgConfig | Td3Config | SacConfig,
+            [complete(algorithm, AddedAlgorithmConfig) for algorithm in added(AddedAlgorithm)],
+        ),
+        Field(discriminator="name"),
+    ]
 
 
 class EvaluationConfig(Frozen):
@@ -254,3 +277,14 @@ class TrainingConfig(Frozen):
     device: Literal["auto", "cpu", "cuda"] = Field(
         "cpu", title="Device", description="Small networks train fastest on a CPU core.", json_schema_extra=ADVANCED
     )
+    extensions: tuple[UsedExtension, ...] = Field(
+        (),
+        max_length=MAX_EXTENSIONS,
+        title="Extensions",
+        description="Whose parts it is made of, as they were when it was launched.",
+        json_schema_extra=HIDDEN,
+    )
+
+    def as_installed(self) -> "TrainingConfig":
+        """The same with the extensions that it needs as they are installed here: what is launched."""
+        return self.model_copy(update={"extensions": used_by(self)})

@@ -1,12 +1,14 @@
 """The errors of this package, one tree; every message says what to do next.
 
-WorkerError
+WorkerError (a sim.errors.MaplessError)
 ├── TrainingError          a training cannot go on
 │   ├── NonFiniteError     its weights are no longer numbers
-│   └── MemoryTooLargeError    its checkpoints would be larger than anybody takes
+│   ├── MemoryTooLargeError    its checkpoints would be larger than anybody takes
+│   └── NetworkError       its network's module is not one that can be trained
 ├── CampaignError          the paper's reproduction does not go on here and now
 │   ├── InterruptedCampaignError  it was asked to stop, or a process was killed: it can be continued
 │   └── OtherTrainingError        its directory is that of another campaign
+├── FrameError             bytes are no frame of the live view
 ├── ExportError            a policy cannot be taken to another format
 ├── UnknownPolicyError     there is no such shipped policy
 ├── EpisodesTooLongError   episodes do not fit into memory to be replayed
@@ -17,6 +19,7 @@ WorkerError
 ├── ArchiveError           a checkpoint archive is refused
 │   ├── ArchiveFormatError       not an archive of this project, or of a newer version
 │   ├── ArchiveIntegrityError    its content is not what its manifest says
+│   ├── ArchiveExtensionError    it needs an extension that is not installed
 │   └── ArchiveMismatchError     it belongs to another training
 └── ServerError            the server does not do what a worker asks of it
     ├── ServerUnavailableError   not reached, or not able to answer: ask again later
@@ -25,8 +28,10 @@ WorkerError
     └── RequestRefusedError      it would refuse the same request again
 """
 
+from sim.errors import MaplessError
 
-class WorkerError(Exception):
+
+class WorkerError(MaplessError):
     """Base of every error that this package raises on purpose."""
 
 
@@ -42,6 +47,10 @@ class MemoryTooLargeError(TrainingError):
     """The replay memory of a training makes checkpoints that nobody could take or read."""
 
 
+class NetworkError(TrainingError):
+    """The module of a network is not one that can be trained, saved and resumed."""
+
+
 class CampaignError(WorkerError):
     """The paper's reproduction does not go on here and now."""
 
@@ -52,6 +61,10 @@ class InterruptedCampaignError(CampaignError):
 
 class OtherTrainingError(CampaignError):
     """A folder of a campaign holds a training with other settings."""
+
+
+class FrameError(WorkerError):
+    """The bytes are not a frame of this version."""
 
 
 class ExportError(WorkerError):
@@ -92,6 +105,10 @@ class ArchiveFormatError(ArchiveError):
 
 class ArchiveIntegrityError(ArchiveError):
     """The content of an archive is not what its manifest promises."""
+
+
+class ArchiveExtensionError(ArchiveError):
+    """An archive was made with an extension that is not installed here; the message says which, and how to get it."""
 
 
 class ArchiveMismatchError(ArchiveError):

@@ -8,16 +8,14 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from workers.errors import FrameError
+
 ViewMode = Literal["training", "policy"]
 
 # version, mode, movers, robots, rays, arena, step, seconds of simulated time, seconds of simulated time per wall second
 _HEADER = struct.Struct("<BBBHHHQdf")
 _VERSION = 4
 _MODES: tuple[ViewMode, ...] = ("training", "policy")
-
-
-class FrameError(ValueError):
-    """The bytes are not a frame of this version."""
 
 
 @dataclass(frozen=True, slots=True)

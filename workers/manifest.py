@@ -42,15 +42,15 @@ class NetworkLayout(Frozen):
     """How the policy's arrays make actions.
 
     Attributes:
-        name: `mlp` or `resblock`.
+        name: of the network.
         layers: prefixes of the arrays 'prefix.weight' (outputs, inputs) and 'prefix.bias' (outputs,), in order.
-        activation: applied to hidden layers.
+        activation: applied to hidden layers; empty, as `layers` is, where only an ONNX graph says what is computed.
         formula: the whole computation, with x the observation, 'layer(x)' = weight @ x + bias.
     """
 
-    name: Literal["mlp", "resblock"]
+    name: str
     layers: tuple[str, ...]
-    activation: Literal["relu", "tanh", "leaky_relu"]
+    activation: Literal["relu", "tanh", "leaky_relu", ""]
     formula: tuple[str, ...]
 
 

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from sim.config import ArenaConfig, Frozen, TaskConfig
+from sim.config import ArenaConfig, Frozen, ObservationConfig, TaskConfig
 from workers.config import (
     DdpgConfig,
     EvaluationConfig,
@@ -69,7 +69,7 @@ PAPER = Preset(
     title="Paper settings",
     description="ResBlock PPO on the observation and the basic reward as published, at the published learning rate.",
     training=TrainingConfig(
-        task=TaskConfig(observation="paper"),
+        task=TaskConfig(observation=ObservationConfig.preset("paper")),
         algorithm=paper_ppo(ResBlockNetwork()),
         steps=600_000,
     ),

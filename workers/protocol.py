@@ -15,6 +15,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, StringConstraints, TypeAdapter
 
 from sim.config import Frozen
+from sim.extending.discovery import MAX_EXTENSIONS, installed
 from workers.config import TrainingConfig
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
@@ -90,6 +91,32 @@ def queues_of(training: TrainingConfig, began_on: str | None = None) -> tuple[Qu
     return ("gpu",) if device == "cuda" else ("cpu",)
 
 
+class ExtensionState(Frozen):
+    """An extension that was found where a worker, or the service, runs.
+
+    Attributes:
+        name: of the extension.
+        version: of the extension; None where it is refused.
+        refused: why it is not used; None where it is.
+    """
+
+    name: str = Field(max_length=100)
+    version: str | None = Field(None, max_length=40)
+    refused: Text | None = None
+
+
+Extensions = Annotated[tuple[ExtensionState, ...], Field(max_length=2 * MAX_EXTENSIONS)]
+"""All that were found."""
+
+
+def found_extensions() -> Extensions:
+    """The extensions of this environment."""
+    found = installed()
+    there = [ExtensionState(name=one.name, version=one.version) for one in found.extensions]
+    refused = [ExtensionState(name=one.name[:100], refused=one.reason[:MAX_TEXT]) for one in found.refused[:MAX_EXTENSIONS]]
+    return (*there, *refused)
+
+
 class ClaimRequest(Frozen):
     """A worker wants to run a training.
 
@@ -99,12 +126,14 @@ class ClaimRequest(Frozen):
         claim_id: chosen by the worker, new for each run that it takes up: asked again under the same id, because the answer
             got lost, the server grants the same attempt once more. None claims anew each time.
         queue: that it works for, which says on what it trains.
+        extensions: that it has.
     """
 
     worker: WorkerName
     published_attempt: int = Field(ge=0)
     claim_id: str | None = Field(None, pattern="^[0-9a-f]{32}$")
     queue: Queue = "cpu"
+    extensions: Extensions = ()
 
 
 class CheckpointReference(Frozen):
@@ -140,12 +169,14 @@ class Heartbeat(Frozen):
     Attributes:
         trouble: why it takes up no run now; None while it does.
         first: since it was started; what was asked of an earlier worker of its name is not asked of it.
+        extensions: that it has.
     """
 
     worker: WorkerName
     queue: Queue
     trouble: str | None = Field(None, max_length=10_000)
     first: bool = False
+    extensions: Extensions = ()
 
 
 class HeartbeatAnswer(Frozen):

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from sim.config import FormulaTerm
+from sim.extending.parts import RewardTerm as AddedTerm
 from sim.observations import observation_size
-from workers.config import PpoConfig, TrainingConfig
+from workers.config import OffPolicyConfig, TrainingConfig
 from workers.diagnoses.history import MIN_POINTS, History
 from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
 
@@ -155,16 +157,16 @@ def _value_diagnosis(history: History, explanation: str, evidence: tuple[Evidenc
 
 
 def largest_value(training: TrainingConfig) -> float | None:
-    """Largest size that a discounted return of off-policy learning can have, in scaled rewards; None for PPO.
+    """Largest size that a discounted return of off-policy learning can have, in scaled rewards; None for others.
 
     The largest reward of a step, at every step for ever: r / (1 - gamma). None, too, where a formula of one's own may be of
     any size.
     """
     algorithm, task = training.algorithm, training.task
-    if isinstance(algorithm, PpoConfig):
+    if not isinstance(algorithm, OffPolicyConfig):
         return None
     robot, terms = task.robot, {term.name: term for term in task.reward.terms}
-    if "formula" in terms:
+    if any(isinstance(term, FormulaTerm | AddedTerm) for term in task.reward.terms):
         return None
     at_end = max(abs(task.reward.weight(name)) for name in ("arrival", "collision", "timeout"))
     on_the_way = {
@@ -215,9 +217,10 @@ def _if_known(history: History, name: str, expected: str) -> tuple[Evidence, ...
 
 def _learning_rate(training: TrainingConfig) -> str:
     algorithm = training.algorithm
-    if isinstance(algorithm, PpoConfig):
-        return f"now {algorithm.learning_rate:g}"
-    return f"now {algorithm.actor_learning_rate:g} for the actor, {algorithm.critic_learning_rate:g} for the critic"
+    if isinstance(algorithm, OffPolicyConfig):
+        return f"now {algorithm.actor_learning_rate:g} for the actor, {algorithm.critic_learning_rate:g} for the critic"
+    rate = getattr(algorithm, "learning_rate", None)  # an algorithm of an extension may call it otherwise
+    return "as it is now" if rate is None else f"now {rate:g}"
 
 
 LEARNING_RULES: tuple[Rule, ...] = (not_finite, constant_observations, kl_exploded, value_diverges, entropy_collapsed)

@@ -18,7 +18,7 @@ STATISTICS = 4
 
 
 @kernel(allocates=True)
-def differentiate(actor, critic, samples, minibatch, at_once, log_std, clip_range, by_log_std, statistics):
+def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, clip_range, by_log_std, statistics):
     """Overwrite the gradients of both networks' parameters.
 
     Some rows at a time are gathered, and go through both networks forward and backward while a core's cache holds them.
@@ -29,23 +29,24 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, clip_rang
         samples: the arrays of `workers.algorithms.storage.rollout.Samples`, in their order.
         minibatch: (n,) rows of the samples.
         at_once: rows, at most as many as both networks have buffers for.
-        log_std: (2,).
+        log_std: (A,).
+        lows: (A,) lowest of each component of an action, see `differentiate_policy_loss`.
         clip_range: how far the ratio may go from 1.
-        by_log_std: (2,) float64, added to: derivative of the loss by the log deviations.
+        by_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: `STATISTICS`.
     """
     all_observations, all_actions, all_log_probs, all_advantages, all_returns = samples
     size = minibatch.shape[0]
     share = 1.0 / size
-    by_logits, by_values = np.empty((at_once, 2), np.float32), np.empty((at_once, 1), np.float32)
+    by_logits, by_values = np.empty((at_once, lows.shape[0]), np.float32), np.empty((at_once, 1), np.float32)
     for first in range(0, size, at_once):
         some = minibatch[first : first + at_once]
         rows, again = some.shape[0], first > 0
         observations = all_observations[some]
         logits = forward(actor, observations, again)
         differentiate_policy_loss(
-            logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, clip_range, share,
-            by_logits, by_log_std, statistics,
+            logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, lows, clip_range,
+            share, by_logits, by_log_std, statistics,
         )  # fmt: skip
         backward(actor, observations, by_logits[:rows], again)
         values = forward(critic, observations, again)
@@ -53,53 +54,65 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, clip_rang
         backward(critic, observations, by_values[:rows], again)
 
 
-@kernel()
+@kernel(allocates=True)
 def differentiate_policy_loss(
-    logits, actions, log_probs, advantages, log_std, clip_range, share, by_logits, by_log_std, statistics
+    logits, actions, log_probs, advantages, log_std, lows, clip_range, share, by_logits, by_log_std, statistics
 ):
     """The clipped surrogate (Schulman et al. 2017, Eq. 7) of some of a minibatch's samples.
 
     Args:
-        logits: (n, 2) the actor's network's outputs, before the sigmoid and the tanh.
-        actions: (n, 2) as sampled.
+        logits: (n, A) the actor's network's outputs, before they are squashed.
+        actions: (n, A) as sampled.
         log_probs: (n,) under the policy that sampled them.
         advantages: (n,).
-        log_std: (2,).
+        log_std: (A,).
+        lows: (A,) lowest of each component's range, whose highest is 1: a tanh makes those from -1, a sigmoid all others.
         clip_range: how far the ratio may go from 1.
         share: what a sample counts: one over the minibatch's size.
-        by_logits: (n or more, 2), written: derivative of the loss by the logits.
-        by_log_std: (2,) float64, added to: derivative of the loss by the log deviations.
+        by_logits: (n or more, A), written: derivative of the loss by the logits.
+        by_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: all of `STATISTICS` but the value loss.
     """
-    rows = logits.shape[0]
+    rows, size = logits.shape
     weight = np.float32(share)
     low, high = np.float32(1.0 - clip_range), np.float32(1.0 + clip_range)
-    inverse0, inverse1 = math.exp(-log_std[0]), math.exp(-log_std[1])
-    constant = log_std[0] + log_std[1] + np.float32(2.0 * LOG_SQRT_2PI)
-    sum0 = sum1 = 0.0
+    inverse, noise, rising, falling = np.empty((4, size), np.float32)
+    sums = np.zeros(size)
+    constant = np.float32(0.0)
+    for k in range(size):
+        inverse[k] = math.exp(-log_std[k])
+        constant += log_std[k]
+    constant += np.float32(size * LOG_SQRT_2PI)
     loss = kl = clips = 0.0
     for i in range(rows):
-        mean0 = _ONE / (_ONE + math.exp(-logits[i, 0]))
-        mean1 = math.tanh(logits[i, 1])
-        noise0 = (actions[i, 0] - mean0) * inverse0
-        noise1 = (actions[i, 1] - mean1) * inverse1
-        log_ratio = np.float32(-0.5) * (noise0 * noise0 + noise1 * noise1) - constant - log_probs[i]
+        squares = np.float32(0.0)
+        for k in range(size):
+            span = _ONE - lows[k]
+            if span == _TWO:
+                mean = math.tanh(logits[i, k])
+                rising[k], falling[k] = _ONE, _ONE - mean * mean
+            else:
+                sigmoid = _ONE / (_ONE + math.exp(-logits[i, k]))
+                mean = lows[k] + span * sigmoid
+                rising[k], falling[k] = span * sigmoid, _ONE - sigmoid
+            noise[k] = (actions[i, k] - mean) * inverse[k]
+            squares += noise[k] * noise[k]
+        log_ratio = np.float32(-0.5) * squares - constant - log_probs[i]
         ratio = math.exp(log_ratio)
         clipped = min(max(ratio, low), high)
         surrogate = ratio * advantages[i]
         clipped_surrogate = clipped * advantages[i]
         # min(r A, clip(r) A) is r A, whose derivative by log r is r A, unless clip(r) A is smaller: then it is constant.
         by_log_prob = np.float32(0.0) if clipped_surrogate < surrogate else -weight * surrogate
-        sum0 += by_log_prob * (noise0 * noise0 - _ONE)
-        sum1 += by_log_prob * (noise1 * noise1 - _ONE)
-        # d log p / d mean = noise / std; then through the sigmoid, s (1 - s), and the tanh, 1 - t^2.
-        by_logits[i, 0] = by_log_prob * noise0 * inverse0 * mean0 * (_ONE - mean0)
-        by_logits[i, 1] = by_log_prob * noise1 * inverse1 * (_ONE - mean1 * mean1)
+        for k in range(size):
+            sums[k] += by_log_prob * (noise[k] * noise[k] - _ONE)
+            # d log p / d mean = noise / std; then through the tanh, 1 - t^2, or the sigmoid, s (1 - s) of its range.
+            by_logits[i, k] = by_log_prob * noise[k] * inverse[k] * rising[k] * falling[k]
         loss -= min(surrogate, clipped_surrogate)
         kl += ratio - _ONE - log_ratio
         clips += ratio != clipped
-    by_log_std[0] += sum0
-    by_log_std[1] += sum1
+    for k in range(size):
+        by_log_std[k] += sums[k]
     statistics[0] += share * loss
     statistics[2] += share * kl
     statistics[3] += share * clips

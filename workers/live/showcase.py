@@ -3,8 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actions import action_layout, twists
 from sim.arrays import PolicyFunction
-from sim.config import GeneratedArenaConfig, TaskConfig
+from sim.config import ArenaPool, TaskConfig
+from sim.drivers import Driver
 from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan
 from workers.frames import Frame
@@ -17,21 +19,23 @@ def along_arc(
 
     Args:
         poses: (N, 3) x, y, heading at the start; metres, radians.
-        velocities: (N, 2) linear and angular; m/s, rad/s.
+        velocities: (N, 3) forwards and to the left, m/s, and turning rate, rad/s.
         seconds: how long they have driven; one number, or one for each.
 
     Returns:
         (N, 3) float32 poses, headings in [-pi, pi].
     """
-    turn = velocities[:, 1] * seconds
+    forwards, aside, rate = velocities.T
+    turn = rate * seconds
     # The chord of an arc: NumPy's sinc is sin(pi x) / (pi x).
-    chord = velocities[:, 0] * seconds * np.sinc(turn / (2.0 * np.pi))
+    chord = seconds * np.sinc(turn / (2.0 * np.pi))
     direction = poses[:, 2] + 0.5 * turn
+    cos, sin = np.cos(direction), np.sin(direction)
     heading = poses[:, 2] + turn
     return np.stack(
         [
-            poses[:, 0] + chord * np.cos(direction),
-            poses[:, 1] + chord * np.sin(direction),
+            poses[:, 0] + chord * (forwards * cos - aside * sin),
+            poses[:, 1] + chord * (forwards * sin + aside * cos),
             np.arctan2(np.sin(heading), np.cos(heading)),
         ],
         axis=1,
@@ -41,7 +45,7 @@ def along_arc(
 
 def _in_first_map(task: TaskConfig) -> TaskConfig:
     """The task in one map of its pool, which the view draws, instead of in all of them."""
-    if not isinstance(task.arena, GeneratedArenaConfig):
+    if not isinstance(task.arena, ArenaPool):
         return task
     return task.model_copy(update={"arena": task.arena.model_copy(update={"maps": 1})})
 
@@ -60,14 +64,16 @@ class Showcase:
         self._env = NavigationVectorEnv(_in_first_map(task), robots)
         self._lidar = task.lidar
         self._period = task.control_period
-        self._limits = np.array([task.robot.max_linear_speed, task.robot.max_angular_speed], np.float32)
+        self._robot = task.robot
+        self._lows = np.array(action_layout(task.robot).lows, np.float32)
         self._observations, _ = self._env.reset()
+        self._driver: Driver | None = None
         self._sim_time = 0.0
         # Time into the control step that is being shown; the first one is yet to be made.
         self._into = self._period
         self._last_outcomes = np.zeros(robots, np.uint8)
         self._begin()
-        self._velocities = np.zeros((robots, 2), np.float32)
+        self._velocities = np.zeros((robots, 3), np.float32)
         self._moved = np.zeros_like(self._discs[:, :2])
 
     @property
@@ -79,9 +85,11 @@ class Showcase:
         """Lets simulated time pass; at every control step the policy chooses anew."""
         self._sim_time += seconds
         self._into += seconds
+        self._driver = self._driver or Driver(policy, self.robots)
+        self._driver.policy = policy
         while self._into >= self._period:
             self._into -= self._period
-            self._step(policy)
+            self._step(self._driver)
 
     def frame(self, step: int, speed: float) -> Frame:
         """This moment.
@@ -108,14 +116,15 @@ class Showcase:
             movers=movers,
         )
 
-    def _step(self, policy: PolicyFunction) -> None:
+    def _step(self, driver: Driver) -> None:
         """One control step. What is shown during it is how things stood when it began."""
         self._begin()
-        actions = np.clip(policy(self._observations), (0.0, -1.0), (1.0, 1.0)).astype(np.float32)
+        actions = np.clip(driver(self._observations), self._lows, 1.0).astype(np.float32)
         self._observations, _, terminations, truncations, _ = self._env.step(actions)
         # Late or slow, robots drive otherwise than commanded; of those that stand at a new start, that is all we know.
+        driver.forget(terminations | truncations)
         anew = (terminations | truncations)[:, None]
-        self._velocities = np.where(anew, actions * self._limits, self._env.velocities())
+        self._velocities = np.where(anew, twists(self._robot, actions).astype(np.float32), self._env.twists())
         self._moved = self._env.discs[0, :, 3:].copy()
         ended = self._env.outcomes > 0
         self._last_outcomes[ended] = self._env.outcomes[ended]

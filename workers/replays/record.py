@@ -85,7 +85,7 @@ def record(archive: Path, suite_name: str | None = None) -> Recording:
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     try:
-        table = run_suite(torch_policy(policy.network, policy.weights), task, suite, moments)
+        table = run_suite(torch_policy(policy), task, suite, moments)
     finally:
         torch.set_flush_denormal(False)
     offsets, poses, ranges, fields = moments.by_scenario(len(suite))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from sim.config import ArenaConfig, Frozen, RewardConfig, RewardPreset, TaskConfig
+from sim.config import ArenaConfig, Frozen, ObservationConfig, RewardConfig, RewardPreset, TaskConfig
 from workers.config import (
     Algorithm,
     EvaluationConfig,
@@ -55,7 +55,7 @@ def _training(arena: str, reward: RewardPreset, algorithm: Algorithm) -> Trainin
     return TrainingConfig(
         task=TaskConfig(
             arena=ArenaConfig.model_validate({"name": arena}),
-            observation="paper",
+            observation=ObservationConfig.preset("paper"),
             reward=RewardConfig.preset(reward),
         ),
         algorithm=algorithm,

@@ -1,7 +1,8 @@
 """The worker's side of the server's worker API over HTTP: claim, heartbeat, checkpoints down and up."""
 
 import hashlib
-from collections.abc import Iterator
+import ssl
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
@@ -16,7 +17,16 @@ from workers.errors import (
     RunRefusedError,
     ServerUnavailableError,
 )
-from workers.protocol import CheckpointReference, CheckpointUpload, Claim, ClaimRequest, Heartbeat, HeartbeatAnswer, Queue
+from workers.protocol import (
+    CheckpointReference,
+    CheckpointUpload,
+    Claim,
+    ClaimRequest,
+    Heartbeat,
+    HeartbeatAnswer,
+    Queue,
+    found_extensions,
+)
 from workers.reporting import EvaluationResult
 
 _Answer = TypeVar("_Answer", bound=BaseModel)
@@ -36,8 +46,13 @@ class ServerClient:
     """
 
     def __init__(self, server_url: str, token: str) -> None:
+        # The system's certificates or SSL_CERT_FILE's, as for the link's WebSocket: a lab may have its own authority.
         self._http = httpx.Client(
-            base_url=server_url, headers={"Authorization": f"Bearer {token}"}, timeout=_TIMEOUT, trust_env=False
+            base_url=server_url,
+            headers={"Authorization": f"Bearer {token}"},
+            timeout=_TIMEOUT,
+            trust_env=False,
+            verify=ssl.create_default_context(),
         )
 
     def __enter__(self) -> Self:
@@ -54,15 +69,21 @@ class ServerClient:
 
     def heartbeat(self, worker: str, queue: Queue, trouble: str | None = None, *, first: bool = False) -> HeartbeatAnswer:
         """Tell that this worker is there, and why it takes up no run where it does not."""
-        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble, first=first)
+        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble, first=first, extensions=found_extensions())
         response = self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
-        return _read(HeartbeatAnswer, response)
+        return read_answer(HeartbeatAnswer, response)
 
     def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str, queue: Queue = "cpu") -> Claim:
         """Take up a run; asked again with the same `claim_id`, it is the same attempt."""
-        request = ClaimRequest(worker=worker, published_attempt=published_attempt, claim_id=claim_id, queue=queue)
+        request = ClaimRequest(
+            worker=worker,
+            published_attempt=published_attempt,
+            claim_id=claim_id,
+            queue=queue,
+            extensions=found_extensions(),
+        )
         response = self._send("POST", f"/api/worker/runs/{run_id}/claim", content=request.model_dump_json())
-        return _read(Claim, response)
+        return read_answer(Claim, response)
 
     def download(self, checkpoint: CheckpointReference, path: Path) -> None:
         """Fetch an archive to `path`; refuses what is not what the server registered.
@@ -78,12 +99,12 @@ class ServerClient:
             with self._http.stream("GET", f"/api/worker/checkpoints/{checkpoint.id}") as response, path.open("wb") as file:
                 if response.is_error:
                     response.read()
-                _check(response)
+                check(response)
                 for block in response.iter_bytes(_BLOCK):
                     digest.update(block)
                     file.write(block)
         except httpx.TransportError as error:
-            raise _unavailable(error) from error
+            raise unavailable(error) from error
         except RunRefusedError as error:
             raise CheckpointGoneError(f"the checkpoint of step {checkpoint.step:,} is gone: {error}") from error
         if digest.hexdigest() != checkpoint.sha256:
@@ -104,19 +125,24 @@ class ServerClient:
         )
 
     def _send(
-        self, method: str, url: str, *, content: str | Iterator[bytes], params: dict[str, int] | None = None
+        self,
+        method: str,
+        url: str,
+        *,
+        content: str | bytes | Iterator[bytes],
+        params: Mapping[str, int | str] | None = None,
     ) -> httpx.Response:
         try:
             response = self._http.request(
-                method, url, params=params, content=content, headers={"Content-Type": "application/json"}
+                method, url, params=dict(params or {}), content=content, headers={"Content-Type": "application/json"}
             )
         except httpx.TransportError as error:
-            raise _unavailable(error) from error
-        _check(response)
+            raise unavailable(error) from error
+        check(response)
         return response
 
 
-def _read(model: type[_Answer], response: httpx.Response) -> _Answer:
+def read_answer(model: type[_Answer], response: httpx.Response) -> _Answer:
     """An answer as the server writes it; whatever else answers in its place may be gone the next time."""
     try:
         return model.model_validate_json(response.content)
@@ -134,11 +160,13 @@ def _upload_body(head: CheckpointUpload, archive: Path) -> Iterator[bytes]:
             yield block
 
 
-def _unavailable(error: httpx.TransportError) -> ServerUnavailableError:
+def unavailable(error: httpx.TransportError) -> ServerUnavailableError:
+    """What is told where a request did not get through."""
     return ServerUnavailableError(f"the server does not answer ({type(error).__name__}: {error})")
 
 
-def _check(response: httpx.Response) -> None:
+def check(response: httpx.Response) -> None:
+    """Raise what an answer that is an error means; see `ServerClient`."""
     if response.is_success:
         return
     detail = f"{response.status_code} {response.text[:500]}"

@@ -15,14 +15,12 @@ from types import FrameType
 from celery.worker import state
 
 from workers.protocol import HEARTBEAT_SECONDS
+from workers.runtime.fitness import HEARTBEAT_FILE
 
 logger = logging.getLogger(__name__)
 
 DRAIN_SIGNAL = signal.SIGUSR1
 """Sent to a worker's main process: finish what is under way, take nothing more, end."""
-
-HEARTBEAT_FILE = "heartbeat"
-"""In the work folder; touched whenever the server has heard that this worker is there."""
 
 _TICK_SECONDS = 0.5
 # A server that was not reached for longer cannot have had work.

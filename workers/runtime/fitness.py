@@ -22,6 +22,9 @@ _LOOK_UP_SECONDS = 0.2
 _PROBE_BYTES = 4_096
 _PRIVATE = 0o700
 
+HEARTBEAT_FILE = "heartbeat"
+"""In the work folder; touched whenever the server has heard that this worker is there."""
+
 
 class Fitness:
     """What is known of this worker's machine. Thread-safe.

@@ -11,6 +11,12 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from workers.logs import LogFormat
 from workers.protocol import Queue
 
+EXTENSIONS_SETTING = (
+    "Modules of extensions besides those that are installed as such, separated by commas: `my_lab`, or "
+    "`my_lab.parts:extension`."
+)
+"""What `MAPLESS_EXTENSIONS` means; `sim.extending.discovery` reads it."""
+
 
 def _private_place() -> Path:
     """A folder that other users of the machine can neither guess their way into nor make first."""
@@ -36,6 +42,7 @@ class WorkerSettings(BaseSettings):
         default_factory=_private_place,
         description="Reports and checkpoints on their way to the server; in the user's cache folder if not given.",
     )
+    extensions: str = Field("", description=EXTENSIONS_SETTING)
     log_format: LogFormat = Field("text", description="Of the log: `text`, or `json`, an object a line.")
     min_free_bytes: int = Field(
         256 * 2**20, ge=0, description="Free space in the work folder below which a worker takes up no run."
@@ -50,4 +57,9 @@ class WorkerSettings(BaseSettings):
 
     def name(self, slot: int) -> str:
         """The name under which the server knows the `slot`-th process of this worker."""
-        return f"{self.worker_name}@{socket.gethostname()}/{slot}"
+        return f"{self.host_name}/{slot}"
+
+    @property
+    def host_name(self) -> str:
+        """The name that all processes of this worker share."""
+        return f"{self.worker_name}@{socket.gethostname()}"

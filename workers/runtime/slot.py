@@ -12,8 +12,8 @@ from types import FrameType
 from workers.errors import ServerError, UnfitError
 from workers.protocol import HEARTBEAT_SECONDS
 from workers.runtime.client import ServerClient
-from workers.runtime.ending import DRAIN_SIGNAL, HEARTBEAT_FILE
-from workers.runtime.fitness import Fitness
+from workers.runtime.ending import DRAIN_SIGNAL
+from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.trainer_handle import TrainerHandle
 

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from workers.errors import UnfitError
 from workers.logs import configure
 from workers.protocol import Queue
+from workers.runtime.companion import Companion
 from workers.runtime.fitness import make_private
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.supervised import end_with_supervisor
@@ -26,8 +27,19 @@ def worker(
     ] = None,
     queue: Annotated[Queue | None, typer.Option(help="Trainings to take [MAPLESS_WORKER_QUEUE, cpu].")] = None,
     concurrency: Annotated[
-        int | None, typer.Option("--concurrency", "-c", min=1, help="Trainings side by side; one a core if not given.")
+        int | None,
+        typer.Option(
+            "--concurrency", "-c", min=0, help="Trainings side by side; one a core if not given, 0 for jobs alone."
+        ),
     ] = None,
+    jobs: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=64,
+            help="Replays, exports and evaluations side by side, beside trainings; 0 leaves them and views to others.",
+        ),
+    ] = 2,
     name: Annotated[str | None, typer.Option(help="Tells workers of one machine apart.")] = None,
     until_idle: Annotated[
         float | None,
@@ -42,7 +54,8 @@ def worker(
     """Start a worker for a server, here or on another machine."""
     given = {
         "server_url": server,
-        "broker_url": broker,
+        # Jobs need none.
+        "broker_url": broker or ("memory://" if concurrency == 0 else None),
         "worker_token": token,
         "worker_queue": queue,
         "work_dir": work_dir,
@@ -62,11 +75,13 @@ def worker(
     except UnfitError as error:
         sys.stderr.write(f"mapless: {error}\n")
         raise typer.Exit(1) from None
-    run_worker(settings, concurrency or usable_cores())
+    run_worker(settings, usable_cores() if concurrency is None else concurrency, jobs)
 
 
-def run_worker(settings: WorkerSettings, concurrency: int) -> None:
+def run_worker(settings: WorkerSettings, concurrency: int, jobs: int) -> None:
     """Work until SIGTERM or SIGINT; trainings under way are then handed back, with a checkpoint.
+
+    Jobs are done by a process of their own, which needs no broker.
 
     At SIGUSR1, or the server's word, they are finished first, and no more are taken up.
     """
@@ -74,14 +89,21 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
     os.umask(0o077)
     # The processes that Celery forks read the settings anew.
     os.environ.update(_environment(settings))
+    if not concurrency:
+        if jobs:
+            os.execv(sys.executable, [sys.executable, *_jobs_command(jobs)])  # noqa: S606 (a fixed list)
+        sys.exit("mapless: a worker without trainings (--concurrency 0) and without jobs (--jobs 0) has nothing to do")
     end_with_supervisor()
+    companion = Companion(_jobs_command(jobs)) if jobs else None
 
     # Late, so that `mapless worker --help` does not wait for Celery.
-    from celery.signals import setup_logging
+    from celery.signals import setup_logging, worker_ready
 
     import workers.runtime.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
     from workers.runtime.app import create_app
 
+    if companion is not None:
+        worker_ready.connect(lambda **_: companion.keep_running(), weak=False)
     if settings.log_format == "json":
         # Celery's own lines are for people.
         setup_logging.connect(_log_json, weak=False)
@@ -101,6 +123,10 @@ def run_worker(settings: WorkerSettings, concurrency: int) -> None:
             "--without-heartbeat",
         ]
     )
+
+
+def _jobs_command(count: int) -> list[str]:
+    return ["-m", "workers.runtime.jobs", str(count)]
 
 
 def _log_json(**_: Any) -> None:

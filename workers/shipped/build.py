@@ -16,10 +16,15 @@ from tempfile import TemporaryDirectory
 
 from pydantic import BaseModel
 
+from sim.arrays import Floats, PolicyFunction
 from sim.baselines.dwa import dynamic_window
+from sim.baselines.memory import mapping_planner
+from sim.baselines.mppi import path_integral
+from sim.baselines.orca import reciprocal_avoidance
 from sim.baselines.simple import go_to_goal, random_policy
+from sim.baselines.vfh import vector_field_histogram
 from sim.config import TaskConfig
-from sim.suites import EpisodeTable, Suite, load_suite, run_controller, run_suite, suite_named, suite_names
+from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller, suite_named, suite_names
 from workers.checkpoints import copy_policy, read_policy
 from workers.frames import Frame
 from workers.policy import torch_policy
@@ -39,13 +44,37 @@ from workers.shipped.recipes import RECIPES, Recipe, recipe
 from workers.training.evaluation import evaluate, to_result
 from workers.training.trainer import train
 
-_TASK = TaskConfig()
-CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {
-    "random": lambda suite: run_suite(random_policy(), _TASK, suite),
-    "go-to-goal": lambda suite: run_suite(go_to_goal(_TASK), _TASK, suite),
-    "dynamic window": lambda suite: run_controller(dynamic_window(_TASK), _TASK, suite),
+_BASELINES: dict[str, Callable[[TaskConfig], Callable[[Situation], Floats]]] = {
+    "random": lambda _: _seeing(random_policy()),
+    "go-to-goal": lambda task: _seeing(go_to_goal(task)),
+    "dynamic window": dynamic_window,
+    "VFH+": vector_field_histogram,
+    "MPPI": path_integral,
+    "mapping, A* and dynamic window": mapping_planner,
+    "ORCA, told where people are": reciprocal_avoidance,
 }
-"""The baselines, of the default task: what each does in a suite."""
+
+
+def _seeing(policy: PolicyFunction) -> Callable[[Situation], Floats]:
+    """A policy as a controller."""
+    return lambda situation: policy(situation.observations)
+
+
+def controller(name: str, task: TaskConfig) -> Callable[[Situation], Floats]:
+    """A baseline for a task; one for each run, since some remember."""
+    return _BASELINES[name](task)
+
+
+def _driven(name: str) -> Callable[[Suite], EpisodeTable]:
+    def drive(suite: Suite) -> EpisodeTable:
+        task = suite.rules.task()
+        return run_controller(controller(name, task), task, suite)
+
+    return drive
+
+
+CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {name: _driven(name) for name in _BASELINES}
+"""The baselines, each with the task that a suite's rules ask for, the default one's where they ask for nothing."""
 
 _COMMAND = "python -m workers.shipped.build"
 _DECIMALS = 4  # of lengths and rewards in the files: tenths of a millimetre
@@ -104,7 +133,7 @@ def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> 
         (target / ARCHIVE).chmod(0o644)
     manifest, policy = read_policy(target / ARCHIVE)
     task = manifest.training.task
-    act = torch_policy(policy.network, policy.weights)
+    act = torch_policy(policy)
     results = []
     for name in made_from.suites:
         result = _rounded(evaluate(act, task, suite_named(name, task)))
@@ -124,14 +153,27 @@ def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> 
     return card
 
 
-def measure_baselines(path: Path = BASELINES) -> Baselines:
-    """Drives the controllers that need no training through every suite, frozen or a recipe's, and writes how they did."""
+def measure_baselines(path: Path = BASELINES, *, again: bool = False) -> Baselines:
+    """Drives the controllers that need no training through every suite, frozen or a recipe's, and writes how they did.
+
+    Args:
+        path: of the file; what it says of a suite of the same hash stands.
+        again: measures everything anew.
+    """
+    old = Baselines.model_validate_json(path.read_bytes()).baselines if path.exists() and not again else ()
+    kept = {(each.name, result.suite_hash): result for each in old for result in each.results}
     drawn = {name: suite_named(name, each.training.task) for each in RECIPES for name in each.suites}
     suites = [*map(load_suite, suite_names()), *(suite for name, suite in drawn.items() if name not in suite_names())]
     measured = Baselines(
         command=f"{_COMMAND} --baselines",
         baselines=tuple(
-            Baseline(name=name, results=tuple(_suite_figures(to_result(drive(suite), suite), _TASK) for suite in suites))
+            Baseline(
+                name=name,
+                results=tuple(
+                    kept.get((name, suite.hash)) or _suite_figures(to_result(drive(suite), suite), suite.rules.task())
+                    for suite in suites
+                ),
+            )
             for name, drive in CONTROLLERS.items()
         ),
     )
@@ -168,7 +210,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog=_COMMAND, description="Train, measure and write shipped policies.")
     # No `choices`: Python 3.11 would look for the empty list among them.
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"Which policies: {known}.")
-    parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with.")
+    parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with, where it is not yet.")
+    parser.add_argument("--again", action="store_true", help="Measure all of that anew.")
     parser.add_argument("--seed", type=int, help="Train with another seed than the recipe's; needs --folder.")
     parser.add_argument(
         "--folder", type=Path, default=FOLDER, help="Where the policies' folders go, if not where they ship."
@@ -183,7 +226,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not recipes and not options.baselines:
         parser.error(f"name at least one policy: {known}")
     if options.baselines:
-        measure_baselines()
+        measure_baselines(again=options.again)
     for made_from in recipes:
         card = build(made_from, options.folder, options.seed)
         for result in card.results:

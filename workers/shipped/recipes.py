@@ -1,6 +1,6 @@
 """What each shipped policy is trained from: the one table to change (pydantic only)."""
 
-from sim.config import Frozen, GeneratedArenaConfig, LidarConfig, MoversConfig, RewardConfig, TaskConfig
+from sim.config import Frozen, GeneratedArenaConfig, LidarConfig, MoversConfig, ObservationConfig, RewardConfig, TaskConfig
 from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
 from workers.presets import COMPLEX, DEFAULT
 
@@ -50,7 +50,8 @@ RECIPES: tuple[Recipe, ...] = (
         training=TrainingConfig(
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="clutter", difficulty=0.9, maps=1024, seed=0),
-                lidar=LidarConfig(rays=60, batches=30, field_of_view=360.0),
+                lidar=LidarConfig(rays=60, field_of_view=360.0),
+                observation=ObservationConfig.preset("improved", batches=30),
             ),
             algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128))),
             steps=4_000_000,
@@ -67,7 +68,8 @@ RECIPES: tuple[Recipe, ...] = (
         training=TrainingConfig(
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="mixed", difficulty=0.8, maps=256, seed=0),
-                lidar=LidarConfig(rays=120, batches=60, field_of_view=360.0),
+                lidar=LidarConfig(rays=120, field_of_view=360.0),
+                observation=ObservationConfig.preset("improved", batches=60),
                 reward=RewardConfig.preset("basic", collision=-1000.0),
             ),
             algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128))),
@@ -85,8 +87,7 @@ RECIPES: tuple[Recipe, ...] = (
         training=TrainingConfig(
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="clutter", difficulty=0.4, maps=256, seed=0, movers=MoversConfig(count=10)),
-                lidar=LidarConfig(batches=30),
-                frames=3,
+                observation=ObservationConfig.preset("improved", batches=30, frames=3),
             ),
             algorithm=PpoConfig(network=MlpNetwork(hidden_sizes=(128, 128)), gamma=0.99, gae_lambda=0.9),
             steps=6_000_000,

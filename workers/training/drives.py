@@ -4,6 +4,7 @@ import numpy as np
 
 from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
+from sim.drivers import Driver
 from sim.envs.vector import NavigationVectorEnv
 from workers.training.table import TableRow
 
@@ -26,8 +27,10 @@ def drive(policy: PolicyFunction, task: TaskConfig, drives: int, steps: int) -> 
     env = NavigationVectorEnv(task, drives, seed=_SEED, copy=False)
     observations, _ = env.reset(seed=_SEED)
     outcomes, reward = np.zeros(4, np.int64), 0.0
+    driver = Driver(policy, drives)
     for _ in range(steps):
-        observations, rewards, _, _, _ = env.step(policy(observations))
+        observations, rewards, terminations, truncations, _ = env.step(driver(observations))
+        driver.forget(terminations | truncations)
         outcomes += np.bincount(env.outcomes, minlength=4)
         reward += float(rewards.sum())
     attempts = max(1, int(outcomes[1:].sum()))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from workers.training.behavior import BehaviorMetrics
 
 if TYPE_CHECKING:
@@ -21,10 +22,10 @@ _OUTCOME_RATES = ("train/success_rate", "train/collision_rate", "train/timeout_r
 class TrainingMetrics:
     """A window of a training: filled by the loop, emptied by each report."""
 
-    def __init__(self, robots: int, steps: int = 0) -> None:
-        """Starts after so many steps of each robot."""
+    def __init__(self, robots: int, steps: int = 0, actions: ActionLayout = DEFAULT_ACTIONS) -> None:
+        """Starts after so many steps of each robot, whose actions are these."""
         self._robots = robots
-        self._behavior = BehaviorMetrics(steps)
+        self._behavior = BehaviorMetrics(steps, actions)
         self._clear()
 
     def _clear(self) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from sim.actions import action_layout
 from sim.arenas import with_maps_of
 from sim.arrays import PolicyFunction
 from sim.envs.vector import NavigationVectorEnv
@@ -25,6 +26,7 @@ from workers.config import TrainingConfig
 from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.live.viewing import TrainingViewer, Unwatched
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.networks.inputs import inputs_of
 from workers.networks.layout import layout
 from workers.policy import Policy, torch_policy
 from workers.reporting import EvaluationResult, Reporter
@@ -71,6 +73,7 @@ def train(
     Raises:
         NonFiniteError: the weights are no longer finite numbers.
         MemoryTooLargeError: its replay memory would not fit into a checkpoint.
+        NetworkError: the module of its network is not one that can be trained, saved and resumed.
         NoDeviceError: this machine does not have the device that it asks for.
         ArchiveError: `resume` is damaged, or belongs to another training.
     """
@@ -103,12 +106,14 @@ class Training:
         self.report_interval = report_interval
         refuse_too_large(config)
         self.suite = suite_for(config.task)
-        self.observation_layout = observation_layout(config.task)
-        self.algorithm = build_algorithm(config.algorithm, self.observation_layout.size, seed, torch.device(config.device))
+        self.observation_layout, self.inputs = observation_layout(config.task), inputs_of(config.task)
+        self.actions = action_layout(config.task.robot)
+        device = torch.device(config.device)
+        self.algorithm = build_algorithm(config.algorithm, self.inputs, seed, device, self.actions)
         self.task = with_maps_of(config.task, seed)
         self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
         self.observations, _ = self.env.reset(seed=seed)
-        self.metrics = TrainingMetrics(self.algorithm.robots)
+        self.metrics = TrainingMetrics(self.algorithm.robots, actions=self.actions)
         self.steps_per_update = self.algorithm.steps_per_update * self.algorithm.robots
         self.total_updates = math.ceil(config.steps / self.steps_per_update)
         self.step = self.updates = self.evaluations = 0
@@ -163,7 +168,7 @@ class Training:
         self.metrics.update(diagnostics)
         if not self.algorithm.finite:
             self.fail()
-        self.viewer.on_weights(lambda: self.policy(Policy), self.step)
+        self.viewer.on_weights(lambda: self.policy(lambda policy: policy), self.step)
 
     def fail(self) -> NoReturn:
         """The weights are no longer numbers: says so, and saves the last state that was remembered before it.
@@ -211,9 +216,10 @@ class Training:
         with self.metrics.phase("evaluation"):
             return drive(self.policy(torch_policy), self.task, config.drives, config.drive_steps).metrics()
 
-    def policy(self, runner: Callable[..., PolicyFunction]) -> PolicyFunction:
+    def policy(self, runner: Callable[[Policy], PolicyFunction]) -> PolicyFunction:
         """A copy of the newest deterministic policy."""
-        return runner(self.config.algorithm.network, self.algorithm.policy_weights())
+        weights = self.algorithm.policy_weights()
+        return runner(Policy(self.config.algorithm.network, weights, self.inputs, self.actions))
 
     def report(self, result: EvaluationResult | None) -> None:
         """Everything since the last report, and the evaluation of this step if there is one."""
@@ -277,7 +283,7 @@ class Training:
         counters = checkpoint.counters
         self.step, self.updates, self.evaluations = counters.step, counters.updates, counters.evaluations
         self.reported = self.saved = counters.step
-        self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots)
+        self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots, self.actions)
         self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
 
     def _counters(self) -> TrainingCounters:
@@ -290,7 +296,6 @@ class Training:
         }
 
     def _manifest(self, result: EvaluationResult | None) -> Manifest:
-        robot = self.config.task.robot
         return Manifest(
             training=self.config,
             seed=self.seed,
@@ -303,17 +308,11 @@ class Training:
                     for index, number in enumerate(self.observation_layout.numbers)
                 ),
             ),
-            action=(
-                Number(index=0, name="linear", meaning=f"x {robot.max_linear_speed} m/s forwards", low=0.0, high=1.0),
-                Number(
-                    index=1,
-                    name="angular",
-                    meaning=f"x {robot.max_angular_speed} rad/s, positive to the left",
-                    low=-1.0,
-                    high=1.0,
-                ),
+            action=tuple(
+                Number(index=index, name=component.name, meaning=component.meaning, low=component.low, high=1.0)
+                for index, component in enumerate(self.actions.components)
             ),
-            network=layout(self.config.algorithm.network),
+            network=layout(self.config.algorithm.network, self.inputs, self.actions),
             evaluation=_summary(result),
             versions=_versions(),
             files={},

@@ -1,0 +1,183 @@
+"""What a job worker and the server say to one another: bodies of HTTP requests (pydantic only).
+
+A *job* is what somebody asks for beside trainings: a view of a finished policy, a replay, an export, an evaluation. It is
+claimed, leased and fenced as a run is (`workers.protocol`); what comes out of it is one file, checked by size and SHA-256.
+
+worker                                            server
+  | POST  /jobs/claim            JobClaimRequest ---> |  waits for a job to come; 204 where none did
+  | GET   /jobs/{id}/archive                     ---> |  the policy's archive, where the job has one
+  | POST  /jobs/{id}/report      JobReport       ---> |  renews the lease; 409 where the job is no longer wanted
+  | POST  /jobs/{id}/frames      frames          ---> |  of a view, each after its length; answered as a report
+  | PUT   /jobs/{id}/result      the file's bytes ---> |
+  | POST  /jobs/{id}/end         JobEnd          ---> |
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+
+from sim.config import AnyArenaConfig, Frozen, TaskConfig
+from workers.protocol import Text, WorkerName
+from workers.reporting import WatchRequest
+
+JobKind = Literal["view", "replay", "export", "evaluate"]
+"""What may be asked for; those that somebody waits for come first."""
+
+KINDS: tuple[JobKind, ...] = ("view", "replay", "export", "evaluate")
+"""In the order in which they are taken up: who looks never waits behind what goes on unwatched."""
+
+Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[a-z0-9-]+$")]
+FRAME_LENGTH_BYTES = 4
+"""Of the number before each frame, little-endian."""
+MAX_FRAMES_BYTES = 4 * 2**20
+"""Of the frames in one request."""
+
+
+class CheckpointPolicy(Frozen):
+    """The policy of a checkpoint."""
+
+    source: Literal["checkpoint"] = "checkpoint"
+    id: Identifier
+
+
+class ShippedPolicyName(Frozen):
+    """A policy that ships."""
+
+    source: Literal["shipped"] = "shipped"
+    name: Identifier
+
+
+class BaselineName(Frozen):
+    """A controller that needs no training, with the robot of `task`."""
+
+    source: Literal["baseline"] = "baseline"
+    name: Literal["random", "go-to-goal", "dynamic window"]
+    task: TaskConfig = TaskConfig()
+
+
+ArchivedPolicy = Annotated[CheckpointPolicy | ShippedPolicyName, Field(discriminator="source")]
+AnyPolicy = Annotated[CheckpointPolicy | ShippedPolicyName | BaselineName, Field(discriminator="source")]
+
+
+class NamedSuite(Frozen):
+    """A suite by its name: a frozen one, or that of the policy's own task."""
+
+    by: Literal["name"] = "name"
+    name: str = Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]+$")
+
+
+class ArenaSuite(Frozen):
+    """The suite that is drawn for an arena: a family at a difficulty, an imported one, a built-in one."""
+
+    by: Literal["arena"] = "arena"
+    arena: AnyArenaConfig
+
+
+class OwnSuite(Frozen):
+    """The suite of the policy's own task."""
+
+    by: Literal["own"] = "own"
+
+
+SuiteChoice = Annotated[NamedSuite | ArenaSuite | OwnSuite, Field(discriminator="by")]
+
+
+class ViewJob(Frozen):
+    """Drive by a policy, for whoever watches."""
+
+    kind: Literal["view"] = "view"
+    policy: ArchivedPolicy
+
+
+class ReplayJob(Frozen):
+    """Drive an evaluation again, and record what every robot did (`workers.replays.recording`)."""
+
+    kind: Literal["replay"] = "replay"
+    policy: ArchivedPolicy
+    suite: str | None = None
+
+
+class ExportJob(Frozen):
+    """The deployment bundle, compared with torch."""
+
+    kind: Literal["export"] = "export"
+    policy: ArchivedPolicy
+
+
+class EvaluateJob(Frozen):
+    """A policy on a suite; the file is an `EvaluationResult` as JSON."""
+
+    kind: Literal["evaluate"] = "evaluate"
+    policy: AnyPolicy
+    suite: SuiteChoice = OwnSuite()
+
+
+JobSpec = Annotated[ViewJob | ReplayJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
+JOB_SPEC: TypeAdapter[ViewJob | ReplayJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
+
+
+class JobClaimRequest(Frozen):
+    """A worker has a place for a job.
+
+    Attributes:
+        worker: its name.
+        claim_id: chosen by the worker, new for each job that it takes up: asked again under the same id, because the answer
+            got lost, the server grants the same attempt once more.
+        kinds: that this place takes.
+        wait_seconds: for a job to come.
+    """
+
+    worker: WorkerName
+    claim_id: str = Field(pattern="^[0-9a-f]{32}$")
+    kinds: tuple[JobKind, ...] = Field(min_length=1, max_length=4)
+    wait_seconds: float = Field(10.0, ge=0.0, le=30.0)
+
+
+class JobClaim(Frozen):
+    """The job is the worker's for as long as it keeps the lease.
+
+    Attributes:
+        id: of the job.
+        attempt: the fencing token of everything that follows.
+        spec: what to do, imported arenas with their geometry.
+        sha256: of the policy's archive; None where it has none.
+        lease_seconds: a worker not heard of for this long loses the job.
+    """
+
+    id: str
+    attempt: int
+    spec: JobSpec
+    sha256: str | None
+    lease_seconds: float
+
+
+class JobReport(Frozen):
+    """A sign of life.
+
+    Attributes:
+        progress: share of the work that is done, 0 to 1.
+    """
+
+    progress: float = Field(0.0, ge=0.0, le=1.0)
+
+
+class JobOrders(Frozen):
+    """What the server wants of whoever has the job.
+
+    Attributes:
+        watch: of a view, what somebody wants to see; None while nobody looks.
+    """
+
+    watch: WatchRequest | None = None
+
+
+class JobEnd(Frozen):
+    """The worker's last word.
+
+    Attributes:
+        outcome: done; failed: it would fail again; lost: another attempt may do better; released: the worker ends.
+        error: what went wrong, for people.
+    """
+
+    outcome: Literal["done", "failed", "lost", "released"]
+    error: Text | None = None

@@ -1,0 +1,244 @@
+"""A place for one job at a time: waits for one, sees it through in a process of its own, waits again."""
+
+import logging
+import multiprocessing
+import shutil
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext, ForkServerProcess
+from pathlib import Path
+from typing import TypeAlias
+
+from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerError, ServerUnavailableError
+from workers.job_protocol import (
+    FRAME_LENGTH_BYTES,
+    MAX_FRAMES_BYTES,
+    JobClaim,
+    JobEnd,
+    JobKind,
+    JobOrders,
+    ViewJob,
+)
+from workers.reporting import WatchRequest
+from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
+from workers.runtime.jobs.client import JobClient
+from workers.runtime.jobs.process import ARCHIVE, RESULT, Done, Failed, Progressed, Said, main
+
+logger = logging.getLogger(__name__)
+
+_CLAIM_WAIT_SECONDS = 10.0
+_RETRY_SECONDS = 0.5
+_REPORT_SECONDS = 1.0
+_LOOK_SECONDS = 0.05
+# Two frames in one request: half the requests, and a thirtieth of a second that nobody sees.
+_FRAMES_AT_ONCE = 2
+_ERROR_CHARACTERS = 9_000
+# A process that has said its last word has nothing left to do.
+_EXIT_SECONDS = 2.0
+
+Pipe: TypeAlias = "Connection[WatchRequest | None, Said]"
+
+
+def forkserver() -> ForkServerContext:
+    """Where job processes are forked from: a process that imports, once, everything that they need."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["workers.runtime.jobs.ready"])
+    return context
+
+
+class Place:
+    """One job at a time.
+
+    Args:
+        name: under which the server knows it.
+        kinds: of jobs that it takes.
+        client: to the server.
+        work_dir: where jobs keep their files while they are under way.
+        fitness: of this machine.
+        context: where processes are forked from.
+        ending: set once the worker is to end.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        kinds: tuple[JobKind, ...],
+        client: JobClient,
+        work_dir: Path,
+        fitness: Fitness,
+        context: ForkServerContext,
+        ending: threading.Event,
+    ) -> None:
+        self.name = name
+        self._kinds = kinds
+        self._client = client
+        self._work_dir = work_dir
+        self._fitness = fitness
+        self._context = context
+        self._ending = ending
+
+    def run(self) -> None:
+        """Take up jobs until the worker ends."""
+        claim_id = uuid.uuid4().hex
+        waited = False
+        while not self._ending.is_set():
+            if self._fitness.trouble is not None:
+                self._ending.wait(_REPORT_SECONDS)
+                continue
+            try:
+                claim = self._client.claim_job(self.name, self._kinds, claim_id, _CLAIM_WAIT_SECONDS)
+            except ServerError as error:
+                if not waited:
+                    logger.warning("%s waits for the server: %s", self.name, error)
+                waited = True
+                self._ending.wait(_RETRY_SECONDS)
+                continue
+            waited = False
+            (self._work_dir / HEARTBEAT_FILE).touch()
+            if claim is None:
+                continue
+            claim_id = uuid.uuid4().hex
+            try:
+                self._see_through(claim)
+            except (OSError, ServerError) as error:
+                logger.exception("job %s: attempt %d broke; another one begins after its lease", claim.id, claim.attempt)
+                self._fitness.rest(f"{type(error).__name__}: {error}", self._ending.is_set)
+
+    def _see_through(self, claim: JobClaim) -> None:
+        logger.info("job %s (%s): attempt %d begins", claim.id, claim.spec.kind, claim.attempt)
+        directory = self._work_dir / f"{multiprocessing.current_process().pid}-{claim.id}-{claim.attempt}"
+        directory.mkdir(mode=0o700)
+        try:
+            end = self._do(claim, directory)
+            if end is not None:
+                self._patiently(lambda: self._client.end_job(claim.id, claim.attempt, end), claim.lease_seconds)
+            logger.info("job %s: attempt %d ended: %s", claim.id, claim.attempt, end.outcome if end else "no longer wanted")
+        except RunRefusedError as refusal:
+            logger.info("job %s: attempt %d is over: %s", claim.id, claim.attempt, refusal)
+        finally:
+            shutil.rmtree(directory, ignore_errors=True)
+
+    def _do(self, claim: JobClaim, directory: Path) -> JobEnd | None:
+        """How the job ended; None where the server knows better."""
+        if claim.sha256 is not None:
+            sha256 = claim.sha256
+            try:
+                self._patiently(
+                    lambda: self._client.fetch_archive(claim.id, claim.attempt, sha256, directory / ARCHIVE),
+                    claim.lease_seconds,
+                )
+            except (ArchiveIntegrityError, RequestRefusedError) as error:
+                return JobEnd(outcome="failed", error=str(error))
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(
+            target=main, args=(claim.spec.model_dump_json(), str(directory), theirs), daemon=True
+        )
+        try:
+            process.start()
+            theirs.close()
+            end = _Watch(self._client, claim, process, ours, self._ending).until_ended()
+        finally:
+            ours.close()
+            if process.pid is not None:
+                process.join(_EXIT_SECONDS if not self._ending.is_set() else 0.0)
+                process.kill()
+                process.join()
+        if end.outcome == "done" and not isinstance(claim.spec, ViewJob):
+            result = directory / RESULT
+            self._patiently(lambda: self._client.bring_result(claim.id, claim.attempt, result), claim.lease_seconds)
+        return end
+
+    def _patiently(self, request: Callable[[], None], seconds: float) -> None:
+        """Ask again while the server does not answer, for as long as it may keep the job for us."""
+        deadline = time.monotonic() + seconds
+        while True:
+            try:
+                return request()
+            except ServerUnavailableError:
+                if time.monotonic() > deadline or self._ending.is_set():
+                    raise
+                time.sleep(_RETRY_SECONDS)
+
+
+class _Watch:
+    """Stands between a job's process and the server for as long as the process runs."""
+
+    def __init__(
+        self, client: JobClient, claim: JobClaim, process: ForkServerProcess, pipe: Pipe, ending: threading.Event
+    ) -> None:
+        self._client = client
+        self._claim = claim
+        self._process = process
+        self._pipe = pipe
+        self._ending = ending
+        self._progress = 0.0
+        self._frames: list[bytes] = []
+        self._told: WatchRequest | None = None
+        self._said = False
+
+    def until_ended(self) -> JobEnd:
+        """How the process ended.
+
+        Raises:
+            RunRefusedError: nobody wants the job any more, or somebody else has it.
+        """
+        due = 0.0
+        while not self._ending.is_set():
+            if time.monotonic() >= due:
+                due = time.monotonic() + _REPORT_SECONDS
+                self._report()
+            if not self._pipe.poll(_LOOK_SECONDS):
+                if not self._process.is_alive() and not self._pipe.poll():
+                    return self._died()
+                continue
+            try:
+                said = self._pipe.recv()
+            except EOFError:
+                return self._died()
+            match said:
+                case bytes():
+                    self._frames.append(said)
+                    if len(self._frames) >= _FRAMES_AT_ONCE:
+                        due = time.monotonic() + _REPORT_SECONDS
+                        self._send_frames()
+                case Progressed():
+                    self._progress = said.share
+                case Failed():
+                    return JobEnd(outcome="failed", error=said.reason[-_ERROR_CHARACTERS:])
+                case Done():
+                    return JobEnd(outcome="done")
+        return JobEnd(outcome="released")
+
+    def _report(self) -> None:
+        try:
+            self._obey(self._client.report_job(self._claim.id, self._claim.attempt, self._progress))
+        except ServerUnavailableError as error:
+            # It may be back before the lease is over; if not, the next report is refused.
+            logger.warning("job %s: %s", self._claim.id, error)
+
+    def _send_frames(self) -> None:
+        frames, self._frames = self._frames, []
+        packed = b"".join(len(frame).to_bytes(FRAME_LENGTH_BYTES, "little") + frame for frame in frames)
+        if len(packed) > MAX_FRAMES_BYTES:
+            return
+        try:
+            self._obey(self._client.send_frames(self._claim.id, self._claim.attempt, packed))
+        except ServerUnavailableError as error:
+            logger.warning("job %s: %s", self._claim.id, error)
+
+    def _obey(self, orders: JobOrders) -> None:
+        if isinstance(self._claim.spec, ViewJob) and (orders.watch != self._told or not self._said):
+            self._told, self._said = orders.watch, True
+            try:
+                self._pipe.send(orders.watch)
+            except BrokenPipeError:
+                return  # it has ended, and whoever waits for it notices
+
+    def _died(self) -> JobEnd:
+        self._process.join(_EXIT_SECONDS)
+        code = self._process.exitcode
+        how = f"was killed by signal {-code} (out of memory, perhaps)" if code and code < 0 else f"ended with status {code}"
+        return JobEnd(outcome="lost", error=f"The process {how}.")

@@ -1,0 +1,153 @@
+"""What a job's process does: the job, and what it says of it over a pipe to the place that started it.
+
+Processes are forked from one that has imported all that they need (`workers.runtime.jobs.ready`), so that the first frame
+of a view comes in a fraction of a second. Each does one job and ends; a crash takes nothing else along.
+"""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from sim.errors import SimError
+from workers.errors import WorkerError
+from workers.frames import Frame
+from workers.job_protocol import JOB_SPEC, BaselineName, EvaluateJob, ExportJob, ReplayJob, ViewJob
+from workers.processes import die_with_parent
+from workers.reporting import EvaluationResult, EventLevel, WatchRequest
+
+ARCHIVE = "checkpoint.zip"
+"""In the job's folder: the policy's archive, where it has one."""
+RESULT = "result"
+"""In the job's folder: what comes out of it."""
+
+_PROGRESS_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """Share of the work that is done, 0 to 1."""
+
+    share: float
+
+
+@dataclass(frozen=True)
+class Failed:
+    """It would fail again; the reason, for people."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Done:
+    """All is done, and the result, where there is one, is complete on disk."""
+
+
+Said = Progressed | Failed | Done | bytes
+"""What a job's process says; bytes are an encoded frame of a view."""
+
+
+def main(spec: str, directory: str, connection: "Connection[Said, WatchRequest | None]") -> None:
+    """Do a job.
+
+    Args:
+        spec: a `JobSpec` as JSON.
+        directory: the job's folder.
+        connection: to the place; what comes in are the wishes of whoever watches.
+    """
+    die_with_parent(os.getppid())
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        _do(spec, Path(directory), connection)
+    except (WorkerError, SimError, OSError, ValueError, KeyError) as error:
+        connection.send(Failed(str(error.args[0]) if error.args else type(error).__name__))
+    else:
+        connection.send(Done())
+
+
+def _do(text: str, directory: Path, connection: "Connection[Said, WatchRequest | None]") -> None:
+    spec = JOB_SPEC.validate_json(text)
+    archive, result = directory / ARCHIVE, directory / RESULT
+    match spec:
+        case ViewJob():
+            _drive(archive, connection)
+        case ReplayJob():
+            from workers.replays.record import record
+
+            record(archive, spec.suite).save(result)
+        case ExportJob():
+            from workers.export.bundle import bundle, export_checkpoint
+
+            result.write_bytes(bundle(export_checkpoint(archive)))
+        case EvaluateJob():
+            result.write_text(_evaluate(spec, archive, connection).model_dump_json(), encoding="utf-8")
+
+
+def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, WatchRequest | None]") -> EvaluationResult:
+    from workers.training.measuring import measure
+
+    told = time.monotonic()
+
+    def progress(share: float) -> None:
+        nonlocal told
+        if time.monotonic() - told > _PROGRESS_SECONDS:
+            told = time.monotonic()
+            connection.send(Progressed(share))
+
+    return measure(None if isinstance(spec.policy, BaselineName) else archive, spec, progress)
+
+
+class _Screen:
+    """A reporter that sends frames over a pipe."""
+
+    def __init__(self, connection: "Connection[Said, WatchRequest | None]") -> None:
+        self._connection = connection
+        self._lock = threading.Lock()
+        self.watch: WatchRequest | None = None
+
+    def metrics(self, step: int, values: Mapping[str, float]) -> None:
+        """There are none."""
+
+    def event(self, step: int, level: EventLevel, message: str) -> None:
+        """Says why the view has stopped."""
+        with self._lock:
+            self._connection.send(Failed(message))
+
+    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
+        """There are none."""
+
+    def frames(self, frames: Sequence[Frame]) -> None:
+        """See `Reporter.frames`."""
+        with self._lock:
+            for frame in frames:
+                self._connection.send(frame.encode())
+
+    @property
+    def stop_requested(self) -> bool:
+        """Never."""
+        return False
+
+
+def _drive(archive: Path, connection: "Connection[Said, WatchRequest | None]") -> None:
+    """Drive for whoever watches, until nobody is left to say what to show."""
+    from sim.arenas import with_maps_of
+    from workers.checkpoints import read_policy
+    from workers.live.viewer import LiveViewer
+
+    manifest, policy = read_policy(archive)
+    screen = _Screen(connection)
+    viewer = LiveViewer(with_maps_of(manifest.training.task, manifest.seed), screen)
+    try:
+        while True:
+            wish = connection.recv()
+            # There are no training robots any more.
+            screen.watch = None if wish is None else wish.model_copy(update={"mode": "policy"})
+            viewer.on_weights(lambda: policy, manifest.step)
+    except EOFError:
+        return
+    finally:
+        viewer.close()
