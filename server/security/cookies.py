@@ -1,6 +1,6 @@
 """The login cookie."""
 
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 
 from server.security.secrets import Secrets
@@ -14,11 +14,33 @@ def cookie_name(settings: Settings) -> str:
     return f"mapless-{settings.port}"
 
 
+def session_cookie_name(settings: Settings) -> str:
+    """Of who signed in with an account."""
+    return f"mapless-session-{settings.port}"
+
+
+def session_cookie(request: HTTPConnection, settings: Settings, secret: str) -> str:
+    """The header that keeps a session's secret in the browser, as `set_login_cookie` keeps the login."""
+    response = Response()
+    _set(response, request, session_cookie_name(settings), secret)
+    return response.headers["set-cookie"]
+
+
+def clear_cookies(response: Response, settings: Settings) -> None:
+    """Log the browser out."""
+    for name in (cookie_name(settings), session_cookie_name(settings)):
+        response.delete_cookie(name, httponly=True, samesite="strict")
+
+
 def set_login_cookie(response: Response, request: Request, settings: Settings, secrets: Secrets) -> None:
     """Log the browser in: out of reach of scripts, and not sent along by other sites' pages."""
+    _set(response, request, cookie_name(settings), secrets.cookie)
+
+
+def _set(response: Response, request: HTTPConnection, name: str, value: str) -> None:
     response.set_cookie(
-        cookie_name(settings),
-        secrets.cookie,
+        name,
+        value,
         max_age=_THIRTY_DAYS,
         httponly=True,
         samesite="strict",

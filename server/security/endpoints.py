@@ -7,13 +7,14 @@ from fastapi import APIRouter, Request, Response, status
 from server.errors import UnauthorizedError
 from server.problems import TOO_MANY, UNAUTHORIZED
 from server.security.cookies import set_login_cookie
+from server.security.permissions import OPEN
 from server.security.schemas import Login
 from server.services import ServicesDep
 
 router = APIRouter(tags=["login"])
 
 
-@router.post("/api/login", status_code=status.HTTP_204_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY)
+@router.post("/api/login", status_code=status.HTTP_204_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY, dependencies=[OPEN])
 async def login(credentials: Login, request: Request, response: Response, services: ServicesDep) -> None:
     """Exchange the token that the server printed at start for a cookie."""
     await services.login_limiter.turn(request)
