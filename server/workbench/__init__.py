@@ -1,0 +1,1 @@
+"""Many trainings in order: found by any setting or figure, sorted, grouped, tagged, put away."""
