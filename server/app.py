@@ -10,31 +10,37 @@ from server import pages
 from server.abandoned import AbandonedRequestsMiddleware
 from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
+from server.audit import endpoints as audit
 from server.checkpoints import endpoints as checkpoints
 from server.checkpoints.archives import keep_swept
 from server.comparison import endpoints as comparison
 from server.database.engine import Database
 from server.database.migrate import upgrade
 from server.diagnoses import endpoints as diagnoses
+from server.evaluations import endpoints as evaluations
 from server.events import endpoints as events
 from server.events.position import PositionMiddleware
 from server.experiments import endpoints as experiments
 from server.exports import endpoints as exports
 from server.files import FileStore
+from server.jobs import endpoints as jobs
+from server.jobs.results import ResultStore
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.monitoring import endpoints as monitoring
 from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
+from server.people import endpoints as people
 from server.policies import endpoints as policies
 from server.problems import UNAUTHORIZED, install_error_handlers
+from server.projects import endpoints as projects
 from server.replays import endpoints as replays
-from server.replays.recordings import RecordingStore
 from server.reproduction import endpoints as reproduction
 from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
+from server.security.declared import check_permissions
 from server.security.headers import SecurityHeadersMiddleware
 from server.security.proxies import ClientAddressMiddleware
 from server.security.secrets import load_secrets
@@ -45,13 +51,21 @@ from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.system.readiness import ReadinessProbe
 from server.version import version
+from server.workbench import endpoints as workbench
+from server.workbench.indexing import keep_indexed
+from server.workbench.trash import keep_emptied
 from server.worker_api import endpoints as worker_api
+from server.worker_api import jobs as worker_jobs
 
 # A new domain's routes go here.
 ROUTERS: tuple[APIRouter, ...] = (
     system.router,
     login.router,
+    people.router,
+    audit.router,
+    projects.router,
     experiments.router,
+    workbench.router,
     gallery.router,
     runs.router,
     metrics.router,
@@ -65,6 +79,9 @@ ROUTERS: tuple[APIRouter, ...] = (
     events.router,
     live.router,
     worker_api.router,
+    worker_jobs.router,
+    jobs.router,
+    evaluations.router,
     monitoring.router,
 )
 
@@ -76,7 +93,7 @@ _COMPRESS_LEVEL = 3
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept)
+BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied)
 
 
 def create_services(settings: Settings) -> Services:
@@ -92,8 +109,8 @@ def create_services(settings: Settings) -> Services:
     upgrade(database, settings.database_wait_seconds)
     files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
     arenas = ArenaStore(settings.arenas_dir)
-    recordings = RecordingStore(settings.replays_dir, settings.max_replay_bytes)
-    return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas, recordings=recordings)
+    results = ResultStore(settings.replays_dir, settings.max_replay_bytes)
+    return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas, results=results)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -109,6 +126,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with AsyncExitStack() as stack:
             stack.callback(services.database.dispose)
             stack.callback(services.bus.close)
+            stack.callback(services.board.close)
             stack.push_async_callback(services.live.close)
             stack.push_async_callback(services.drivers.close)
             for background in BACKGROUND:
@@ -125,7 +143,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
     app.add_middleware(PositionMiddleware, bus=services.bus)
     app.add_middleware(
-        AccessMiddleware, settings=services.settings, secrets=services.secrets, limiter=services.login_limiter
+        AccessMiddleware,
+        settings=services.settings,
+        secrets=services.secrets,
+        limiter=services.login_limiter,
+        gate=services.gate,
     )
     app.add_middleware(SecurityHeadersMiddleware)
     app.add_middleware(RequestTimesMiddleware, instruments=services.instruments)
@@ -155,5 +177,6 @@ def describe(
     )
     install_error_handlers(app)
     for router in ROUTERS:
+        check_permissions(router)
         app.include_router(router)
     return app

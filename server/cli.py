@@ -9,6 +9,8 @@ import typer
 from pydantic import ValidationError
 
 from server.arenas.cli import app as arena_app
+from server.people.cli import app as people_app
+from workers.extension_cli import app as extension_app
 
 if TYPE_CHECKING:
     from server.settings import Settings
@@ -22,6 +24,8 @@ app = typer.Typer(
 )
 
 app.add_typer(arena_app, name="arena")
+app.add_typer(people_app, name="people")
+app.add_typer(extension_app, name="extension")
 
 # Everything after the command's name belongs to the workers' own command line, --help included.
 _PASSED_ON: dict[str, Any] = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}

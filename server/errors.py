@@ -1,6 +1,6 @@
 """The service's errors; each carries the HTTP status that it becomes and tells the reader what to do next.
 
-ServiceError                        500
+ServiceError (a sim.errors.MaplessError)   500
 ├── InvalidRequestError             400  the request makes no sense as a whole (a wrong Host header, say)
 ├── UnauthorizedError               401  no valid token
 ├── ForbiddenError                  403  a request from a foreign page, or a token without that right
@@ -12,15 +12,18 @@ ServiceError                        500
 ├── RefusedFieldError               422  a field of a form, told as FastAPI tells its own
 ├── CorruptUploadError              422  the bytes are not what their checksum says
 ├── TooManyAttemptsError            429  too many wrong tokens
-├── ExportFailedError               500  a policy could not be exported faithfully
-├── ReplayFailedError               500  an evaluation could not be driven again
+├── JobFailedError                  500  a worker could not do what was asked for
+│   ├── ExportFailedError                a policy could not be exported faithfully
+│   └── ReplayFailedError                an evaluation could not be driven again
 ├── DatabaseBusyError               503  other writers take too long
 ├── BusyError                       503  as much of this kind of work waits as may
-├── ExportTimeoutError              503  exporting took too long
-└── ReplayTimeoutError              503  driving an evaluation again took too long
+├── JobTimeoutError                 503  what was asked for took a worker too long
+└── NoWorkerError                   503  no worker is there to do it
 """
 
 from pydantic import BaseModel
+
+from sim.errors import MaplessError
 
 
 class ErrorBody(BaseModel):
@@ -29,7 +32,7 @@ class ErrorBody(BaseModel):
     detail: str
 
 
-class ServiceError(Exception):
+class ServiceError(MaplessError):
     """Base of everything that the service refuses; `status` is its HTTP status.
 
     Args:
@@ -98,13 +101,15 @@ class RefusedFieldError(ServiceError):
     Args:
         location: of the field, as FastAPI names it: "body", then the names that lead to it.
         message: what is wrong with it, and what would be right.
+        position: of the fault in the field's text, in characters from 0; None where all of it is meant.
     """
 
     status = 422
 
-    def __init__(self, location: tuple[str, ...], message: str) -> None:
+    def __init__(self, location: tuple[str, ...], message: str, position: int | None = None) -> None:
         super().__init__(message)
         self.location = location
+        self.position = position
 
 
 class CorruptUploadError(ServiceError):
@@ -125,31 +130,33 @@ class DatabaseBusyError(ServiceError):
     status = 503
 
 
-class ExportFailedError(ServiceError):
-    """A checkpoint's policy could not be exported, or the export does not equal it."""
-
-    status = 500
-
-
-class ExportTimeoutError(ServiceError):
-    """Exporting took too long; later it may not."""
-
-    status = 503
-
-
 class BusyError(ServiceError):
     """As much of this kind of work waits as may; later there is room."""
 
     status = 503
 
 
-class ReplayFailedError(ServiceError):
-    """An evaluation could not be driven again."""
+class JobFailedError(ServiceError):
+    """A worker could not do what was asked for; it would fail again."""
 
     status = 500
 
 
-class ReplayTimeoutError(ServiceError):
-    """Driving an evaluation again took too long; later it may not."""
+class ExportFailedError(JobFailedError):
+    """A checkpoint's policy could not be exported, or the export does not equal it."""
+
+
+class ReplayFailedError(JobFailedError):
+    """An evaluation could not be driven again."""
+
+
+class JobTimeoutError(ServiceError):
+    """What was asked for took too long; later it may not."""
+
+    status = 503
+
+
+class NoWorkerError(ServiceError):
+    """No worker is there to do what was asked for."""
 
     status = 503

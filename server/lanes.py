@@ -78,17 +78,29 @@ class Lane:
 class Lanes:
     """The lanes of a service.
 
-    An export takes a core and half a gigabyte, a replay a core; the later ones wait. The database takes one writer at a
-    time, so that a few threads serve all workers.
+    Filming an episode takes half a core's second. The database takes one writer at a time, so that a few threads serve all
+    workers.
     """
 
-    exports: Lane = field(default_factory=lambda: Lane("exports", threads=2, queue=8))
+    jobs: Lane = field(default_factory=lambda: Lane("jobs", threads=4))
     replays: Lane = field(default_factory=lambda: Lane("replays", threads=4, queue=12))
     downloads: Lane = field(default_factory=lambda: Lane("downloads", threads=4))
     workers: Lane = field(default_factory=lambda: Lane("workers", threads=4))
     metrics: Lane = field(default_factory=lambda: Lane("scrapes", threads=1, queue=4))
+    accounts: Lane = field(default_factory=lambda: Lane("accounts", threads=2))
+    # Each takes 64 MiB and a core for some 50 ms.
+    passwords: Lane = field(default_factory=lambda: Lane("sign-ins", threads=2, queue=16))
     sweeper: Lane = field(default_factory=lambda: Lane("sweeps", threads=1))
 
     def all(self) -> tuple[Lane, ...]:
         """Every lane, for whoever counts."""
-        return (self.exports, self.replays, self.downloads, self.workers, self.metrics, self.sweeper)
+        return (
+            self.jobs,
+            self.replays,
+            self.downloads,
+            self.workers,
+            self.metrics,
+            self.accounts,
+            self.passwords,
+            self.sweeper,
+        )

@@ -12,6 +12,8 @@ from server.errors import ErrorBody, RefusedFieldError, ServiceError
 Responses = dict[int | str, dict[str, Any]]
 
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
+FORBIDDEN: Responses = {403: {"model": ErrorBody, "description": "Takes more rights"}}
+INVALID: Responses = {400: {"model": ErrorBody, "description": "Makes no sense as a whole"}}
 NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}
 CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
 EXPORT_FAILED: Responses = {
@@ -21,6 +23,9 @@ EXPORT_FAILED: Responses = {
 REPLAY_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
     503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
+}
+BUSY: Responses = {
+    503: {"model": ErrorBody, "description": "Too many wait already: Retry-After says when to come again"},
 }
 TOO_MANY_STREAMS: Responses = {503: {"model": ErrorBody, "description": "Too many streams are open"}}
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
@@ -41,7 +46,9 @@ def install_error_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(RefusedFieldError)
     async def _refuse_field(_request: Request, error: RefusedFieldError) -> JSONResponse:
-        problem = {"loc": error.location, "msg": error.message, "type": "value_error"}
+        problem: dict[str, Any] = {"loc": error.location, "msg": error.message, "type": "value_error"}
+        if error.position is not None:
+            problem["ctx"] = {"position": error.position}
         return JSONResponse({"detail": [problem]}, status_code=error.status)
 
     @app.exception_handler(RequestValidationError)

@@ -28,6 +28,7 @@ class Page(Schema, Generic[Item]):
     total: int = Field(description="How many there are on all pages.")
 
 
+LACKING = "Extensions for want of which settings can't be read here."
 UNREADABLE = "Settings that another version stored and this one can't read, dotted: the defaults are shown in their place."
 
 
@@ -42,3 +43,12 @@ class Estimate(Schema):
     episodes: int = Field(ge=1, description="Episodes of all those runs together.")
     per_seed: list[float] = Field(description="The value of each of those runs.")
     failed: FailedSeeds | None = Field(description="What so few seeds leave open; null unless it is a success rate.")
+
+
+class SeedMean(Schema):
+    """A number over runs, in short."""
+
+    value: float = Field(description="Mean over the runs.")
+    low: float | None = Field(description="Lower end of the mean's 95 % interval over seeds; null for one run.")
+    high: float | None = Field(description="Upper end; null for one run.")
+    runs: int = Field(ge=1, description="Behind it.")

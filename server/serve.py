@@ -71,8 +71,13 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_GRACE_SECONDS,
         )
+
+        def end_streams() -> None:
+            services.bus.close()
+            services.board.close()
+
         url = login_url(settings, services.secrets.token)
-        server = _Server(config, on_ready=lambda: on_ready(url), end_streams=services.bus.close)
+        server = _Server(config, on_ready=lambda: on_ready(url), end_streams=end_streams)
         # uvicorn raises the signal that ended it once more when it has shut down; nothing is left to be interrupted.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         with contextlib.suppress(KeyboardInterrupt):

@@ -1,5 +1,6 @@
 """What every request and background task shares; `app.state.services` holds the one of an application."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -11,13 +12,16 @@ from server.database.engine import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
 from server.files import FileStore
+from server.jobs.board import Board
+from server.jobs.results import ResultStore
 from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
 from server.metrics.cache import AnswerCache
 from server.monitoring.instruments import Instruments
-from server.replays.recordings import RecordingStore
+from server.people.gate import Gate
+from server.projects.repository import ProjectRepository
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
@@ -34,23 +38,34 @@ class Services:
     database: Database
     files: FileStore
     arenas: ArenaStore
-    recordings: RecordingStore
-    bus: EventBus = field(default_factory=EventBus)
+    results: ResultStore
+    bus: EventBus = field(init=False)
     doorbell: Doorbell = field(default_factory=NoDoorbell)
     links: Links = field(default_factory=NoLinks)
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
     leases: Leases = field(init=False)
+    job_leases: Leases = field(init=False)
+    board: Board = field(default_factory=Board)
     instruments: Instruments = field(default_factory=Instruments)
     curves: AnswerCache = field(default_factory=AnswerCache)
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)
     login_limiter: GuessLimiter = field(init=False)
+    gate: Gate = field(init=False)
 
     def __post_init__(self) -> None:
         self.login_limiter = GuessLimiter(on_guess=self.instruments.wrong_secrets.inc)
+        self.bus = EventBus(find_projects=self._projects_of)
+        self.gate = Gate(self.database, self.lanes.accounts)
         self.drivers = PolicyDrivers(self.live)
         self.leases = Leases(self.settings.lease_seconds)
+        self.job_leases = Leases(self.settings.lease_seconds)
+
+    def _projects_of(self, experiment_ids: Collection[str]) -> dict[str, str]:
+        with self.database.read() as session:
+            found = ProjectRepository(session).of_experiments(experiment_ids)
+        return {experiment_id: project_id for experiment_id, (project_id,) in found.items()}
 
 
 def _services(connection: HTTPConnection) -> Services:

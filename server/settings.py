@@ -8,6 +8,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from workers.logs import LogFormat
+from workers.runtime.settings import EXTENSIONS_SETTING
 
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
 
@@ -77,11 +78,21 @@ class Settings(BaseSettings):
     workers: int | None = Field(
         None, ge=0, le=256, description="Local worker processes of `mapless up`; one a core if not given."
     )
-    lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run.")
+    jobs: int | None = Field(
+        None,
+        ge=0,
+        le=64,
+        description="Replays, exports and evaluations side by side in the workers of `mapless up`; 2 if not given.",
+    )
+    lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run or job.")
+    extensions: str = Field("", description=EXTENSIONS_SETTING)
     log_format: LogFormat = Field("text", description="Of the log on standard error: `text`, or `json`, an object a line.")
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
-    max_replay_bytes: int = Field(256 * 2**20, ge=0, description="Of all replays that are kept; older ones are made again.")
+    trash_days: float = Field(7.0, ge=0.0, le=3_650.0, description="How long what was deleted can be taken back.")
+    max_replay_bytes: int = Field(
+        256 * 2**20, ge=0, description="Of all replays and bundles that are kept; older ones are made again."
+    )
     request_seconds: float = Field(
         20.0, gt=0.0, le=600.0, description="How long a client may take for headers, and for the next part of a body."
     )

@@ -35,6 +35,8 @@ _FIRST_RESTART_SECONDS = 0.5
 _LAST_RESTART_SECONDS = 30.0
 # A process that ran for this long has not died of what it died of before.
 _STABLE_SECONDS = 60.0
+# One for what somebody waits for, one that takes evaluations too.
+_USUAL_JOBS = 2
 _LOG_BYTES = 10 * 2**20
 
 
@@ -166,7 +168,8 @@ class Supervisor:
                 stack.callback(signal.signal, number, signal.signal(number, self._on_signal))
             count = usable_cores() if settings.workers is None else settings.workers
             server = _server(settings)
-            worker = _worker(settings, secrets.worker_token, count) if count else None
+            jobs = (_USUAL_JOBS if count else 0) if settings.jobs is None else settings.jobs
+            worker = _worker(settings, secrets.worker_token, count, jobs) if count or jobs else None
             children = [server, *([worker] if worker else [])]
             stack.callback(self._stop, server, worker)
             server.start()
@@ -265,7 +268,7 @@ def _server(settings: Settings) -> Child:
     return Child("server", ["-m", "server", "serve"], environment, settings.data_dir / "logs" / "server.log")
 
 
-def _worker(settings: Settings, token: str, count: int) -> Child:
+def _worker(settings: Settings, token: str, count: int, jobs: int) -> Child:
     environment = _environment(
         settings,
         MAPLESS_SERVER_URL=local_url(settings),
@@ -274,5 +277,5 @@ def _worker(settings: Settings, token: str, count: int) -> Child:
         MAPLESS_WORKER_NAME="local",
         MAPLESS_WORK_DIR=str(settings.data_dir / "work"),
     )
-    command = ["-m", "workers", "worker", f"--concurrency={count}"]
+    command = ["-m", "workers", "worker", f"--concurrency={count}", f"--jobs={jobs}"]
     return Child("worker", command, environment, settings.data_dir / "logs" / "worker.log")

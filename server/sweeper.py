@@ -12,13 +12,15 @@ from starlette.concurrency import run_in_threadpool
 
 from server.doorbell import CeleryDoorbell, prepare_broker
 from server.experiments.stored import training_of
+from server.jobs.service import JobService
 from server.runs.repository import RunRepository
 from server.services import Services
-from server.system.repository import SILENCE_SECONDS, WorkerRepository
+from server.system.repository import SILENCE_SECONDS, WorkerRepository, versions_on
 from server.worker_api.ingest import Ingest
 from server.worker_api.leases import Attempt
 from server.worker_api.links import OpenLinks
 from server.worker_api.service import WorkerService
+from sim.extending.discovery import missing
 from workers.protocol import queues_of
 
 logger = logging.getLogger(__name__)
@@ -26,6 +28,8 @@ logger = logging.getLogger(__name__)
 _SWEEPS_PER_LEASE = 5
 # A run that waits although a worker is idle is rung again after this long: its message was lost.
 RING_AGAIN_SECONDS = 3.0
+# Between two looks at what has ended long ago.
+_FORGET_SECONDS = 600.0
 
 
 class Sweeper:
@@ -40,6 +44,8 @@ class Sweeper:
         self._services = services
         self._clock = clock
         self._service = WorkerService(services)
+        self._jobs = JobService(services)
+        self._forgot_at = 0.0
         self._lease_seconds = services.settings.lease_seconds
         self._swept_at: float | None = None
         self._rung_all = False
@@ -59,8 +65,13 @@ class Sweeper:
         now = self._clock()
         if self._swept_at is not None and now - self._swept_at > self._lease_seconds / 2:
             self._services.leases.renew_all()
+            self._services.job_leases.renew_all()
         self._swept_at = now
         self._service.lose_expired()
+        self._jobs.lose_expired()
+        if not self._rung_all or now - self._forgot_at > _FORGET_SECONDS:
+            self._jobs.forget_old()
+            self._forgot_at = now
         self._ring_again(now, everybody=not self._rung_all)
         self._rung_all = True
 
@@ -69,14 +80,19 @@ class Sweeper:
         moment = time.time()
         with self._services.database.read() as session:
             waiting = RunRepository(session).queued()
-            idle = WorkerRepository(session).idle_by_queue(moment - SILENCE_SECONDS, moment)
+            idle = [
+                (worker.queue, versions_on(worker))
+                for worker in WorkerRepository(session).idle(moment - SILENCE_SECONDS, moment)
+            ]
         # Whoever queued a run has rung for it: one that is new here was rung a moment ago.
         quiet_since = {(run.id, run.attempt): self._quiet_since.get((run.id, run.attempt), now) for run in waiting}
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
             quiet = now - quiet_since[run.id, run.attempt]
-            for queue in queues_of(training_of(run.experiment), run.device):
-                if everybody or (quiet >= RING_AGAIN_SECONDS and rung[queue] < idle.get(queue, 0)):
+            training = training_of(run.experiment)
+            for queue in queues_of(training, run.device):
+                takers = sum(there == queue and not missing(training.extensions, has) for there, has in idle)
+                if everybody or (quiet >= RING_AGAIN_SECONDS and rung[queue] < takers):
                     quiet_since[run.id, run.attempt] = now
                     self._services.doorbell.ring(run.id, run.attempt, queue)
                     rung[queue] += 1
@@ -88,6 +104,8 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     """Reach workers for as long as the block lasts: doorbell, links and sweeper."""
     broker_url, prefix = services.settings.resolved_broker_url, services.settings.queue_prefix
     await run_in_threadpool(prepare_broker, broker_url, prefix)
+    # Nobody has a view open of a server that starts.
+    await run_in_threadpool(JobService(services).cancel_all, "view")
     doorbell = CeleryDoorbell(broker_url, prefix)
     services.doorbell = doorbell
     ingest = Ingest(WorkerService(services).receive)

@@ -5,13 +5,23 @@ import base64
 from sqlalchemy import func, select
 
 from server.arenas.schemas import ArenaSummary, ArenaUpload, ArenaView
+from server.audit.repository import AuditRepository
 from server.database import tables
-from server.errors import ConflictError, UnusableArenaError
+from server.errors import ConflictError, NotFoundError, UnusableArenaError
 from server.services import Services
 from sim.arenas import build_arenas
 from sim.arenas.document import free_area, to_arena, to_document
 from sim.arenas.files import read_arena
-from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, FamilyName, GeneratedArenaConfig, ImportedArenaConfig
+from sim.config import (
+    ADDED_FAMILIES,
+    AddedArenaPool,
+    AnyArenaConfig,
+    ArenaConfig,
+    ArenaFile,
+    FamilyName,
+    GeneratedArenaConfig,
+    ImportedArenaConfig,
+)
 from sim.errors import ArenaFileError
 
 _FIXED = (("Simple", ArenaConfig(name="simple")), ("Complex", ArenaConfig(name="complex")))
@@ -25,7 +35,11 @@ _FAMILIES: tuple[tuple[str, FamilyName], ...] = (
     ("Thicket of pillars", "thicket"),
     ("Clutter and thickets", "mixed"),
 )
-_TITLES = {config.name: title for title, config in _FIXED} | {name: title for title, name in _FAMILIES}
+_POOLS: tuple[tuple[str, GeneratedArenaConfig | AddedArenaPool], ...] = (
+    *((title, GeneratedArenaConfig(name=name)) for title, name in _FAMILIES),
+    *((str(family.model_fields["name"].title), family.model_validate({})) for family in ADDED_FAMILIES),
+)
+_TITLES: dict[str, str] = {config.name: title for title, config in (*_FIXED, *_POOLS)}
 
 
 class ArenaService:
@@ -42,8 +56,8 @@ class ArenaService:
             for title, config in _FIXED
         ]
         generated = [
-            ArenaSummary(kind="generated", key=name, title=title, config=GeneratedArenaConfig(name=name), imported_at=None)
-            for title, name in _FAMILIES
+            ArenaSummary(kind="generated", key=config.name, title=title, config=config, imported_at=None)
+            for title, config in _POOLS
         ]
         imported = [
             ArenaSummary(
@@ -61,9 +75,17 @@ class ArenaService:
         """A built-in arena."""
         return self._view(_TITLES[config.name], config, to_document(build_arenas(config)[0]))
 
-    def generated(self, config: GeneratedArenaConfig) -> ArenaView:
-        """The first map of a family's pool."""
-        (arena,) = build_arenas(config.model_copy(update={"maps": 1}))
+    def generated(self, name: str, difficulty: float, seed: int) -> ArenaView:
+        """The first map of a family's pool.
+
+        Raises:
+            NotFoundError: there is no such family.
+        """
+        config = next((pool for _, pool in _POOLS if pool.name == name), None)
+        if config is None:
+            raise NotFoundError.of("family of arenas", name)
+        config = config.model_copy(update={"difficulty": difficulty, "seed": seed, "maps": 1, "own_maps": False})
+        (arena,) = build_arenas(config)
         return self._view(_TITLES[config.name], config, to_document(arena))
 
     def imported(self, sha256: str) -> ArenaView:
@@ -91,7 +113,9 @@ class ArenaService:
         except ArenaFileError as error:
             raise UnusableArenaError(str(error)) from error
         if upload.keep:
-            return self.imported(self._store.add(document))
+            sha256 = self._store.add(document)
+            self._note("arena.imported", sha256, document.name)
+            return self.imported(sha256)
         config = ImportedArenaConfig(sha256=document.sha256)
         return self._view(document.name, config, document, known=False)
 
@@ -102,12 +126,17 @@ class ArenaService:
             NotFoundError: there is none of this hash.
             ConflictError: an experiment trains on it.
         """
-        self._store.get(sha256)
+        name = self._store.get(sha256).document.name
         if count := self._trainings(sha256):
             raise ConflictError(
                 f"{count} training{'s' if count > 1 else ''} use{'' if count > 1 else 's'} this arena: delete those first."
             )
         self._store.delete(sha256)
+        self._note("arena.deleted", sha256, name)
+
+    def _note(self, action: str, sha256: str, name: str) -> None:
+        with self._services.database.write() as session:
+            AuditRepository(session).add(action, target=sha256, name=name)
 
     def _trainings(self, sha256: str) -> int:
         used = tables.Experiment.training["task"]["arena"]["sha256"].as_string()

@@ -6,21 +6,16 @@ store. What was never registered is doomed an hour after it began, in a transact
 registered any more, whatever the clock says, and its file may go.
 """
 
-import asyncio
-import contextlib
-import logging
 import time
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 
 from sqlalchemy import delete, select, update
 from sqlalchemy.orm import Session
-from starlette.concurrency import run_in_threadpool
 
+from server.background import kept_up
 from server.database import tables
 from server.services import Services
-
-logger = logging.getLogger(__name__)
 
 GRACE_SECONDS = 3_600.0
 """An upload that takes longer is begun anew."""
@@ -81,22 +76,10 @@ def sweep_archives(services: Services, now: float) -> int:
 @asynccontextmanager
 async def keep_swept(services: Services) -> AsyncIterator[None]:
     """Sweep the store at start and every ten minutes, for as long as the block lasts."""
-    task = asyncio.create_task(_sweep_regularly(services))
-    try:
+    async with kept_up(
+        lambda: sweep_archives(services, time.time()),
+        at_once=_AT_ONCE,
+        pause=_PAUSE_SECONDS,
+        failed="archives that no checkpoint names could not be removed: the next sweep tries again",
+    ):
         yield
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
-
-
-async def _sweep_regularly(services: Services) -> None:
-    while True:
-        removed = 0
-        try:
-            removed = await run_in_threadpool(sweep_archives, services, time.time())
-        except Exception:
-            # The store may be away for a while.
-            logger.exception("archives that no checkpoint names could not be removed: the next sweep tries again")
-        if removed < _AT_ONCE:
-            await asyncio.sleep(_PAUSE_SECONDS)

@@ -9,6 +9,7 @@ from server.checkpoints.schemas import CheckpointPage, Episodes
 from server.checkpoints.service import CheckpointService
 from server.paging import WindowDep
 from server.problems import NOT_FOUND, Responses
+from server.security.permissions import view
 from server.services import ServicesDep
 
 router = APIRouter(tags=["checkpoints"])
@@ -23,7 +24,7 @@ def _service(services: ServicesDep) -> CheckpointService:
 CheckpointServiceDep = Annotated[CheckpointService, Depends(_service)]
 
 
-@router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND)
+@router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND, dependencies=[view("run_id")])
 def list_checkpoints(
     run_id: str,
     service: CheckpointServiceDep,
@@ -34,20 +35,25 @@ def list_checkpoints(
     return service.of_run(run_id, window, step)
 
 
-@router.get("/api/checkpoints/{checkpoint_id}/download", response_class=StreamingResponse, responses=NOT_FOUND | _ZIP)
+@router.get(
+    "/api/checkpoints/{checkpoint_id}/download",
+    response_class=StreamingResponse,
+    responses=NOT_FOUND | _ZIP,
+    dependencies=[view("checkpoint_id")],
+)
 async def download_checkpoint(checkpoint_id: str, service: CheckpointServiceDep, services: ServicesDep) -> StreamingResponse:
     """The archive: weights as safetensors, manifest as JSON, and the state to resume."""
     lane = services.lanes.downloads
-    download = await lane.run(service.download, checkpoint_id)
+    download = await lane.run(service.take_home, checkpoint_id)
     headers = {
-        "Content-Disposition": f'attachment; filename="{download.file_name}"',
-        "Content-Length": str(download.size),
-        "ETag": f'"{download.sha256}"',
+        "Content-Disposition": f'attachment; filename="{download.archive.file_name}"',
+        "Content-Length": str(download.archive.size),
+        "ETag": f'"{download.archive.sha256}"',
     }
     return StreamingResponse(lane.each(download.blocks), media_type="application/zip", headers=headers)
 
 
-@router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND)
+@router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
 def list_episodes(checkpoint_id: str, service: CheckpointServiceDep) -> Episodes:
     """Every episode behind the checkpoint's figures."""
     return service.episodes(checkpoint_id)

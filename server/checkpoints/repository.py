@@ -44,7 +44,15 @@ class CheckpointRepository:
                     episodes=zlib.compress(_EPISODES.dump_json(evaluation.episodes)),
                 )
             )
+            self._keep_last(run_id, step, evaluation, len(arrived))
         return checkpoint
+
+    def _keep_last(self, run_id: str, step: int, evaluation: EvaluationResult, arrivals: int) -> None:
+        """Beside the run, unless a later step has been evaluated."""
+        run = self._session.get_one(tables.Run, run_id)
+        if run.final_step is None or run.final_step <= step:
+            run.final_step, run.final_suite = step, evaluation.suite_hash
+            run.final_arrivals, run.final_episodes = arrivals, len(evaluation.episodes)
 
     def get(self, checkpoint_id: str) -> tables.Checkpoint:
         """The checkpoint.

@@ -4,8 +4,8 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
+from server.audit.repository import AuditRepository
 from server.checkpoints import views
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.checkpoints.schemas import CheckpointPage, Episodes
@@ -17,18 +17,20 @@ _MAX_SLUG = 60
 
 
 @dataclass(frozen=True)
-class Download:
-    """An archive on its way out: bytes, how many, and under what name to save them."""
+class Described:
+    """An archive: under what name to save it, how many bytes it has, and their SHA-256."""
 
     file_name: str
     size: int
     sha256: str
-    blocks: Iterator[bytes]
 
-    def save(self, path: Path) -> None:
-        """Write the archive to a file."""
-        with path.open("wb") as file:
-            file.writelines(self.blocks)
+
+@dataclass(frozen=True)
+class Download:
+    """An archive on its way out."""
+
+    archive: Described
+    blocks: Iterator[bytes]
 
 
 class CheckpointService:
@@ -72,17 +74,45 @@ class CheckpointService:
                 episodes=decode_episodes(evaluation),
             )
 
-    def download(self, checkpoint_id: str) -> Download:
-        """The archive.
+    def described(self, checkpoint_id: str) -> Described:
+        """What there is to know of an archive without reading it.
 
         Raises:
             NotFoundError: there is no such checkpoint, or its file is gone.
         """
+        described = self._described(checkpoint_id)
+        self._services.files.open(checkpoint_id).close()
+        return described
+
+    def _described(self, checkpoint_id: str) -> Described:
         with self._services.database.read() as session:
             checkpoint = CheckpointRepository(session).get(checkpoint_id)
             run = RunRepository(session).get(checkpoint.run_id)
             file_name = f"mapless-{_slug(run.experiment.name)}-seed{run.seed}-step{checkpoint.step}.zip"
-        return Download(file_name, checkpoint.size, checkpoint.sha256, self._services.files.read(checkpoint_id))
+        return Described(file_name, checkpoint.size, checkpoint.sha256)
+
+    def take_home(self, checkpoint_id: str) -> Download:
+        """`download`, for a person: who took what home is kept.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or its file is gone.
+        """
+        return Download(self.taken_home(checkpoint_id), self._services.files.read(checkpoint_id))
+
+    def taken_home(self, checkpoint_id: str) -> Described:
+        """`described`, for a person who takes what is made of it home.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or its file is gone.
+        """
+        archive = self.described(checkpoint_id)
+        with self._services.database.write() as session:
+            checkpoint = CheckpointRepository(session).get(checkpoint_id)
+            project_id = RunRepository(session).get(checkpoint.run_id).experiment.project_id
+            AuditRepository(session).add(
+                "checkpoint.downloaded", target=checkpoint_id, name=archive.file_name, project_id=project_id
+            )
+        return archive
 
 
 def _slug(name: str) -> str:

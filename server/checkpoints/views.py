@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Protocol
 
 from server.checkpoints.schemas import Checkpoint, Evaluation
 from server.database import tables
@@ -9,7 +10,23 @@ from server.estimates import success_estimate
 from server.schemas import Estimate
 
 
-def success_over_runs(evaluations: Sequence[tables.Evaluation]) -> Estimate | None:
+class Evaluated(Protocol):
+    """What an evaluation says of success."""
+
+    @property
+    def suite_hash(self) -> str:
+        """Of the suite."""
+
+    @property
+    def arrivals(self) -> int:
+        """Episodes that arrived."""
+
+    @property
+    def episode_count(self) -> int:
+        """Episodes in all."""
+
+
+def success_over_runs(evaluations: Sequence[Evaluated]) -> Estimate | None:
     """Success rate over runs, one evaluation each, of those on the suite that most of them were measured on."""
     if not evaluations:
         return None

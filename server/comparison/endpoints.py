@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query
 from server.comparison.schemas import Comparison, Curves
 from server.comparison.service import ComparisonService
 from server.problems import NOT_FOUND
+from server.security.permissions import view
 from server.services import ServicesDep
 
 router = APIRouter(prefix="/api/compare", tags=["comparison"])
@@ -16,7 +17,7 @@ ExperimentIds = Annotated[
 ]
 
 
-@router.get("", responses=NOT_FOUND)
+@router.get("", responses=NOT_FOUND, dependencies=[view("experiment")])
 def compare(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
@@ -28,7 +29,7 @@ def compare(
     return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin)
 
 
-@router.get("/curves", responses=NOT_FOUND)
+@router.get("/curves", responses=NOT_FOUND, dependencies=[view("experiment")])
 def compare_curves(
     experiment_ids: ExperimentIds,
     services: ServicesDep,

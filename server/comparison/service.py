@@ -11,6 +11,7 @@ from server.comparison.figures import FinalFigures, final_figures
 from server.comparison.schemas import Comparison, Curves, ExperimentCurves, SeedCurve
 from server.comparison.verdicts import verdicts
 from server.database import tables
+from server.estimates import is_rate
 from server.experiments.repository import ExperimentRepository
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
@@ -20,7 +21,7 @@ from server.services import Services
 from workers.statistics.seeds import means_band, rates_band
 
 # Metrics between 0 and 1, and those among them that every evaluation counts over its suite's episodes.
-_RATE, _EVALUATION = "_rate", "eval/"
+_EVALUATION = "eval/"
 
 
 class ComparisonService:
@@ -109,7 +110,7 @@ def _curves(
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
     counted = name.startswith(_EVALUATION) and driven[np.isfinite(values).any(axis=1)].all()
-    if not name.endswith(_RATE):
+    if not is_rate(name):
         mean, low, high = means_band(values)
     else:
         mean, low, high = rates_band(values, driven if counted else None)

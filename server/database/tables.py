@@ -3,17 +3,48 @@
 import time
 from typing import Any, Literal
 
-from sqlalchemy import JSON, BigInteger, Boolean, Float, ForeignKey, Index, Integer, LargeBinary, String, Text
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Boolean,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    String,
+    Text,
+    UniqueConstraint,
+    text,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
+from workers.job_protocol import JobKind
 from workers.protocol import Queue
 from workers.reporting import EventLevel
 
 RunState = Literal["queued", "running", "stopping", "stopped", "completed", "failed"]
+Role = Literal["viewer", "editor", "admin"]
+TokenScope = Literal["read", "launch", "admin"]
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 
 class Base(DeclarativeBase):
     """Declarative base of every table."""
+
+
+# Of the project that every database begins with: what is launched into none is its.
+DEFAULT_PROJECT = "default"
+
+
+class Project(Base):
+    """What belongs together: experiments, and the people who may see them."""
+
+    __tablename__ = "projects"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    name: Mapped[str] = mapped_column(String(80), unique=True)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
 
 
 class Experiment(Base):
@@ -22,16 +53,60 @@ class Experiment(Base):
     __tablename__ = "experiments"
 
     id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    project_id: Mapped[str] = mapped_column(ForeignKey("projects.id"), index=True, default=DEFAULT_PROJECT)
     name: Mapped[str] = mapped_column(String(120))
     training: Mapped[dict[str, Any]] = mapped_column(JSON)
     created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
     # Of the paper's reproduction: experiments launched together share the first, the second names the table's row.
     campaign: Mapped[str | None] = mapped_column(String(16), index=True)
     campaign_row: Mapped[str | None] = mapped_column(String(64))
+    # Markdown.
+    notes: Mapped[str | None] = mapped_column(Text)
+    starred_at: Mapped[float | None] = mapped_column(Float)
+    archived_at: Mapped[float | None] = mapped_column(Float)
+    # In the trash since then; what lies there for long is removed.
+    deleted_at: Mapped[float | None] = mapped_column(Float, index=True)
+    # The form of the settings under which `ExperimentKey` has them; another one than this version's, and they are due.
+    indexed_as: Mapped[str | None] = mapped_column(String(12), index=True)
 
     runs: Mapped[list["Run"]] = relationship(
         back_populates="experiment", cascade="all, delete-orphan", passive_deletes=True, order_by="Run.seed"
     )
+
+
+class ExperimentKey(Base):
+    """One value of an experiment's settings under its dotted name ("algorithm.gamma"), to filter, sort and group by.
+
+    A number is in `number`, everything else in `text`, cut to its length.
+    """
+
+    __tablename__ = "experiment_keys"
+    __table_args__ = (Index("experiment_keys_by_key", "key"),)
+
+    experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), primary_key=True)
+    key: Mapped[str] = mapped_column(String(160), primary_key=True)
+    number: Mapped[float | None] = mapped_column(Float)
+    text: Mapped[str | None] = mapped_column(String(200))
+
+
+class ExperimentTag(Base):
+    """A word that people have put on an experiment."""
+
+    __tablename__ = "experiment_tags"
+
+    experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), primary_key=True)
+    tag: Mapped[str] = mapped_column(String(40), primary_key=True, index=True)
+
+
+class SavedView(Base):
+    """A view of the table of trainings under a name: the query of its address."""
+
+    __tablename__ = "saved_views"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    name: Mapped[str] = mapped_column(String(80), unique=True)
+    address: Mapped[str] = mapped_column(Text)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
 
 
 class Run(Base):
@@ -51,6 +126,8 @@ class Run(Base):
     worker: Mapped[str | None] = mapped_column(String(120))
     # Chosen by the worker that has it: asked again under the same one, its claim is the same.
     claim_id: Mapped[str | None] = mapped_column(String(32))
+    # Id of the workers' token that it was claimed with; null for the installation's own.
+    claimed_with: Mapped[str | None] = mapped_column(String(16))
     # Where the training's device is "auto": the one that it began on, and goes on on.
     device: Mapped[str | None] = mapped_column(String(8))
     # Attempts lost since the last new checkpoint, and how many of them by each worker.
@@ -63,6 +140,11 @@ class Run(Base):
     queued_at: Mapped[float] = mapped_column(Float, default=time.time)
     started_at: Mapped[float | None] = mapped_column(Float)
     finished_at: Mapped[float | None] = mapped_column(Float)
+    # Of its last evaluated checkpoint, for lists of many.
+    final_step: Mapped[int | None] = mapped_column(BigInteger)
+    final_suite: Mapped[str | None] = mapped_column(String(64))
+    final_arrivals: Mapped[int | None] = mapped_column(Integer)
+    final_episodes: Mapped[int | None] = mapped_column(Integer)
 
     experiment: Mapped[Experiment] = relationship(back_populates="runs")
 
@@ -188,3 +270,188 @@ class Worker(Base):
     trouble: Mapped[str | None] = mapped_column(Text)
     # When it was asked to finish its runs and take up no more; null unless it was.
     drained_at: Mapped[float | None] = mapped_column(Float)
+    # What it said of the extensions that were found where it runs (`workers.protocol.ExtensionState`).
+    extensions: Mapped[list[dict[str, str | None]] | None] = mapped_column(JSON)
+
+
+class User(Base):
+    """A person with an account; `issuer` and `subject` are kept for who will sign in with a provider of identities."""
+
+    __tablename__ = "users"
+    __table_args__ = (UniqueConstraint("issuer", "subject"),)
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    # In lower case: what is typed to sign in.
+    name: Mapped[str] = mapped_column(String(80), unique=True)
+    email: Mapped[str | None] = mapped_column(String(254), unique=True)
+    password_hash: Mapped[str | None] = mapped_column(Text)
+    issuer: Mapped[str | None] = mapped_column(String(255))
+    subject: Mapped[str | None] = mapped_column(String(255))
+    # Of the whole installation: every project, people, and the log of what was done.
+    admin: Mapped[bool] = mapped_column(Boolean, default=False)
+    disabled_at: Mapped[float | None] = mapped_column(Float)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+
+
+class Membership(Base):
+    """What a person may do in a project."""
+
+    __tablename__ = "memberships"
+
+    project_id: Mapped[str] = mapped_column(ForeignKey("projects.id", ondelete="CASCADE"), primary_key=True)
+    user_id: Mapped[str] = mapped_column(ForeignKey("users.id", ondelete="CASCADE"), primary_key=True, index=True)
+    role: Mapped[Role] = mapped_column(String(8))
+
+
+class Invitation(Base):
+    """A link that makes an account, adds a project to one, or sets its password; once, and not for ever.
+
+    Secrets of this table and those below are kept as their SHA-256: they are too long to be guessed.
+    """
+
+    __tablename__ = "invitations"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    # Whose password is set; null where somebody joins.
+    user_id: Mapped[str | None] = mapped_column(ForeignKey("users.id", ondelete="CASCADE"))
+    project_id: Mapped[str | None] = mapped_column(ForeignKey("projects.id", ondelete="CASCADE"))
+    role: Mapped[Role | None] = mapped_column(String(8))
+    admin: Mapped[bool] = mapped_column(Boolean, default=False)
+    note: Mapped[str] = mapped_column(String(120), default="")
+    invited_by: Mapped[str] = mapped_column(String(120))
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    expires_at: Mapped[float] = mapped_column(Float)
+    used_at: Mapped[float | None] = mapped_column(Float)
+
+
+class LoginSession(Base):
+    """A browser that somebody signed in with."""
+
+    __tablename__ = "sessions"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    user_id: Mapped[str] = mapped_column(ForeignKey("users.id", ondelete="CASCADE"), index=True)
+    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    # Of the secret before: requests that were under way when it changed bring it.
+    previous_hash: Mapped[str | None] = mapped_column(String(64), index=True)
+    rotated_at: Mapped[float] = mapped_column(Float, default=time.time)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    seen_at: Mapped[float] = mapped_column(Float, default=time.time)
+    expires_at: Mapped[float] = mapped_column(Float)
+    address: Mapped[str] = mapped_column(String(64))
+    browser: Mapped[str] = mapped_column(String(200))
+
+
+class ApiToken(Base):
+    """A person's token for programs: at most what the person may, within `scope` and `projects` (null: all)."""
+
+    __tablename__ = "api_tokens"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    user_id: Mapped[str] = mapped_column(ForeignKey("users.id", ondelete="CASCADE"), index=True)
+    name: Mapped[str] = mapped_column(String(80))
+    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    scope: Mapped[TokenScope] = mapped_column(String(8))
+    projects: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    expires_at: Mapped[float | None] = mapped_column(Float)
+    seen_at: Mapped[float | None] = mapped_column(Float)
+    revoked_at: Mapped[float | None] = mapped_column(Float)
+
+
+class WorkerToken(Base):
+    """A token for the workers of one machine; its name stands in the log of every run that they take up."""
+
+    __tablename__ = "worker_tokens"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    name: Mapped[str] = mapped_column(String(80))
+    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    seen_at: Mapped[float | None] = mapped_column(Float)
+    revoked_at: Mapped[float | None] = mapped_column(Float)
+
+
+class AuditEntry(Base):
+    """Who did what: written with it in one transaction, and never changed (a trigger refuses it).
+
+    Nothing of it hangs on another table: it outlives what it tells of.
+    """
+
+    __tablename__ = "audit_entries"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    actor: Mapped[str] = mapped_column(String(120), index=True)
+    user_id: Mapped[str | None] = mapped_column(String(16))
+    address: Mapped[str] = mapped_column(String(64))
+    action: Mapped[str] = mapped_column(String(40), index=True)
+    target: Mapped[str | None] = mapped_column(String(64))
+    name: Mapped[str | None] = mapped_column(String(254))
+    project_id: Mapped[str | None] = mapped_column(String(16), index=True)
+    details: Mapped[str | None] = mapped_column(Text)
+
+
+class Job(Base):
+    """Something that somebody asked for beside trainings. (state, attempt) is what a worker's claim compares and sets.
+
+    `key` says what comes out of it: what is asked for twice is one job for as long as it is open.
+    """
+
+    __tablename__ = "jobs"
+    __table_args__ = (
+        Index("jobs_by_state", "state", "priority", "created_at"),
+        Index(
+            "open_jobs_by_key",
+            "key",
+            unique=True,
+            sqlite_where=text("state IN ('queued', 'running')"),
+            postgresql_where=text("state IN ('queued', 'running')"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    kind: Mapped[JobKind] = mapped_column(String(12))
+    key: Mapped[str] = mapped_column(String(120))
+    title: Mapped[str] = mapped_column(String(200))
+    spec: Mapped[dict[str, Any]] = mapped_column(JSON)
+    # Of the policy's archive; null where the job needs none.
+    sha256: Mapped[str | None] = mapped_column(String(64))
+    state: Mapped[JobState] = mapped_column(String(12), default="queued")
+    priority: Mapped[int] = mapped_column(Integer)
+    attempt: Mapped[int] = mapped_column(Integer, default=0)
+    worker: Mapped[str | None] = mapped_column(String(120))
+    claim_id: Mapped[str | None] = mapped_column(String(32))
+    # Attempts lost, and how many of them by each worker.
+    losses: Mapped[int] = mapped_column(Integer, default=0)
+    lost_by: Mapped[dict[str, int] | None] = mapped_column(JSON)
+    error: Mapped[str | None] = mapped_column(Text)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    started_at: Mapped[float | None] = mapped_column(Float)
+    finished_at: Mapped[float | None] = mapped_column(Float)
+
+
+class PolicyEvaluation(Base):
+    """A policy or a baseline on a suite that somebody asked for; without figures until its job is done."""
+
+    __tablename__ = "policy_evaluations"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    # No foreign key: jobs are forgotten after a while.
+    job_id: Mapped[str] = mapped_column(String(16), index=True)
+    key: Mapped[str] = mapped_column(String(120), index=True)
+    title: Mapped[str] = mapped_column(String(200))
+    policy: Mapped[dict[str, Any]] = mapped_column(JSON)
+    choice: Mapped[dict[str, Any]] = mapped_column(JSON)
+    # Of the policy's task, metres.
+    arrival_distance: Mapped[float] = mapped_column(Float)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    # Why there will be no figures.
+    error: Mapped[str | None] = mapped_column(Text)
+    # Null until the job is done.
+    suite: Mapped[str | None] = mapped_column(String(64))
+    suite_hash: Mapped[str | None] = mapped_column(String(64), index=True)
+    figures: Mapped[dict[str, Any] | None] = mapped_column(JSON)
+    # Zlib-compressed JSON, as of `Evaluation`.
+    episodes: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)

@@ -20,6 +20,7 @@ from server.files import FileStore
 from server.listening import local_url
 from server.settings import Settings
 from server.version import commit, version
+from sim.extending.discovery import installed
 from workers.runtime.app import create_app
 
 _MIN_FREE = 2**30
@@ -48,6 +49,7 @@ def examine(settings: Settings, min_free: int = _MIN_FREE) -> list[Finding]:
         ("clock", lambda: _clock(settings), "Set the clocks by NTP on this machine and on the database's."),
         ("broker", lambda: _broker(settings), f"Start it, or point MAPLESS_BROKER_URL at it; now: {broker}"),
         ("store", lambda: _store(settings), "Make the place of MAPLESS_FILES_URL writable, or choose another."),
+        ("extensions", _extensions, "Install it anew, or take it out of this environment and of MAPLESS_EXTENSIONS."),
         ("server", lambda: _server(settings), "The server's log says why; restart it if it stays so."),
     )
     return [look(name, check, advice) for name, check, advice in parts]
@@ -163,6 +165,13 @@ def _store(settings: Settings) -> str:
         return f"{url} will be made at the first start"
     FileStore(url, settings.max_checkpoint_bytes).probe()
     return f"{url}: written, read and removed"
+
+
+def _extensions() -> str:
+    found = installed()
+    if found.refused:
+        raise OSError("; ".join(f"{one.name} is refused: {one.reason}" for one in found.refused))
+    return ", ".join(f"{one.name} {one.version}" for one in found.extensions) or "none"
 
 
 def _server(settings: Settings) -> str:

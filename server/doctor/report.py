@@ -20,7 +20,7 @@ def report(settings: Settings, *, as_json: bool) -> tuple[str, bool]:
         return json.dumps({"ok": well, "findings": [asdict(finding) for finding in findings]}, indent=2), well
     lines = []
     for finding in findings:
-        lines.append(f"{'ok  ' if finding.ok else 'FAIL'}  {finding.name:<9} {finding.found}")
+        lines.append(f"{'ok  ' if finding.ok else 'FAIL'}  {finding.name:<10} {finding.found}")
         if finding.advice is not None:
-            lines.append(f"{'':<16}{finding.advice}")
+            lines.append(f"{'':<17}{finding.advice}")
     return "\n".join(lines), well

@@ -8,7 +8,7 @@ import asyncio
 import secrets
 import threading
 from collections import OrderedDict, deque
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 
 from server.errors import BusyError
@@ -34,8 +34,9 @@ def _event(position: str, name: str, data: str) -> bytes:
 class Subscription:
     """One listener's pending events. Belongs to the event loop."""
 
-    def __init__(self, shown: Shown | None) -> None:
+    def __init__(self, shown: Shown | None, projects: frozenset[str] | None = None) -> None:
         self.shown = shown
+        self.projects = projects
         self._pending: deque[bytes] = deque()
         self._closed = False
         self._woken = asyncio.Event()
@@ -73,9 +74,17 @@ class EventBus:
     Args:
         pause: seconds between two events of a stream.
         remembered: that many of the newest changes are told to whoever comes back and says where it was.
+        find_projects: the project of each of the experiments, on a thread; asked for what `belongs` has not told, and only
+            while somebody listens who may not hear everything.
     """
 
-    def __init__(self, pause: float = _PAUSE, remembered: int = _REMEMBERED) -> None:
+    def __init__(
+        self,
+        pause: float = _PAUSE,
+        remembered: int = _REMEMBERED,
+        find_projects: Callable[[Collection[str]], Mapping[str, str]] = lambda _: {},
+    ) -> None:
+        self._find_projects = find_projects
         self._pause = pause
         self._remembered = remembered
         self._lock = threading.Lock()
@@ -87,6 +96,7 @@ class EventBus:
         # Numbers of another process of ours mean nothing here.
         self._epoch = secrets.token_hex(4)
         self._subscriptions: set[Subscription] = set()
+        self._projects: OrderedDict[str, str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._woken = asyncio.Event()
         self._asleep = True
@@ -115,22 +125,37 @@ class EventBus:
         if wake:
             self._wake()
 
+    def belongs(self, experiment_id: str, project_id: str) -> None:
+        """Say in which project an experiment is, from now on; from any thread."""
+        with self._lock:
+            self._projects[experiment_id] = project_id
+            self._projects.move_to_end(experiment_id)
+            if len(self._projects) > self._remembered:
+                self._projects.popitem(last=False)
+
     @contextmanager
-    def subscribe(self, shown: Shown | None = None, since: str | None = None) -> Iterator[Subscription]:
+    def subscribe(
+        self, shown: Shown | None = None, since: str | None = None, projects: frozenset[str] | None = None
+    ) -> Iterator[Subscription]:
         """Listen to the end of the block; on the event loop.
 
         Args:
             shown: what the listener shows; None for everything.
             since: the position from which it goes on; None from now on.
+            projects: it hears of these only; None for all.
 
         Raises:
             BusyError: so many listen that another one would harm them all.
         """
         if len(self._subscriptions) >= _MAX_LISTENERS:
             raise BusyError(f"{_MAX_LISTENERS} pages are open already: close some.", retry_after=_SILENCE)
-        subscription = Subscription(shown)
+        subscription = Subscription(shown, projects)
         with self._lock:
             missed = self._since(since)
+            if missed and projects is not None:
+                # Where a change belongs may have to be looked up, which is not done on the event loop.
+                unknown = any(change.experiment_id not in self._projects for change in missed)
+                missed = None if unknown else self._heard(missed, projects)
             position = self.position
         subscription.put(_event(position, "opened", "{}"), b"")
         if missed is None:
@@ -163,6 +188,8 @@ class EventBus:
         while not self._closed:
             await self._woken.wait()
             self._woken.clear()
+            if any(subscription.projects is not None for subscription in self._subscriptions):
+                await asyncio.to_thread(self._look_up)
             self._tell_now()
             await asyncio.sleep(self._pause)
 
@@ -175,14 +202,30 @@ class EventBus:
             self._told = self._newest
             position = self.position
         resync = self._resync()
-        texts: dict[Shown | None, bytes] = {}
+        texts: dict[tuple[Shown | None, frozenset[str] | None], bytes] = {}
         for subscription in tuple(self._subscriptions):
-            shown = subscription.shown
-            if shown not in texts:
-                told = _told(batch, shown)
-                texts[shown] = resync if lost else _event(position, "changes", _json(told)) if told else b""
-            if event := texts[shown]:
+            audience = subscription.shown, subscription.projects
+            if audience not in texts:
+                told = _told(self._heard(batch, subscription.projects), subscription.shown)
+                texts[audience] = resync if lost else _event(position, "changes", _json(told)) if told else b""
+            if event := texts[audience]:
                 subscription.put(event, resync)
+
+    def _look_up(self) -> None:
+        """Learn where the changes that are to be told belong."""
+        with self._lock:
+            changed = {change.experiment_id for change in self._after(self._told)}
+            unknown = [each for each in changed if each is not None and each not in self._projects]
+        if not unknown:
+            return
+        for experiment_id, project_id in self._find_projects(unknown).items():
+            self.belongs(experiment_id, project_id)
+
+    def _heard(self, changes: list[Change], projects: frozenset[str] | None) -> list[Change]:
+        """The changes of experiments in these projects; where one belongs that nobody can say, it is not told."""
+        if projects is None:
+            return changes
+        return [change for change in changes if self._projects.get(change.experiment_id or "") in projects]
 
     def _since(self, position: str | None) -> list[Change] | None:
         """What was told after a position; None where that is not known."""

@@ -1,11 +1,36 @@
 """How long an experiment still takes, from how its running runs get on and how many wait behind them."""
 
 from collections.abc import Sequence
+from typing import Protocol
 
-from server.runs.schemas import Run
+from server.database.tables import RunState
 
 
-def seconds_left(runs: Sequence[Run]) -> float | None:
+class Paced(Protocol):
+    """How far a run is, and how quick."""
+
+    @property
+    def state(self) -> RunState:
+        """That it is in."""
+
+    @property
+    def step(self) -> int:
+        """Environment steps done."""
+
+    @property
+    def total_steps(self) -> int:
+        """That it was given."""
+
+    @property
+    def steps_per_second(self) -> float | None:
+        """None unless it runs."""
+
+    @property
+    def seconds_left(self) -> float | None:
+        """None unless it runs."""
+
+
+def seconds_left(runs: Sequence[Paced]) -> float | None:
     """Seconds until the last run is through; None where none runs, or none has said yet how quick it is.
 
     Those that wait are taken to be as quick as the mean of those that run, and to be trained as many at a time as now: the

@@ -9,7 +9,7 @@ from server.database import tables
 from server.database.tables import RunState
 from server.errors import NotFoundError
 from server.experiments.schemas import ExperimentState
-from server.paging import Window
+from server.workbench.keys import KeyRepository
 
 # While any run is in one of these, that is what the experiment is; the first that applies.
 UNFINISHED: tuple[RunState, ...] = ("running", "stopping", "queued")
@@ -24,7 +24,7 @@ def aggregate_state(states: Collection[RunState]) -> ExperimentState:
     return distinct.pop() if len(distinct) == 1 else "mixed"
 
 
-def _aggregate_state_sql() -> ColumnElement[str]:
+def aggregate_state_sql() -> ColumnElement[str]:
     """`aggregate_state` over the runs of a group."""
     unfinished = [(func.sum(case((tables.Run.state == state, 1), else_=0)) > 0, state) for state in UNFINISHED]
     uniform = (func.min(tables.Run.state) == func.max(tables.Run.state), func.min(tables.Run.state))
@@ -38,27 +38,29 @@ class ExperimentRepository:
         self._session = session
 
     def add(self, experiment: tables.Experiment) -> None:
-        """Add an experiment with its runs."""
+        """Add an experiment with its runs, and write its settings down key by key."""
         self._session.add(experiment)
+        self._session.flush()
+        KeyRepository(self._session).write_down([experiment])
 
-    def get(self, experiment_id: str) -> tables.Experiment:
-        """The experiment with its runs.
+    def get(self, experiment_id: str, *, deleted: bool = False) -> tables.Experiment:
+        """The experiment with its runs; one in the trash where it is `deleted`.
 
         Raises:
             NotFoundError: there is none.
         """
-        found = self.get_many([experiment_id])
+        found = self.get_many([experiment_id], deleted=deleted)
         return found[0]
 
-    def get_many(self, experiment_ids: Sequence[str]) -> list[tables.Experiment]:
-        """The experiments with their runs, in the order asked for.
+    def get_many(self, experiment_ids: Sequence[str], *, deleted: bool = False) -> list[tables.Experiment]:
+        """The experiments with their runs, in the order asked for; those in the trash where they are `deleted`.
 
         Raises:
             NotFoundError: one of them is missing.
         """
         query = (
             select(tables.Experiment)
-            .where(tables.Experiment.id.in_(experiment_ids))
+            .where(tables.Experiment.id.in_(experiment_ids), tables.Experiment.deleted_at.is_not(None) == deleted)
             .options(selectinload(tables.Experiment.runs))
         )
         found = {experiment.id: experiment for experiment in self._session.scalars(query)}
@@ -75,7 +77,8 @@ class ExperimentRepository:
         """
         query = (
             select(tables.Run)
-            .where(tables.Run.experiment_id == experiment_id)
+            .join(tables.Run.experiment)
+            .where(tables.Run.experiment_id == experiment_id, tables.Experiment.deleted_at.is_(None))
             .options(joinedload(tables.Run.experiment))
             .order_by(tables.Run.seed)
             .with_for_update(of=tables.Run)
@@ -85,27 +88,6 @@ class ExperimentRepository:
             raise NotFoundError.of("experiment", experiment_id)
         return runs
 
-    def page(self, *, query: str, state: ExperimentState | None, window: Window) -> tuple[Sequence[tables.Experiment], int]:
-        """Experiments whose name contains `query` (in any case) and that are in `state`, newest first; how many in all."""
-        wanted = select(tables.Experiment.id)
-        if query:
-            wanted = wanted.where(func.lower(tables.Experiment.name).contains(query.lower(), autoescape=True))
-        if state is not None:
-            in_state = (
-                select(tables.Run.experiment_id).group_by(tables.Run.experiment_id).having(_aggregate_state_sql() == state)
-            )
-            wanted = wanted.where(tables.Experiment.id.in_(in_state))
-        total = self._session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
-        rows = (
-            select(tables.Experiment)
-            .where(tables.Experiment.id.in_(wanted))
-            .options(selectinload(tables.Experiment.runs))
-            .order_by(tables.Experiment.created_at.desc(), tables.Experiment.id)
-            .limit(window.limit)
-            .offset(window.offset)
-        )
-        return self._session.scalars(rows).all(), total
-
     def campaign(self, campaign_id: str) -> Sequence[tables.Experiment]:
         """The experiments of a campaign with their runs; those that were deleted are missing.
 
@@ -114,7 +96,7 @@ class ExperimentRepository:
         """
         query = (
             select(tables.Experiment)
-            .where(tables.Experiment.campaign == campaign_id)
+            .where(tables.Experiment.campaign == campaign_id, tables.Experiment.deleted_at.is_(None))
             .options(selectinload(tables.Experiment.runs))
             .order_by(tables.Experiment.created_at, tables.Experiment.id)
         )
@@ -123,15 +105,23 @@ class ExperimentRepository:
             raise NotFoundError.of("campaign", campaign_id)
         return found
 
-    def campaigns(self) -> list[tuple[str, float]]:
-        """Every campaign of which an experiment is left, with the time of its launch, the newest first."""
+    def campaigns(self, visible: Collection[str] | None = None) -> list[tuple[str, float]]:
+        """Every campaign of which an experiment is left, with the time of its launch, the newest first.
+
+        Only those of which all is in `visible` projects, where they are given.
+        """
         launched = func.min(tables.Experiment.created_at)
         query = (
             select(tables.Experiment.campaign, launched)
-            .where(tables.Experiment.campaign.is_not(None))
+            .where(tables.Experiment.campaign.is_not(None), tables.Experiment.deleted_at.is_(None))
             .group_by(tables.Experiment.campaign)
             .order_by(launched.desc(), tables.Experiment.campaign)
         )
+        if visible is not None:
+            elsewhere = select(tables.Experiment.campaign).where(
+                tables.Experiment.campaign.is_not(None), tables.Experiment.project_id.not_in(visible)
+            )
+            query = query.where(tables.Experiment.campaign.not_in(elsewhere))
         return [(campaign, at) for campaign, at in self._session.execute(query) if campaign is not None]
 
     def unfinished_campaign(self) -> str | None:
@@ -142,6 +132,12 @@ class ExperimentRepository:
             .where(tables.Experiment.campaign.is_not(None), tables.Run.state.in_(UNFINISHED))
         )
         return self._session.scalars(query).first()
+
+    def deleted_before(self, moment: float, limit: int) -> list[str]:
+        """The ids of experiments that lie in the trash since before `moment`, the longest first."""
+        deleted = tables.Experiment.deleted_at
+        query = select(tables.Experiment.id).where(deleted < moment).order_by(deleted).limit(limit)
+        return list(self._session.scalars(query))
 
     def delete(self, experiment: tables.Experiment) -> None:
         """Remove the experiment with everything that hangs on it."""

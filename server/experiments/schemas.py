@@ -4,10 +4,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, field_validator
 
-from server.database.tables import RunState
+from server.database.tables import DEFAULT_PROJECT, RunState
 from server.runs.schemas import Run
-from server.schemas import UNREADABLE, Estimate, Line, Schema
+from server.schemas import LACKING, UNREADABLE, Estimate, Line, Schema
 from sim.config import Frozen
+from sim.extending.discovery import UsedExtension
 from workers.config import TrainingConfig
 from workers.presets import Preset
 
@@ -41,48 +42,31 @@ class ExperimentCreate(Frozen):
         return seeds
 
 
-class ExperimentPatch(Schema):
-    """What may be changed after launch."""
+class ExperimentLaunch(ExperimentCreate):
+    """An experiment, and where it belongs."""
 
-    name: ExperimentName
+    project_id: str = Field(DEFAULT_PROJECT, max_length=16, description="Of the project that it is launched into.")
+
+
+class ExperimentPatch(Schema):
+    """What may be changed after launch; what is absent stays as it is."""
+
+    name: ExperimentName | None = None
+    project_id: str | None = Field(None, max_length=16, description="Of the project that it is moved to.")
 
 
 class Experiment(Schema):
     """One configuration x several seeds."""
 
     id: str
+    project_id: str
     name: str
     created_at: float
     training: TrainingConfig
     unreadable: list[str] = Field(description=UNREADABLE)
+    lacking: list[UsedExtension] = Field(description=LACKING)
     state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
     runs: list[Run] = Field(description="One a seed, by seed.")
-    campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
-    success: Estimate | None = Field(
-        description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."
-    )
-
-
-class ListedExperiment(Schema):
-    """An experiment as a list shows it: without its whole configuration and its runs."""
-
-    id: str
-    name: str
-    created_at: float
-    arena: str
-    movers: int = Field(description="Moving obstacles.")
-    robot: str
-    algorithm: str
-    network: str
-    reward: str
-    unreadable: list[str] = Field(description=UNREADABLE)
-    state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
-    states: list[RunState] = Field(description="That its runs are in, each once.")
-    runs: int
-    progress: float = Field(description="Steps done by all runs over the steps that they were given, 0 to 1.")
-    seconds_left: float | None = Field(
-        description="Until its last run is through, those that wait included; null where that is not known."
-    )
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
     success: Estimate | None = Field(
         description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."

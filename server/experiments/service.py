@@ -1,33 +1,31 @@
 """What a person may do with an experiment."""
 
+import time
 from collections.abc import Callable, Sequence
 
 from sqlalchemy.orm import Session
 
 from server.arenas.references import without_geometry
+from server.audit.repository import AuditRepository
 from server.checkpoints.archives import LooseArchives, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.database import tables
 from server.errors import ConflictError, RefusedFieldError
-from server.events.changes import Change
-from server.experiments.pace import seconds_left
+from server.events.changes import Change, ChangeKind
 from server.experiments.repository import ExperimentRepository, aggregate_state
 from server.experiments.schemas import (
     Experiment,
-    ExperimentCreate,
+    ExperimentLaunch,
     ExperimentPatch,
-    ExperimentState,
-    ListedExperiment,
 )
 from server.experiments.stored import read_training
 from server.ids import new_id
-from server.paging import Window
+from server.projects.repository import ProjectRepository
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
-from server.schemas import Page
 from server.services import Services
 from workers.archive_size import refuse_too_large
 from workers.errors import MemoryTooLargeError
@@ -41,10 +39,11 @@ class ExperimentService:
         self._services = services
         self._runs = RunService(services)
 
-    def create(self, request: ExperimentCreate) -> Experiment:
+    def create(self, request: ExperimentLaunch) -> Experiment:
         """Queue one run a seed, and wake workers for them.
 
         Raises:
+            NotFoundError: there is no such project.
             UnusableArenaError: it trains on an imported arena that is not here.
             RefusedFieldError: its checkpoints would be larger than this installation takes.
         """
@@ -54,15 +53,19 @@ class ExperimentService:
             raise RefusedFieldError(
                 ("body", "training", "algorithm", request.training.algorithm.name, "replay_size"), str(error)
             ) from error
-        training = without_geometry(request.training, self._services.arenas)
-        experiment = tables.Experiment(id=new_id(), name=request.name, training=training.model_dump(mode="json"))
+        training = without_geometry(request.training.as_installed(), self._services.arenas)
+        experiment = tables.Experiment(
+            id=new_id(), project_id=request.project_id, name=request.name, training=training.model_dump(mode="json")
+        )
         experiment.runs = [tables.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
         with self._services.database.write() as session:
+            ProjectRepository(session).get(request.project_id)
             ExperimentRepository(session).add(experiment)
+            _note(session, "experiment.launched", experiment, f"{len(experiment.runs)} runs")
         for run in experiment.runs:
             for queue in queues_of(request.training):
                 self._services.doorbell.ring(run.id, run.attempt, queue)
-        self._publish(experiment.id, "experiment")
+        self._publish(experiment, "experiment")
         return self.get(experiment.id)
 
     def get(self, experiment_id: str) -> Experiment:
@@ -74,21 +77,23 @@ class ExperimentService:
         with self._services.database.read() as session:
             return _views(session, [ExperimentRepository(session).get(experiment_id)])[0]
 
-    def page(self, *, query: str, state: ExperimentState | None, window: Window) -> Page[ListedExperiment]:
-        """Experiments whose name contains `query` and that are in `state`, the newest first."""
-        with self._services.database.read() as session:
-            found, total = ExperimentRepository(session).page(query=query.strip(), state=state, window=window)
-            return Page(items=[_listed(experiment) for experiment in _views(session, found)], total=total)
-
-    def rename(self, experiment_id: str, patch: ExperimentPatch) -> Experiment:
-        """Give the experiment another name.
+    def change(self, experiment_id: str, patch: ExperimentPatch) -> Experiment:
+        """Give the experiment another name, or move it to another project.
 
         Raises:
-            NotFoundError: there is none.
+            NotFoundError: there is no such experiment, or project.
         """
         with self._services.database.write() as session:
-            ExperimentRepository(session).get(experiment_id).name = patch.name
-        self._publish(experiment_id, "experiment")
+            experiment = ExperimentRepository(session).get(experiment_id)
+            if patch.name is not None and patch.name != experiment.name:
+                before, experiment.name = experiment.name, patch.name
+                _note(session, "experiment.renamed", experiment, f"was {before}")
+            if patch.project_id is not None and patch.project_id != experiment.project_id:
+                projects = ProjectRepository(session)
+                before = projects.get(experiment.project_id).name
+                experiment.project_id = projects.get(patch.project_id).id
+                _note(session, "experiment.moved", experiment, f"was in {before}")
+        self._publish(experiment, "experiment")
         return self.get(experiment_id)
 
     def stop(self, experiment_id: str) -> Experiment:
@@ -106,6 +111,7 @@ class ExperimentService:
                 raise ConflictError("All runs of this experiment have ended already.")
             for run in runs:
                 stop_run(session, run)
+            _note(session, "experiment.stopped", runs[0].experiment)
         for run in runs:
             self._runs.announce_stopped(run)
         return self.get(experiment_id)
@@ -125,17 +131,18 @@ class ExperimentService:
                 raise ConflictError("No run of this experiment was stopped or has failed, so there is nothing to resume.")
             for run in runs:
                 resume_run(session, run)
+            _note(session, "experiment.resumed", runs[0].experiment)
         for run in runs:
             self._runs.announce_queued(run)
         return self.get(experiment_id)
 
     def delete(self, experiment_id: str) -> None:
-        """Remove the experiment, its runs, curves, checkpoints and files. A worker that still trains one of them is cut off.
+        """Put the experiment into the trash, from where it is removed later; runs that are going on are stopped.
 
         Raises:
             NotFoundError: there is none.
         """
-        self._delete(lambda repository: [repository.get(experiment_id)])
+        self._throw_away(lambda repository: [repository.get(experiment_id)])
 
     def delete_campaign(self, campaign_id: str) -> None:
         """`delete` for every experiment of a campaign.
@@ -143,48 +150,70 @@ class ExperimentService:
         Raises:
             NotFoundError: there is no such campaign.
         """
-        self._delete(lambda repository: repository.campaign(campaign_id))
+        self._throw_away(lambda repository: repository.campaign(campaign_id))
 
-    def _delete(self, find: Callable[[ExperimentRepository], Sequence[tables.Experiment]]) -> None:
+    def restore(self, experiment_id: str) -> None:
+        """Take an experiment out of the trash; what was stopped then can be resumed.
+
+        Raises:
+            NotFoundError: it does not lie there (any more).
+        """
+        with self._services.database.write() as session:
+            experiment = ExperimentRepository(session).get(experiment_id, deleted=True)
+            experiment.deleted_at = None
+            _note(session, "experiment.restored", experiment)
+        self._publish(experiment, "experiment")
+
+    def remove(self, experiment_id: str) -> None:
+        """Remove an experiment that lies in the trash: its runs, curves, checkpoints and files.
+
+        A worker that still trains one of its runs is cut off.
+
+        Raises:
+            NotFoundError: it does not lie there (any more).
+        """
         with self._services.database.write() as session:
             repository = ExperimentRepository(session)
-            experiments = find(repository)
-            run_ids = [run.id for experiment in experiments for run in experiment.runs]
+            experiment = repository.get(experiment_id, deleted=True)
+            run_ids = [run.id for run in experiment.runs]
             checkpoint_ids = CheckpointRepository(session).ids(run_ids)
             LooseArchives(session).doom(checkpoint_ids)
-            for experiment in experiments:
-                repository.delete(experiment)
+            _note(session, "experiment.removed", experiment)
+            repository.delete(experiment)
         # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
         remove_archives(self._services, checkpoint_ids)
+        self._publish(experiment, "deleted")
+
+    def _throw_away(self, find: Callable[[ExperimentRepository], Sequence[tables.Experiment]]) -> None:
+        with self._services.database.write() as session:
+            repository = ExperimentRepository(session)
+            experiments = find(repository)
+            stopped = [
+                run
+                for experiment in experiments
+                for run in repository.lock_runs(experiment.id)
+                if states.allows(run.state, "stop")
+            ]
+            for run in stopped:
+                stop_run(session, run)
+            for experiment in experiments:
+                experiment.deleted_at = time.time()
+                _note(session, "experiment.deleted", experiment)
+        for run in stopped:
+            self._runs.announce_stopped(run)
         for experiment in experiments:
-            self._publish(experiment.id, "deleted")
+            self._publish(experiment, "deleted")
 
-    def _publish(self, experiment_id: str, kind: str) -> None:
-        self._services.bus.publish(Change.model_validate({"experiment_id": experiment_id, "run_id": None, "kind": kind}))
+    def _publish(self, experiment: tables.Experiment, kind: ChangeKind) -> None:
+        self._services.bus.belongs(experiment.id, experiment.project_id)
+        self._services.bus.publish(Change(experiment_id=experiment.id, run_id=None, kind=kind))
 
 
-def _listed(experiment: Experiment) -> ListedExperiment:
-    task, algorithm, runs = experiment.training.task, experiment.training.algorithm, experiment.runs
-    return ListedExperiment(
-        id=experiment.id,
-        name=experiment.name,
-        created_at=experiment.created_at,
-        arena=task.arena.name,
-        movers=task.arena.movers.count,
-        robot=task.robot.name,
-        algorithm=algorithm.name,
-        network=algorithm.network.name,
-        reward=task.reward.in_short,
-        unreadable=experiment.unreadable,
-        state=experiment.state,
-        states=sorted({run.state for run in runs}),
-        runs=len(runs),
-        progress=min(1.0, sum(run.step for run in runs) / max(1, sum(run.total_steps for run in runs))),
-        seconds_left=seconds_left(runs),
-        campaign=experiment.campaign,
-        success=experiment.success,
+def _note(session: Session, action: str, experiment: tables.Experiment, details: str | None = None) -> None:
+    AuditRepository(session).add(
+        action, target=experiment.id, name=experiment.name, project_id=experiment.project_id, details=details
     )
 
 
@@ -198,10 +227,12 @@ def _views(session: Session, experiments: Sequence[tables.Experiment]) -> list[E
         views.append(
             Experiment(
                 id=experiment.id,
+                project_id=experiment.project_id,
                 name=experiment.name,
                 created_at=experiment.created_at,
                 training=stored.training,
                 unreadable=list(stored.unreadable),
+                lacking=list(stored.lacking),
                 state=aggregate_state([run.state for run in experiment.runs]),
                 runs=[run_view(run, stored.training, latest.get(run.id, {})) for run in experiment.runs],
                 campaign=experiment.campaign,

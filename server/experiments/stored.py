@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from server.database import tables
+from sim.extending.discovery import UsedExtension, missing, versions, wording
 from workers.config import TrainingConfig
 
 
@@ -26,6 +27,20 @@ class StoredTraining:
 
     training: TrainingConfig
     unreadable: tuple[str, ...]
+
+    @property
+    def lacking(self) -> tuple[UsedExtension, ...]:
+        """The extensions for want of which settings can't be read."""
+        return missing(self.training.extensions, versions()) if self.unreadable else ()
+
+    @property
+    def why_not(self) -> str:
+        """Why it is not trained, and what to do; where it can be read, nothing."""
+        if self.lacking:
+            sources = "; ".join(one.source for one in self.lacking if one.source)
+            how = f" ({sources})" if sources else ""
+            return f"It needs {wording(self.lacking)}, which the service does not have: install it{how}."
+        return f"This version can't read {', '.join(self.unreadable)}: launch the training anew." if self.unreadable else ""
 
 
 def read_training(document: Mapping[str, Any]) -> StoredTraining:

@@ -3,10 +3,12 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.exports.response import BundleResponse
-from server.exports.service import ExportService
+from server.checkpoints.service import CheckpointService
+from server.exports.service import bundle_of
 from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from server.security.permissions import view
 from server.services import ServicesDep
+from workers.job_protocol import CheckpointPolicy
 
 router = APIRouter(tags=["checkpoints"])
 
@@ -17,7 +19,11 @@ _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "str
     "/api/checkpoints/{checkpoint_id}/bundle",
     response_class=FileResponse,
     responses=NOT_FOUND | EXPORT_FAILED | _ZIP,
+    dependencies=[view("checkpoint_id")],
 )
 async def download_bundle(checkpoint_id: str, services: ServicesDep) -> FileResponse:
-    """All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch just now."""
-    return BundleResponse(await services.lanes.exports.run(ExportService(services).bundle, checkpoint_id))
+    """All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch."""
+    archive = await services.lanes.jobs.run(CheckpointService(services).taken_home, checkpoint_id)
+    name = archive.file_name.removesuffix(".zip")
+    path = await bundle_of(services, CheckpointPolicy(id=checkpoint_id), archive.sha256, name)
+    return FileResponse(path, media_type="application/zip", filename=f"{name}-bundle.zip")

@@ -1,76 +1,32 @@
-"""Makes deployment bundles, each in a process of its own: exporting compares with torch, which the server never imports."""
+"""Deployment bundles: made by a worker, for exporting compares with torch, which the server never imports."""
 
-import shutil
-import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
-from server.checkpoints.service import CheckpointService
-from server.errors import ExportFailedError, ExportTimeoutError
-from server.processes import ProcessFailedError, ProcessTimeoutError, run_module
+from server.errors import ExportFailedError, JobFailedError
+from server.jobs.asked import Asked
+from server.jobs.waiting import result_of
+from server.replays.simulator import simulator
 from server.services import Services
-
-# Imports take most of the three seconds that an export needs; a machine that is busy training needs longer.
-_TIMEOUT = 120.0
+from workers.job_protocol import ArchivedPolicy, ExportJob
 
 
-@dataclass(frozen=True)
-class BundleFile:
-    """A finished bundle in a directory of its own; `discard` once it is sent."""
+async def bundle_of(services: Services, policy: ArchivedPolicy, sha256: str, title: str) -> Path:
+    """A policy's deployment bundle; made now if it is not kept.
 
-    path: Path
-    file_name: str
-
-    def discard(self) -> None:
-        """Remove the file and its directory."""
-        shutil.rmtree(self.path.parent, ignore_errors=True)
-
-
-class ExportService:
-    """Turns checkpoints into bundles."""
-
-    def __init__(self, services: Services) -> None:
-        self._checkpoints = CheckpointService(services)
-
-    def bundle(self, checkpoint_id: str) -> BundleFile:
-        """The checkpoint's deployment bundle, compared with torch just now.
-
-        Raises:
-            NotFoundError: there is no such checkpoint, or its file is gone.
-            ExportFailedError: the archive can't be exported, or the export does not equal the trained policy.
-            ExportTimeoutError: it took too long.
-        """
-        download = self._checkpoints.download(checkpoint_id)
-        with tempfile.TemporaryDirectory(prefix="mapless-checkpoint-") as scratch:
-            archive = Path(scratch) / "checkpoint.zip"
-            download.save(archive)
-            return bundle_of(archive, f"{download.file_name.removesuffix('.zip')}-bundle.zip")
-
-
-def bundle_of(archive: Path, file_name: str) -> BundleFile:
-    """An archive's deployment bundle, under the name that a browser should give it.
+    Args:
+        services: of the server.
+        policy: which.
+        sha256: of its archive.
+        title: for people.
 
     Raises:
         ExportFailedError: the archive can't be exported, or the export does not equal the trained policy.
-        ExportTimeoutError: it took too long.
+        JobTimeoutError: it took too long.
+        NoWorkerError: nobody is there to do it.
+        BusyError: as much waits as may.
     """
-    directory = Path(tempfile.mkdtemp(prefix="mapless-export-"))
+    asked = Asked(ExportJob(policy=policy), f"{sha256[:32]}-bundle-{simulator()}", title, sha256)
     try:
-        out = directory / "bundle.zip"
-        _run(archive, out)
-    except BaseException:
-        shutil.rmtree(directory, ignore_errors=True)
-        raise
-    return BundleFile(out, file_name)
-
-
-def _run(archive: Path, out: Path) -> None:
-    try:
-        run_module("workers.export", str(archive), "--format", "bundle", "--out", str(out), timeout=_TIMEOUT)
-    except ProcessTimeoutError as error:
-        raise ExportTimeoutError(
-            f"Exporting took longer than {_TIMEOUT:.0f} s: the machine is busy; try again, or download the checkpoint "
-            "and run `mapless export` on it elsewhere."
-        ) from error
-    except ProcessFailedError as error:
-        raise ExportFailedError(f"The policy was not exported: {error}") from error
+        return await result_of(services, asked)
+    except JobFailedError as error:
+        raise ExportFailedError(f"The policy was not exported: {error.message}") from error

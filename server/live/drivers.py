@@ -1,33 +1,72 @@
-"""Processes that drive finished policies for whoever watches: what a worker's link is to a training, these are after it."""
+"""Finished policies that workers drive for whoever watches: what a link is to a training, a view job is after it."""
 
 import asyncio
 import contextlib
 import logging
-import os
-import sys
-import tempfile
-from collections.abc import AsyncGenerator, Callable
-from pathlib import Path
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from server.errors import ServiceError
+from server.ids import new_id
+from server.jobs.asked import Asked
+from server.jobs.repository import OPEN
 from server.live.hub import LiveHub, TooManyViewsError
-from server.processes import ROOT
-from workers.frames import FrameError
+from workers.errors import FrameError
+from workers.job_protocol import FRAME_LENGTH_BYTES, ArchivedPolicy, ViewJob
 from workers.reporting import WatchRequest
 
-_log = logging.getLogger(__name__)
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
-# As `workers.live.drive` writes them; its module imports the simulator, which the server never does.
-_LENGTH_BYTES = 4
+    from server.jobs.service import JobService
+
+logger = logging.getLogger(__name__)
+
+_LOOK_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A finished policy to look at.
+
+    Attributes:
+        policy: where a worker gets it from.
+        sha256: of its archive.
+        title: for people.
+    """
+
+    policy: ArchivedPolicy
+    sha256: str
+    title: str
+
+
+@dataclass(eq=False)
+class _Driver:
+    """One view job, and who has it."""
+
+    subject: str
+    watchers: int = 0
+    job_id: str | None = None
+    failure: str | None = None
+    waits_in_vain: bool = False
+    wish: WatchRequest | None = None
+    detach: "Callable[[], None] | None" = None
+    task: "asyncio.Task[None] | None" = field(default=None)
+
+    @property
+    def ended(self) -> bool:
+        return self.task is not None and self.task.done()
 
 
 class PolicyDrivers:
-    """One process for each finished policy that is watched.
+    """One view job for each finished policy that is watched.
 
     Lives on the server's event loop, as the hub does.
 
     Args:
         hub: takes their frames, and says what somebody wants to see.
-        capacity: processes at the same time; each takes 150 MB and, while watched, a few percent of a core.
+        capacity: view jobs at the same time; each takes 150 MB of a worker and, while watched, a few percent of a core.
         linger: seconds that one outlives its last watcher, so that a reload finds it again.
     """
 
@@ -36,32 +75,63 @@ class PolicyDrivers:
         self._capacity = capacity
         self._linger = linger
         self._drivers: dict[str, _Driver] = {}
+        self._by_job: dict[str, _Driver] = {}
 
     @contextlib.asynccontextmanager
-    async def driving(self, subject: str, save: Callable[[Path], None]) -> AsyncGenerator[None]:
+    async def driving(self, jobs: "JobService", subject: str, driven: Driven) -> AsyncGenerator[None]:
         """Keeps a policy driving for as long as the context lasts.
 
         Args:
+            jobs: where it is asked for.
             subject: under which the hub knows it.
-            save: writes its archive to a file.
+            driven: the policy.
 
         Raises:
-            TooManyViewsError: the cap on processes is reached.
+            TooManyViewsError: the cap on view jobs is reached.
         """
         driver = self._drivers.get(subject)
         if driver is None or driver.ended:
-            if (reason := self.refusal(subject)) is not None:
+            if (reason := self._full(subject)) is not None:
                 raise TooManyViewsError(reason)
-            driver = self._drivers[subject] = _Driver(self._hub, subject, save)
+            driver = self._drivers[subject] = _Driver(subject)
+            driver.task = asyncio.create_task(self._keep(jobs, driver, driven))
         driver.watchers += 1
         try:
             yield
         finally:
             driver.watchers -= 1
-            asyncio.get_running_loop().call_later(self._linger, self._end_if_unwatched, subject, driver)
+            asyncio.get_running_loop().call_later(self._linger, self._end_if_unwatched, driver)
 
     def refusal(self, subject: str) -> str | None:
         """Why this policy can't drive now, and what to do about it; None where it drives, or has room to."""
+        driver = self._drivers.get(subject)
+        if driver is not None and driver.ended and driver.failure is not None:
+            return driver.failure
+        if driver is not None and driver.waits_in_vain:
+            return "No worker is there that drives finished policies: start one with `mapless worker`."
+        return self._full(subject)
+
+    def frames(self, job_id: str, data: bytes | None = None) -> WatchRequest | None:
+        """The job's worker is there, with frames (each after its length) or without; what somebody wants to see."""
+        driver = self._by_job.get(job_id)
+        if driver is None:
+            return None
+        if driver.detach is None:
+            driver.detach = self._hub.attach_driver(driver.subject, lambda wish: setattr(driver, "wish", wish))
+        for frame in _split(data or b""):
+            with contextlib.suppress(FrameError):
+                self._hub.driven_frames(driver.subject, frame)
+        return driver.wish
+
+    async def close(self) -> None:
+        """Ends every view."""
+        for driver in tuple(self._drivers.values()):
+            if driver.task is not None:
+                driver.task.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await driver.task
+
+    def _full(self, subject: str) -> str | None:
         driver = self._drivers.get(subject)
         if driver is not None and not driver.ended:
             return None
@@ -69,85 +139,55 @@ class PolicyDrivers:
             return None
         return f"{self._capacity} finished policies are watched already. Close one of their pages, and this one drives."
 
-    async def close(self) -> None:
-        """Ends every process."""
-        drivers, self._drivers = tuple(self._drivers.values()), {}
-        for driver in drivers:
-            await driver.end()
+    def _end_if_unwatched(self, driver: _Driver) -> None:
+        if not driver.watchers and self._drivers.get(driver.subject) is driver:
+            del self._drivers[driver.subject]
+            if driver.task is not None:
+                driver.task.cancel()
 
-    def _end_if_unwatched(self, subject: str, driver: "_Driver") -> None:
-        if not driver.watchers and self._drivers.get(subject) is driver:
-            del self._drivers[subject]
-            driver.cancel()
-
-
-class _Driver:
-    """One process, and the task that reads its frames."""
-
-    def __init__(self, hub: LiveHub, subject: str, save: Callable[[Path], None]) -> None:
-        self.watchers = 0
-        self._hub = hub
-        self._subject = subject
-        self._save = save
-        self._task = asyncio.get_running_loop().create_task(self._run())
-
-    @property
-    def ended(self) -> bool:
-        """Whether the process is gone."""
-        return self._task.done()
-
-    def cancel(self) -> None:
-        """Ends the process soon."""
-        self._task.cancel()
-
-    async def end(self) -> None:
-        """Ends the process and waits until it is gone."""
-        self.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await self._task
-
-    async def _run(self) -> None:
-        with tempfile.TemporaryDirectory(prefix="mapless-live-") as scratch:
-            archive = Path(scratch) / "policy.zip"
-            try:
-                await asyncio.to_thread(self._save, archive)
-                await self._drive(archive)
-            except asyncio.CancelledError:
-                raise
-            except Exception:
-                # Whatever it is, the server and all other views go on.
-                _log.exception("The live view of the finished policy %s has ended", self._subject)
-
-    async def _drive(self, archive: Path) -> None:
-        path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "workers.live.drive",
-            str(archive),
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
-        )
-        assert process.stdin is not None
-        assert process.stdout is not None
-        wishes = process.stdin
-
-        def tell(request: WatchRequest | None) -> None:
-            line = "null" if request is None else request.model_dump_json()
-            if not wishes.is_closing():
-                wishes.write(f"{line}\n".encode())
-
-        detach = self._hub.attach_driver(self._subject, tell)
+    async def _keep(self, jobs: "JobService", driver: _Driver, driven: Driven) -> None:
+        """Asks for the job, waits for its end, and takes it back when nobody watches any more."""
+        # Each view is a job of its own: what comes out of it is not kept.
+        asked = Asked(ViewJob(policy=driven.policy), f"view-{new_id()}", driven.title, driven.sha256)
         try:
-            with contextlib.suppress(asyncio.IncompleteReadError):
-                while True:
-                    length = int.from_bytes(await process.stdout.readexactly(_LENGTH_BYTES), "little")
-                    frame = await process.stdout.readexactly(length)
-                    with contextlib.suppress(FrameError):
-                        self._hub.driven_frames(self._subject, frame)
+            driver.job_id = await asyncio.shield(jobs.lane.run(jobs.ask, asked))
+            self._by_job[driver.job_id] = driver
+            with jobs.board.asking(driver.job_id) as ended:
+                while (job := await jobs.lane.run(jobs.find, driver.job_id)).state in OPEN and not jobs.board.closed:
+                    driver.waits_in_vain = job.state == "queued" and not jobs.board.workers()
+                    if job.state == "queued":
+                        self._left(driver)
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(_LOOK_SECONDS):
+                            await ended.wait()
+            driver.failure = f"This view has ended. {job.error or ''}".strip()
+        except ServiceError as error:
+            driver.failure = error.message
+        except Exception:
+            # Whatever it is, the server and all other views go on.
+            logger.exception("The live view of the finished policy %s has ended", driver.subject)
+            driver.failure = "This view has ended: the server's log says why."
         finally:
-            detach()
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await asyncio.shield(process.wait())
+            self._left(driver)
+            if driver.job_id is not None:
+                self._by_job.pop(driver.job_id, None)
+                jobs.board.start(jobs.lane.run(jobs.cancel, driver.job_id))
+
+    @staticmethod
+    def _left(driver: _Driver) -> None:
+        """No worker has the job."""
+        if driver.detach is not None:
+            driver.detach()
+            driver.detach = None
+
+
+def _split(data: bytes) -> list[bytes]:
+    """Frames, each after its length; what is cut short is none."""
+    frames = []
+    start = 0
+    while start + FRAME_LENGTH_BYTES <= len(data):
+        length = int.from_bytes(data[start : start + FRAME_LENGTH_BYTES], "little")
+        start += FRAME_LENGTH_BYTES + length
+        if start <= len(data):
+            frames.append(data[start - length : start])
+    return frames

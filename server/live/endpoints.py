@@ -10,6 +10,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
 from server.errors import NotFoundError
+from server.jobs.service import JobService
 from server.live.bridge import bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
@@ -17,6 +18,8 @@ from server.live.settings import LiveSettings, LiveState
 from server.live.watched import Watched, policy_view, watched
 from server.problems import NOT_FOUND
 from server.scene.themes import Theme
+from server.security.permissions import SIGNED_IN, view
+from server.security.principal import principal_of
 from server.services import Services, ServicesDep
 from sim.errors import ArenaError
 
@@ -43,40 +46,40 @@ WatchedDep = Annotated[Watched, Depends(_watched)]
 WatchedPolicyDep = Annotated[Watched, Depends(_watched_policy)]
 
 
-@router.get("/api/runs/{run_id}/live", responses=NOT_FOUND)
+@router.get("/api/runs/{run_id}/live", responses=NOT_FOUND, dependencies=[view("run_id")])
 async def get_live(subject: WatchedDep, services: ServicesDep) -> LiveState:
     """What the live view of a run shows, and whether it has anything to show."""
     return _state(subject, services)
 
 
-@router.put("/api/runs/{run_id}/live", responses=NOT_FOUND)
+@router.put("/api/runs/{run_id}/live", responses=NOT_FOUND, dependencies=[view("run_id")])
 async def change_live(subject: WatchedDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
     """Change what the live view of a run shows, for everyone who watches it."""
     services.live.configure(subject.id, settings)
     return _state(subject, services)
 
 
-@router.get("/api/policies/{name}/live", responses=NOT_FOUND)
+@router.get("/api/policies/{name}/live", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep) -> LiveState:
     """What the live view of a shipped policy shows."""
     return _state(subject, services)
 
 
-@router.put("/api/policies/{name}/live", responses=NOT_FOUND)
+@router.put("/api/policies/{name}/live", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 async def change_policy_live(subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
     """Change what the live view of a shipped policy shows, for everyone who watches it."""
     services.live.configure(subject.id, settings)
     return _state(subject, services)
 
 
-@router.get("/live/{run_id}/", include_in_schema=False)
+@router.get("/live/{run_id}/", include_in_schema=False, dependencies=[view("run_id")])
 async def choose_theme(subject: WatchedDep, request: Request) -> Response:
     """On to the page in the look that the query asks for."""
     dark = "darkMode" in request.query_params
     return RedirectResponse(f"/live/{subject.id}/dark/?darkMode" if dark else f"/live/{subject.id}/light/")
 
 
-@router.get("/live/{run_id}/{theme}/", include_in_schema=False)
+@router.get("/live/{run_id}/{theme}/", include_in_schema=False, dependencies=[view("run_id")])
 async def show_page(subject: WatchedDep, theme: Theme, request: Request) -> Response:
     """The page inside the live view's frame.
 
@@ -92,8 +95,8 @@ async def show_page(subject: WatchedDep, theme: Theme, request: Request) -> Resp
     return HTMLResponse(live_page(theme), headers=HEADERS)
 
 
-@router.websocket("/live/{run_id}")
-@router.websocket("/live/{run_id}/{theme}")
+@router.websocket("/live/{run_id}", dependencies=[view("run_id")])
+@router.websocket("/live/{run_id}/{theme}", dependencies=[view("run_id")])
 async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep, theme: Theme = "light") -> None:
     """The socket of viser itself, bridged to the scene of the run; whoever holds it counts as a watcher."""
     subject = await _found(run_id, services)
@@ -102,15 +105,17 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
         return
     try:
         async with AsyncExitStack() as stack:
-            if subject.save is not None:
-                await stack.enter_async_context(services.drivers.driving(run_id, subject.save))
+            if subject.driven is not None:
+                await stack.enter_async_context(services.drivers.driving(JobService(services), run_id, subject.driven))
             view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme))
-            await bridge(websocket, view.port)
+            await until_one_ends(
+                partial(bridge, websocket, view.port), partial(services.gate.until_changed, principal_of(websocket))
+            )
     except (TooManyViewsError, ArenaError) as error:
         await websocket.close(_TRY_AGAIN_LATER, str(error)[:_MAX_REASON])
 
 
-@router.websocket("/live/{run_id}/{theme}/display")
+@router.websocket("/live/{run_id}/{theme}/display", dependencies=[view("run_id")])
 async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, services: ServicesDep) -> None:
     """The numbers of the head-up display, a few times a second where they change."""
     subject = await _found(run_id, services)
@@ -118,14 +123,18 @@ async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, servic
         await websocket.close(_POLICY_VIOLATION)
         return
     await websocket.accept()
-    await until_one_ends(partial(_send_scores, websocket, subject, theme, services), partial(_wait_for_the_end, websocket))
+    await until_one_ends(
+        partial(_send_scores, websocket, subject, theme, services),
+        partial(_wait_for_the_end, websocket),
+        partial(services.gate.until_changed, principal_of(websocket)),
+    )
 
 
 async def _send_scores(websocket: WebSocket, subject: Watched, theme: Theme, services: Services) -> None:
     told = ""
     while True:
         score = services.live.score(subject.id, theme)
-        if subject.save is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
+        if subject.driven is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
             score = score.model_copy(update={"refusal": refusal})
         text = score.model_dump_json()
         if text != told:

@@ -23,6 +23,7 @@ from server.live.scoreboard import Score
 from server.live.settings import RECEIVING_SECONDS, LiveSettings, LiveStatus
 from server.scene.themes import Theme
 from sim.config import TaskConfig
+from sim.errors import MaplessError
 from workers.frames import Frame
 from workers.reporting import WatchRequest
 
@@ -31,7 +32,7 @@ _T = TypeVar("_T")
 WatchCallback = Callable[[WatchRequest | None], None]
 
 
-class LiveError(Exception):
+class LiveError(MaplessError):
     """The live view cannot be shown; the message says why."""
 
 

@@ -11,8 +11,9 @@ from server.scene.camera import CameraRig
 from server.scene.quiet import start_viser, stop_viser
 from server.scene.scene import Scene
 from server.scene.themes import Theme
-from sim.config import MAX_MOVERS, GeneratedArenaConfig, TaskConfig
-from workers.frames import Frame, FrameError
+from sim.config import MAX_MOVERS, ArenaPool, TaskConfig
+from workers.errors import FrameError
+from workers.frames import Frame
 
 logger = logging.getLogger(__name__)
 
@@ -33,8 +34,8 @@ class LiveView:
 
     def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
         self._server = start_viser()
-        self._rays = task.lidar.rays
-        self._arenas = task.arena.maps if isinstance(task.arena, GeneratedArenaConfig) else 1
+        self._rays = task.lidar.scan_size
+        self._arenas = task.arena.maps if isinstance(task.arena, ArenaPool) else 1
         self._scene = Scene(self._server, task, theme)
         self._camera = CameraRig(self._server, self._scene.half_size)
         self._scoreboard = Scoreboard()

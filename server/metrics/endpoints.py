@@ -7,12 +7,13 @@ from fastapi import APIRouter, Query, Response
 from server.metrics.schemas import Metrics
 from server.metrics.service import MetricService
 from server.problems import NOT_FOUND
+from server.security.permissions import view
 from server.services import ServicesDep
 
 router = APIRouter(tags=["metrics"])
 
 
-@router.get("/api/runs/{run_id}/metrics", response_model=Metrics, responses=NOT_FOUND)
+@router.get("/api/runs/{run_id}/metrics", response_model=Metrics, responses=NOT_FOUND, dependencies=[view("run_id")])
 def get_metrics(
     run_id: str,
     services: ServicesDep,

@@ -3,12 +3,13 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.exports.response import BundleResponse
 from server.exports.service import bundle_of
 from server.policies import service
 from server.policies.schemas import PolicyEpisodes, ShippedPolicy
 from server.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from server.security.permissions import SIGNED_IN
 from server.services import ServicesDep
+from workers.job_protocol import ShippedPolicyName
 from workers.shipped.library import shipped_policies
 
 router = APIRouter(prefix="/api/policies", tags=["policies"])
@@ -16,34 +17,37 @@ router = APIRouter(prefix="/api/policies", tags=["policies"])
 _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}}
 
 
-@router.get("")
+@router.get("", dependencies=[SIGNED_IN])
 def list_policies() -> list[ShippedPolicy]:
     """Trained policies that ship with the project, to watch, to drive and to compare with."""
     return [service.view(policy) for policy in shipped_policies()]
 
 
-@router.get("/{name}", responses=NOT_FOUND)
+@router.get("/{name}", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 def get_policy(name: str) -> ShippedPolicy:
     """One of them."""
     return service.view(service.find(name))
 
 
-@router.get("/{name}/suites/{suite}/episodes", responses=NOT_FOUND)
+@router.get("/{name}/suites/{suite}/episodes", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 def list_policy_episodes(name: str, suite: str) -> PolicyEpisodes:
     """Every episode behind its figures on a suite."""
     return service.episodes(name, suite)
 
 
-@router.get("/{name}/download", response_class=FileResponse, responses=NOT_FOUND | _ZIP)
+@router.get("/{name}/download", response_class=FileResponse, responses=NOT_FOUND | _ZIP, dependencies=[SIGNED_IN])
 def download_policy(name: str) -> FileResponse:
     """The archive: weights as safetensors, and the manifest."""
     policy = service.find(name)
     return FileResponse(policy.archive, media_type="application/zip", filename=f"mapless-{policy.card.name}.zip")
 
 
-@router.get("/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | EXPORT_FAILED | _ZIP)
+@router.get(
+    "/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | EXPORT_FAILED | _ZIP, dependencies=[SIGNED_IN]
+)
 async def download_policy_bundle(name: str, services: ServicesDep) -> FileResponse:
-    """All that it takes to drive a robot with it; compared with torch just now."""
+    """All that it takes to drive a robot with it; compared with torch."""
     policy = service.find(name)
     file_name = f"mapless-{policy.card.name}-bundle.zip"
-    return BundleResponse(await services.lanes.exports.run(bundle_of, policy.archive, file_name))
+    path = await bundle_of(services, ShippedPolicyName(name=name), service.shipped_hash(name), policy.card.title)
+    return FileResponse(path, media_type="application/zip", filename=file_name)

@@ -1,5 +1,8 @@
 """What a person may do with the policies that ship: look, take away."""
 
+import functools
+import hashlib
+
 from server.errors import NotFoundError
 from server.estimates import success_estimate
 from server.policies.schemas import PolicyEpisodes, ShippedPolicy, SuiteResult, SuiteRow
@@ -18,6 +21,16 @@ def find(name: str) -> library.ShippedPolicy:
         return library.shipped_policy(name)
     except UnknownPolicyError as error:
         raise NotFoundError.of("shipped policy", name) from error
+
+
+@functools.cache
+def shipped_hash(name: str) -> str:
+    """SHA-256 of a shipped policy's archive.
+
+    Raises:
+        NotFoundError: there is no such policy.
+    """
+    return hashlib.sha256(find(name).archive.read_bytes()).hexdigest()
 
 
 def view(policy: library.ShippedPolicy) -> ShippedPolicy:

@@ -7,20 +7,18 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from server.live.page import HEADERS
 from server.problems import NOT_FOUND, REPLAY_FAILED
+from server.replays import service
+from server.replays.recordings import recording_of
 from server.replays.schemas import Replay
-from server.replays.service import ReplayService
 from server.replays.subject import Subject
 from server.replays.subjects import checkpoint_subject, policy_subject
 from server.scene.themes import Theme
+from server.security.permissions import SIGNED_IN, view
 from server.services import ServicesDep
 
 router = APIRouter(tags=["replays"])
 
 _DOWNLOAD = "download"
-
-
-def _service(services: ServicesDep) -> ReplayService:
-    return ReplayService(services.recordings)
 
 
 def _checkpoint(checkpoint_id: str, services: ServicesDep) -> Subject:
@@ -41,36 +39,42 @@ class Player:
         if _DOWNLOAD in request.query_params:
             name = f"{subject.file_name.removesuffix('.zip')}-episode{episode}.html"
             headers["Content-Disposition"] = f'attachment; filename="{name}"'
-        service = ReplayService(self._services.recordings)
-        page = await self._services.lanes.replays.run(service.page, subject, episode, theme)
+        service.check_episode(subject, episode)
+        recording = await recording_of(self._services, subject)
+        page = await self._services.lanes.replays.run(service.filmed, subject, recording, episode, theme)
         return HTMLResponse(page, headers=headers)
 
 
-ReplayServiceDep = Annotated[ReplayService, Depends(_service)]
 PlayerDep = Annotated[Player, Depends()]
 CheckpointDep = Annotated[Subject, Depends(_checkpoint)]
 PolicyDep = Annotated[Subject, Depends(policy_subject)]
 
 
-@router.get("/api/checkpoints/{checkpoint_id}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
-async def replay_checkpoint(
-    checkpoint_id: str, subject: CheckpointDep, episode: int, service: ReplayServiceDep, services: ServicesDep
-) -> Replay:
+@router.get(
+    "/api/checkpoints/{checkpoint_id}/replays/{episode}",
+    responses=NOT_FOUND | REPLAY_FAILED,
+    dependencies=[view("checkpoint_id")],
+)
+async def replay_checkpoint(checkpoint_id: str, subject: CheckpointDep, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of a checkpoint's evaluation again: a few seconds for the first one, then at once."""
     page = f"/replays/checkpoints/{checkpoint_id}/{episode}/"
-    return await services.lanes.replays.run(service.prepare, subject, episode, page)
+    service.check_episode(subject, episode)
+    return service.prepared(subject, await recording_of(services, subject), episode, page)
 
 
-@router.get("/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED)
-async def replay_policy(
-    name: str, suite: str, subject: PolicyDep, episode: int, service: ReplayServiceDep, services: ServicesDep
-) -> Replay:
+@router.get(
+    "/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[SIGNED_IN]
+)
+async def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of a shipped policy again: a few seconds for the first one, then at once."""
     page = f"/replays/policies/{name}/{suite}/{episode}/"
-    return await services.lanes.replays.run(service.prepare, subject, episode, page)
+    service.check_episode(subject, episode)
+    return service.prepared(subject, await recording_of(services, subject), episode, page)
 
 
-@router.get("/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False)
+@router.get(
+    "/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False, dependencies=[view("checkpoint_id")]
+)
 async def play_checkpoint(
     request: Request, subject: CheckpointDep, episode: int, theme: Theme, player: PlayerDep
 ) -> Response:
@@ -78,7 +82,7 @@ async def play_checkpoint(
     return await player(request, subject, episode, theme)
 
 
-@router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False)
+@router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False, dependencies=[SIGNED_IN])
 async def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, player: PlayerDep) -> Response:
     """The player of an episode of a shipped policy."""
     return await player(request, subject, episode, theme)

@@ -1,10 +1,9 @@
 """Whose episodes are replayed, and what was recorded of them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from sim.config import TaskConfig
+from workers.job_protocol import ArchivedPolicy
 from workers.reporting import EvaluationResult
 
 
@@ -19,7 +18,7 @@ class Subject:
         sha256: of its archive.
         suite: by name, where it is not that of its own task.
         recorded: how its episodes ended when they counted.
-        save: writes its archive to a file.
+        policy: where a worker gets it from.
     """
 
     title: str
@@ -28,4 +27,4 @@ class Subject:
     sha256: str
     suite: str | None
     recorded: EvaluationResult
-    save: Callable[[Path], None]
+    policy: ArchivedPolicy

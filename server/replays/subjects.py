@@ -1,17 +1,15 @@
 """Finds whose episodes are to be replayed: a checkpoint's or a shipped policy's."""
 
-import hashlib
-from pathlib import Path
-
 from server.checkpoints.repository import CheckpointRepository, evaluation_result
 from server.checkpoints.service import CheckpointService
 from server.errors import NotFoundError
 from server.experiments.stored import training_of
-from server.policies.service import find
+from server.policies.service import find, shipped_hash
 from server.replays.subject import Subject
 from server.runs.repository import RunRepository
 from server.services import Services
 from workers.errors import UnknownPolicyError
+from workers.job_protocol import CheckpointPolicy, ShippedPolicyName
 
 
 def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
@@ -27,8 +25,10 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
         recorded = evaluation_result(checkpoints.evaluation(checkpoint_id))
         title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
         training = training_of(run.experiment)
-    download = CheckpointService(services).download(checkpoint_id)
-    return Subject(title, download.file_name, training.task, download.sha256, None, recorded, download.save)
+    archive = CheckpointService(services).described(checkpoint_id)
+    return Subject(
+        title, archive.file_name, training.task, archive.sha256, None, recorded, CheckpointPolicy(id=checkpoint_id)
+    )
 
 
 def policy_subject(name: str, suite: str) -> Subject:
@@ -42,17 +42,12 @@ def policy_subject(name: str, suite: str) -> Subject:
         recorded = policy.evaluation(suite)
     except UnknownPolicyError as error:
         raise NotFoundError(f"The policy {name} was not measured on {suite}.") from error
-    archive = policy.archive.read_bytes()
     return Subject(
         title=policy.card.title,
         file_name=f"mapless-{name}.zip",
         task=policy.card.training.task,
-        sha256=hashlib.sha256(archive).hexdigest(),
+        sha256=shipped_hash(name),
         suite=suite,
         recorded=recorded,
-        save=lambda path: _write(path, archive),
+        policy=ShippedPolicyName(name=name),
     )
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)

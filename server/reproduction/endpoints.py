@@ -4,9 +4,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
+from server.database.tables import DEFAULT_PROJECT
 from server.problems import CONFLICT, NOT_FOUND
 from server.reproduction.schemas import CampaignCreate, Reproduction
 from server.reproduction.service import ReproductionService
+from server.security.permissions import LAUNCH, edit, view
+from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 
 router = APIRouter(prefix="/api/reproduction", tags=["reproduction"])
@@ -19,34 +22,45 @@ def _service(services: ServicesDep) -> ReproductionService:
 ReproductionServiceDep = Annotated[ReproductionService, Depends(_service)]
 
 
-@router.get("", responses=NOT_FOUND)
+@router.get("", responses=NOT_FOUND, dependencies=[view("campaign")])
 def get_reproduction(
     service: ReproductionServiceDep,
+    principal: PrincipalDep,
     campaign: Annotated[str | None, Query(max_length=16, description="Its id; the newest without it.")] = None,
 ) -> Reproduction:
     """The paper and ours, side by side."""
-    return service.get(campaign)
+    return service.get(campaign, principal.visible)
 
 
-@router.post("", status_code=status.HTTP_201_CREATED, responses=CONFLICT)
-def launch_reproduction(request: CampaignCreate, service: ReproductionServiceDep) -> Reproduction:
+@router.post("", status_code=status.HTTP_201_CREATED, responses=NOT_FOUND | CONFLICT, dependencies=[LAUNCH])
+def launch_reproduction(
+    request: CampaignCreate,
+    service: ReproductionServiceDep,
+    principal: PrincipalDep,
+    project: Annotated[
+        str, Query(max_length=16, description="Id of the project that it is launched into.")
+    ] = DEFAULT_PROJECT,
+) -> Reproduction:
     """Launch every row of the paper's tables, all seeds, as one campaign."""
-    return service.launch(request)
+    principal.require("editor", project)
+    return service.launch(request, project)
 
 
-@router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT, responses=NOT_FOUND)
+@router.delete(
+    "/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT, responses=NOT_FOUND, dependencies=[edit("campaign_id")]
+)
 def delete_reproduction(campaign_id: str, service: ReproductionServiceDep) -> None:
     """Delete a campaign: its experiments, runs, curves and checkpoints."""
     service.delete(campaign_id)
 
 
-@router.post("/{campaign_id}/stop", responses=NOT_FOUND | CONFLICT)
+@router.post("/{campaign_id}/stop", responses=NOT_FOUND | CONFLICT, dependencies=[edit("campaign_id")])
 def stop_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Reproduction:
     """End every run of the campaign that has not ended."""
     return service.stop(campaign_id)
 
 
-@router.post("/{campaign_id}/resume", responses=NOT_FOUND | CONFLICT)
+@router.post("/{campaign_id}/resume", responses=NOT_FOUND | CONFLICT, dependencies=[edit("campaign_id")])
 def resume_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Reproduction:
     """Go on with every run of the campaign that was stopped or has failed."""
     return service.resume(campaign_id)

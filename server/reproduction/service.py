@@ -1,11 +1,12 @@
 """Launches, reads, stops, resumes and deletes campaigns."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from threading import Lock
 
 from sqlalchemy.orm import Session
 
+from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError
 from server.events.changes import Change
@@ -14,6 +15,7 @@ from server.experiments.service import ExperimentService
 from server.ids import new_id
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
+from server.projects.repository import ProjectRepository
 from server.reproduction.schemas import CampaignCreate, CampaignSummary, Reproduction
 from server.reproduction.views import campaign_view, reproduction_view
 from server.runs import states
@@ -38,15 +40,17 @@ class ReproductionService:
         self._services = services
         self._runs = RunService(services)
 
-    def get(self, campaign_id: str | None = None) -> Reproduction:
+    def get(self, campaign_id: str | None = None, visible: Collection[str] | None = None) -> Reproduction:
         """A campaign beside the paper, the newest if none is named; the paper alone before the first.
+
+        Only campaigns in `visible` projects are known, where they are given.
 
         Raises:
             NotFoundError: there is no such campaign.
         """
         with self._services.database.read() as session:
             repository = ExperimentRepository(session)
-            campaigns = [CampaignSummary(id=each, created_at=at) for each, at in repository.campaigns()]
+            campaigns = [CampaignSummary(id=each, created_at=at) for each, at in repository.campaigns(visible)]
             workers = len(workers_lately(session))
             chosen = campaign_id or (campaigns[0].id if campaigns else None)
             if chosen is None:
@@ -62,20 +66,25 @@ class ReproductionService:
                 workers,
             )
 
-    def launch(self, request: CampaignCreate) -> Reproduction:
-        """Queue every row with every seed, and wake workers for them.
+    def launch(self, request: CampaignCreate, project_id: str) -> Reproduction:
+        """Queue every row with every seed in a project, and wake workers for them.
 
         Raises:
+            NotFoundError: there is no such project.
             ConflictError: a campaign is not finished yet.
         """
         campaign = new_id()
-        experiments = [_experiment(row, campaign, request) for row in ROWS]
+        experiments = [_experiment(row, campaign, request, project_id) for row in ROWS]
         with _LAUNCH, self._services.database.write() as session:
+            ProjectRepository(session).get(project_id)
             repository = ExperimentRepository(session)
             if repository.unfinished_campaign() is not None:
                 raise ConflictError("A campaign is not finished yet: wait for it, or cancel it first.")
             for experiment in experiments:
                 repository.add(experiment)
+            AuditRepository(session).add(
+                "campaign.launched", target=campaign, project_id=project_id, details=f"{request.seeds} seeds of each row"
+            )
         # Seed by seed: the first intervals can be looked at early.
         queues = [queues_of(row.training) for row in ROWS]
         for runs in zip(*(experiment.runs for experiment in experiments), strict=True):
@@ -134,12 +143,15 @@ class ReproductionService:
             runs.sort(key=lambda run: run.seed)
             for run in runs:
                 move(session, run)
+            action = "campaign.stopped" if occasion == "stop" else "campaign.resumed"
+            AuditRepository(session).add(action, target=campaign_id, project_id=runs[0].experiment.project_id)
         return runs
 
 
-def _experiment(row: Row, campaign: str, request: CampaignCreate) -> tables.Experiment:
+def _experiment(row: Row, campaign: str, request: CampaignCreate, project_id: str) -> tables.Experiment:
     return tables.Experiment(
         id=new_id(),
+        project_id=project_id,
         name=f"Paper: {title(row)}",
         training=scaled(row.training, request.effort).model_dump(mode="json"),
         campaign=campaign,

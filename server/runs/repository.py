@@ -22,10 +22,10 @@ class RunRepository:
         """The run with its experiment; `for_update` locks the row where the database has row locks.
 
         Raises:
-            NotFoundError: there is none.
+            NotFoundError: there is none, or it lies in the trash.
         """
         run = self.find(run_id, for_update=for_update)
-        if run is None:
+        if run is None or run.experiment.deleted_at is not None:
             raise NotFoundError.of("run", run_id)
         return run
 
@@ -84,9 +84,11 @@ class RunRepository:
         rows = self._session.execute(select(tables.Run.state, func.count()).group_by(tables.Run.state))
         return {row[0]: row[1] for row in rows}
 
-    def trained_by(self, workers: Collection[str]) -> dict[str, str]:
-        """The run that each of `workers` trains now, by worker."""
+    def trained_by(self, workers: Collection[str], visible: Collection[str] | None = None) -> dict[str, str]:
+        """The run that each of `workers` trains now, by worker; of `visible` projects only, where they are given."""
         query = select(tables.Run.worker, tables.Run.id).where(
             tables.Run.state.in_(("running", "stopping")), tables.Run.worker.in_(workers)
         )
+        if visible is not None:
+            query = query.join(tables.Experiment).where(tables.Experiment.project_id.in_(visible))
         return {worker: run_id for worker, run_id in self._session.execute(query) if worker is not None}

@@ -3,7 +3,8 @@
 from pydantic import Field
 
 from server.database.tables import RunState
-from server.schemas import UNREADABLE, Schema
+from server.schemas import LACKING, UNREADABLE, Schema
+from sim.extending.discovery import UsedExtension
 from workers.config import TrainingConfig
 from workers.reporting import EventLevel
 
@@ -35,6 +36,10 @@ class RunDetail(Run):
     experiment_name: str
     training: TrainingConfig
     unreadable: list[str] = Field(description=UNREADABLE)
+    lacking: list[UsedExtension] = Field(description=LACKING)
+    waits_for: list[UsedExtension] = Field(
+        description="Extensions that it needs, while it is queued and no worker that is there has them all."
+    )
 
 
 class RunEvent(Schema):

@@ -1,9 +1,11 @@
 """What a person may do with a run."""
 
 import time
+from collections.abc import Sequence
 
 from sqlalchemy.orm import Session
 
+from server.audit.repository import AuditRepository
 from server.database import tables
 from server.events.changes import Change
 from server.experiments.stored import training_of
@@ -11,6 +13,8 @@ from server.runs import states, views
 from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail, RunEvent
 from server.services import Services
+from server.system.repository import SILENCE_SECONDS, WorkerRepository
+from workers.config import TrainingConfig
 from workers.protocol import queues_of
 
 
@@ -28,7 +32,9 @@ class RunService:
         """
         with self._services.database.read() as session:
             repository = RunRepository(session)
-            return views.run_detail(repository.get(run_id), repository.latest_metrics([run_id], views.SHOWN).get(run_id, {}))
+            run = repository.get(run_id)
+            latest = repository.latest_metrics([run_id], views.SHOWN).get(run_id, {})
+            return views.run_detail(run, latest, lambda training: takers(session, run, training))
 
     def events(self, run_id: str) -> list[RunEvent]:
         """The run's event log, oldest first.
@@ -54,6 +60,7 @@ class RunService:
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
             stop_run(session, run)
+            _note(session, "run.stopped", run)
         self.announce_stopped(run)
         return self.get(run_id)
 
@@ -67,6 +74,7 @@ class RunService:
         with self._services.database.write() as session:
             run = RunRepository(session).get(run_id, for_update=True)
             resume_run(session, run)
+            _note(session, "run.resumed", run)
         self.announce_queued(run)
         return self.get(run_id)
 
@@ -81,6 +89,18 @@ class RunService:
         for queue in queues_of(training_of(run.experiment), run.device):
             self._services.doorbell.ring(run.id, run.attempt, queue)
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind="run"))
+
+
+def _note(session: Session, action: str, run: tables.Run) -> None:
+    name = f"{run.experiment.name}, seed {run.seed}"
+    AuditRepository(session).add(action, target=run.id, name=name, project_id=run.experiment.project_id)
+
+
+def takers(session: Session, run: tables.Run, training: TrainingConfig) -> Sequence[str]:
+    """The workers that would take up a run now."""
+    now = time.time()
+    queues = queues_of(training, run.device)
+    return WorkerRepository(session).fit(queues, now - SILENCE_SECONDS, now, training.extensions)
 
 
 def stop_run(session: Session, run: tables.Run) -> None:

@@ -1,6 +1,6 @@
 """A run's row as JSON shows it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from server.database import tables
 from server.experiments.stored import read_training
@@ -37,12 +37,18 @@ def run_view(run: tables.Run, training: TrainingConfig, latest: Mapping[str, flo
     )
 
 
-def run_detail(run: tables.Run, latest: Mapping[str, float]) -> RunDetail:
-    """The run in JSON with what it trains."""
+def run_detail(
+    run: tables.Run, latest: Mapping[str, float], takers: Callable[[TrainingConfig], Collection[str]]
+) -> RunDetail:
+    """The run in JSON with what it trains; `takers` are the workers that would take up a run of a training now."""
     stored = read_training(run.experiment.training)
+    needed = stored.training.extensions
+    waits = run.state == "queued" and bool(needed) and not takers(stored.training)
     return RunDetail(
         **run_view(run, stored.training, latest).model_dump(),
         experiment_name=run.experiment.name,
         training=stored.training,
         unreadable=list(stored.unreadable),
+        lacking=list(stored.lacking),
+        waits_for=list(needed) if waits else [],
     )

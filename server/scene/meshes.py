@@ -1,9 +1,13 @@
 """Low-poly shapes of the scene: robots like a TurtleBot3 Burger or a Jackal, rings and beacons. Metres, z up, x ahead."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+Places = Sequence[tuple[float, float]]
+"""Where scanners stand on a body, x ahead and y to the left of its middle."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +53,8 @@ def rectangle(x: float, y: float, half_x: float, half_y: float) -> NDArray[np.fl
     return np.array([[x - half_x, y - half_y], [x + half_x, y - half_y], [x + half_x, y + half_y], [x - half_x, y + half_y]])
 
 
-def chassis(radius: float) -> Mesh:
-    """The dark parts of a robot: two decks, posts, wheels and the scanner on its neck."""
+def chassis(radius: float, scanners: Places) -> Mesh:
+    """The dark parts of a robot: two decks, posts, wheels and the scanners on their necks."""
     r = radius
     deck = circle(0.92 * r, 12, turn=np.pi / 12)
     mesh = prism(deck, 0.25 * r, 0.45 * r) + prism(deck, 0.95 * r, 1.1 * r)
@@ -58,20 +62,25 @@ def chassis(radius: float) -> Mesh:
         mesh += prism(circle(0.08 * r, 6, (x * r, y * r)), 0.45 * r, 1.4 * r)
     for side in (-1.0, 1.0):
         mesh += _wheel(0.32 * r, side * 0.93 * r, 0.09 * r)
-    return mesh + prism(circle(0.34 * r, 14, (-0.1 * r, 0.0)), 1.58 * r, 1.98 * r)
+    for place in scanners:
+        mesh += prism(circle(0.34 * r, 14, place), 1.58 * r, 1.98 * r)
+    return mesh
 
 
-def shell(radius: float) -> Mesh:
-    """The coloured parts of a robot: the top deck with a nose that points ahead, and the scanner's cap."""
+def shell(radius: float, scanners: Places) -> Mesh:
+    """The coloured parts of a robot: the top deck with a nose that points ahead, and the scanners' caps."""
     r = radius
     half = np.linspace(0.36 * np.pi, 1.64 * np.pi, 13)
     deck = np.column_stack([0.98 * r * np.cos(half), 0.98 * r * np.sin(half)])
     outline = np.concatenate([deck, [[1.5 * r, 0.0]]])
-    return prism(outline, 1.38 * r, 1.58 * r) + prism(circle(0.26 * r, 14, (-0.1 * r, 0.0)), 1.98 * r, 2.06 * r)
+    mesh = prism(outline, 1.38 * r, 1.58 * r)
+    for place in scanners:
+        mesh += prism(circle(0.26 * r, 14, place), 1.98 * r, 2.06 * r)
+    return mesh
 
 
-def box_chassis(half_length: float, half_width: float) -> Mesh:
-    """The dark parts of a robot with a rectangular body: hull, four wheels and the scanner on its neck."""
+def box_chassis(half_length: float, half_width: float, scanners: Places) -> Mesh:
+    """The dark parts of a robot with a rectangular body: hull, four wheels and the scanners on their necks."""
     r = min(half_length, half_width)
     wheel = min(0.45 * r, 0.45 * half_length)
     mesh = prism(rectangle(0.0, 0.0, half_length, 0.72 * half_width), 0.3 * r, 0.8 * r)
@@ -79,15 +88,20 @@ def box_chassis(half_length: float, half_width: float) -> Mesh:
         for y in (-1.0, 1.0):
             part = _wheel(wheel, y * 0.87 * half_width, 0.13 * half_width)
             mesh += Mesh(part.vertices + np.array([x * (half_length - wheel), 0.0, 0.0], np.float32), part.faces)
-    return mesh + prism(circle(0.28 * r, 14), 1.05 * r, 1.4 * r)
+    for place in scanners:
+        mesh += prism(circle(0.28 * r, 14, place), 1.05 * r, 1.4 * r)
+    return mesh
 
 
-def box_shell(half_length: float, half_width: float) -> Mesh:
-    """The coloured parts of a robot with a rectangular body: the top deck with a nose that points ahead, and a cap."""
+def box_shell(half_length: float, half_width: float, scanners: Places) -> Mesh:
+    """The coloured parts of a robot with a rectangular body: the top deck with a nose that points ahead, and caps."""
     r = min(half_length, half_width)
     deck = prism(rectangle(0.0, 0.0, half_length, 0.98 * half_width), 0.92 * r, 1.05 * r)
     nose = np.array([[half_length, -0.4 * half_width], [half_length + 0.3 * r, 0.0], [half_length, 0.4 * half_width]])
-    return deck + prism(nose, 0.92 * r, 1.05 * r) + prism(circle(0.22 * r, 14), 1.4 * r, 1.48 * r)
+    mesh = deck + prism(nose, 0.92 * r, 1.05 * r)
+    for place in scanners:
+        mesh += prism(circle(0.22 * r, 14, place), 1.4 * r, 1.48 * r)
+    return mesh
 
 
 def mover() -> Mesh:

@@ -8,8 +8,8 @@ from server.scene import meshes
 from server.scene.continuity import continues, ended
 from server.scene.themes import OUTCOMES, Colours, linear, robot_colours
 from server.scene.trails import Trails, trail_colours
-from sim.config import AnyRobotConfig, TaskConfig
-from sim.lidar import drawn_ray_angles
+from sim.config import TaskConfig
+from sim.lidar import drawn_ray_angles, ray_origins
 from workers.frames import Frame
 
 _FLOOR_HEIGHT = 0.02
@@ -42,8 +42,9 @@ class RobotNodes:
 
     def __init__(self, server: viser.ViserServer, parent: str, task: TaskConfig, colours: Colours, frame: Frame) -> None:
         robots, rays = frame.ranges.shape
+        scanners = len(task.lidar.mount.places)
         scene = server.scene
-        chassis, shell = _body(task.robot)
+        chassis, shell = _body(task)
         halo = max(task.collision_distance, 1.5 * task.robot.inscribed_radius)
         few = robots <= _FEW
         own = robot_colours(robots)
@@ -145,8 +146,8 @@ class RobotNodes:
         self._fan = (
             scene.add_mesh_simple(
                 f"{parent}/fan",
-                np.zeros((robots * (rays + 1), 3), np.float32),
-                _fan_faces(robots, rays),
+                np.zeros((robots * (rays + scanners), 3), np.float32),
+                _fan_faces(robots * scanners, task.lidar.rays),
                 color=colours.fan,
                 opacity=_FAN_OPACITY,
                 side="double",
@@ -208,9 +209,9 @@ class RobotNodes:
 
     def _draw_rays(self, frame: Frame) -> None:
         angles = frame.poses[:, 2:3] + drawn_ray_angles(self._lidar, frame.fields_of_view)
-        self._ends[:, :, 0, :2] = frame.poses[:, None, :2]
-        self._ends[:, :, 1, 0] = frame.poses[:, 0:1] + frame.ranges * np.cos(angles)
-        self._ends[:, :, 1, 1] = frame.poses[:, 1:2] + frame.ranges * np.sin(angles)
+        self._ends[:, :, 0, :2] = origins = ray_origins(self._lidar, frame.poses)
+        self._ends[:, :, 1, 0] = origins[..., 0] + frame.ranges * np.cos(angles)
+        self._ends[:, :, 1, 1] = origins[..., 1] + frame.ranges * np.sin(angles)
         self._ray_lines.points = self._ends.reshape(-1, 2, 3)
         # The points stand a little before the surface that was met, or it would hide half of each. A ray that meets
         # nothing puts its point inside the robot, where nobody sees it: the count stays the same.
@@ -221,7 +222,9 @@ class RobotNodes:
         hits[..., 2] = np.where(length > 0.0, _HIT_HEIGHT, _INSIDE_THE_ROBOT)
         self._hits.points = hits.reshape(-1, 3)
         if self._fan is not None:
-            corners = np.concatenate([self._ends[:, :1, 0], self._ends[:, :, 1]], axis=1)
+            # One fan for each LiDAR.
+            ends = self._ends.reshape(-1, self._lidar.rays, 2, 3)
+            corners = np.concatenate([ends[:, :1, 0], ends[:, :, 1]], axis=1)
             corners[..., 2] = 0.015
             self._fan.vertices = corners.reshape(-1, 3)
 
@@ -255,19 +258,24 @@ class RobotNodes:
             self._rings.batched_opacities = np.where(active, 1.0 - age, 0.0).astype(np.float32)
 
 
-def _body(robot: AnyRobotConfig) -> tuple[meshes.Mesh, meshes.Mesh]:
-    """Dark and coloured parts of a robot."""
+def _body(task: TaskConfig) -> tuple[meshes.Mesh, meshes.Mesh]:
+    """Dark and coloured parts of a robot, its LiDARs where they are mounted."""
+    robot, mount = task.robot, task.lidar.mount
+    scanners = [(x, y) for x, y, _ in mount.places]
     if robot.half_extents is None:
-        return meshes.chassis(robot.inscribed_radius), meshes.shell(robot.inscribed_radius)
-    return meshes.box_chassis(*robot.half_extents), meshes.box_shell(*robot.half_extents)
+        radius = robot.inscribed_radius
+        # One in the middle is drawn a little behind it: the nose is then seen from above.
+        scanners = [(-0.1 * radius, 0.0)] if mount.name == "centre" else scanners
+        return meshes.chassis(radius, scanners), meshes.shell(radius, scanners)
+    return meshes.box_chassis(*robot.half_extents, scanners), meshes.box_shell(*robot.half_extents, scanners)
 
 
 def _mesh_arguments(mesh: meshes.Mesh) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     return mesh.vertices, mesh.faces
 
 
-def _fan_faces(robots: int, rays: int) -> NDArray[np.uint32]:
-    """Triangles between each robot's origin and its neighbouring rays."""
+def _fan_faces(scanners: int, rays: int) -> NDArray[np.uint32]:
+    """Triangles between the origin of each LiDAR and its neighbouring rays."""
     ray = np.arange(1, rays)
     one = np.column_stack([np.zeros_like(ray), ray, ray + 1])
-    return (one[None] + (rays + 1) * np.arange(robots)[:, None, None]).reshape(-1, 3).astype(np.uint32)
+    return (one[None] + (rays + 1) * np.arange(scanners)[:, None, None]).reshape(-1, 3).astype(np.uint32)

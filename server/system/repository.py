@@ -2,12 +2,13 @@
 
 from collections.abc import Collection, Sequence
 
-from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.runs.states import ACTIVE
-from workers.protocol import HEARTBEAT_SECONDS, Queue
+from sim.extending.discovery import UsedExtension, missing
+from workers.protocol import HEARTBEAT_SECONDS, Extensions, ExtensionState, Queue
 
 SILENCE_SECONDS = 3 * HEARTBEAT_SECONDS
 """A worker that was silent for longer is not counted on."""
@@ -24,9 +25,10 @@ class WorkerRepository:
         query = select(tables.Worker).where(tables.Worker.last_seen >= moment).order_by(tables.Worker.name)
         return self._session.scalars(query).all()
 
-    def seen(self, name: str, queue: Queue, moment: float, trouble: str | None = None) -> None:
+    def seen(self, name: str, queue: Queue, moment: float, trouble: str | None = None, extensions: Extensions = ()) -> None:
         """Note that a worker of this queue has just been heard of, and why it takes up no run where it does not."""
-        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment, trouble=trouble))
+        found = [extension.model_dump() for extension in extensions]
+        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment, trouble=trouble, extensions=found))
 
     def drain(self, names: Collection[str], moment: float | None) -> None:
         """Ask workers to finish their runs and take up no more; None takes it back."""
@@ -37,24 +39,31 @@ class WorkerRepository:
         query = select(tables.Worker.drained_at).where(tables.Worker.name == name)
         return self._session.scalar(query) is not None
 
-    def fit(self, queues: Collection[Queue], since: float, until: float) -> Sequence[str]:
-        """The workers of these queues that were heard of between these moments and take up runs."""
-        return self._session.scalars(
-            select(tables.Worker.name).where(tables.Worker.queue.in_(queues), *_there(since, until))
-        ).all()
+    def fit(
+        self, queues: Collection[Queue], since: float, until: float, needed: Collection[UsedExtension] = ()
+    ) -> Sequence[str]:
+        """The workers of these queues that were heard of between these moments, take up runs and have these extensions."""
+        query = select(tables.Worker).where(tables.Worker.queue.in_(queues), *_there(since, until))
+        return [worker.name for worker in self._session.scalars(query) if not missing(needed, versions_on(worker))]
 
-    def idle_by_queue(self, since: float, until: float) -> dict[Queue, int]:
-        """How many workers heard of between these moments could take up a run, by queue; a queue without any is absent.
+    def idle(self, since: float, until: float) -> Sequence[tables.Worker]:
+        """The workers heard of between these moments that could take up a run.
 
         One heard of in the future was heard before the clock was set back, and not since.
         """
         busy = select(tables.Run.worker).where(tables.Run.state.in_(ACTIVE), tables.Run.worker.is_not(None))
-        query = (
-            select(tables.Worker.queue, func.count())
-            .where(*_there(since, until), tables.Worker.name.not_in(busy))
-            .group_by(tables.Worker.queue)
-        )
-        return {row[0]: row[1] for row in self._session.execute(query)}
+        query = select(tables.Worker).where(*_there(since, until), tables.Worker.name.not_in(busy))
+        return self._session.scalars(query).all()
+
+
+def extensions_on(worker: tables.Worker) -> Extensions:
+    """What a worker said of its extensions; a row of an earlier version says nothing."""
+    return tuple(ExtensionState.model_validate(found) for found in worker.extensions or ())
+
+
+def versions_on(worker: tables.Worker) -> dict[str, str | None]:
+    """The extensions that a worker has: names to versions."""
+    return {found.name: found.version for found in extensions_on(worker)}
 
 
 def _there(since: float, until: float) -> tuple[ColumnElement[bool], ...]:

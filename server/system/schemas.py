@@ -3,6 +3,7 @@
 from pydantic import Field
 
 from server.schemas import Schema
+from workers.protocol import ExtensionState
 
 
 class Version(Schema):
@@ -20,6 +21,7 @@ class WorkerStatus(Schema):
     run_id: str | None = Field(description="The run that it trains now.")
     draining: bool = Field(description="It was asked to finish its runs and take up no more.")
     trouble: str | None = Field(description="Why it takes up no run, a full disk say; null while it does.")
+    extensions: list[ExtensionState] = Field(description="That were found where it runs.")
 
 
 class Readiness(Schema):
@@ -41,3 +43,4 @@ class Status(Version):
     workers: list[WorkerStatus]
     queued: int = Field(description="Runs that wait for a worker.")
     running: int = Field(description="Runs that a worker trains, those about to stop included.")
+    extensions: list[ExtensionState] = Field(description="That were found where the service runs.")

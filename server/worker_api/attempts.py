@@ -15,10 +15,8 @@ from server.errors import ConflictError, NotFoundError
 from server.metrics.repository import MetricRepository
 from server.runs import states
 from server.runs.repository import RunRepository
+from server.worker_api.losses import MAX_LOSSES, count_loss, exhausted, hopeful, too_many
 from workers.protocol import ClaimRequest, Final
-
-# Attempts in a row, without a new checkpoint, that one worker may lose while others wait; and workers that may lose one.
-MAX_LOSSES = 3
 
 
 class FencedError(ConflictError):
@@ -47,7 +45,7 @@ def begin(session: Session, run: tables.Run, request: ClaimRequest, others: Coll
         raise ConflictError(
             f"Run {run.id} is {run.state} at attempt {run.attempt}: it is not to be had at {request.published_attempt}."
         )
-    if _exhausted(run, request.worker) and _hopeful(run, others):
+    if exhausted(run, request.worker) and hopeful(run, others):
         raise ConflictError(f"{request.worker} lost run {run.id} {MAX_LOSSES} times: it waits for another worker.")
     run.state = states.next_state(run.state, "claim")
     run.attempt += 1
@@ -118,19 +116,14 @@ def end(
 def lose(session: Session, run: tables.Run, reason: str, others: Collection[str]) -> None:
     """The attempt was lost for a reason: another one may do better, unless too many were lost without a new checkpoint.
 
-    Too many are three by each worker that there is (`others`: those that take up runs of this queue now), or one by each of
-    three workers. A sick machine alone cannot fail a run that a healthy one would finish.
+    `server.worker_api.losses` says how many are too many; `others` are those that take up runs of this queue now.
     """
     events = RunRepository(session)
     events.add_event(run.id, "warning", f"Attempt {run.attempt} was lost: {reason}", run.step)
     losses = f"Attempt {run.attempt}: {reason}"
     run.error = f"{run.error}\n{losses}" if run.error else losses
-    run.losses += 1
-    if run.worker is not None:
-        name = machine_of(run.worker)
-        run.lost_by = {**(run.lost_by or {}), name: (run.lost_by or {}).get(name, 0) + 1}
-    too_many = len(run.lost_by or {}) >= MAX_LOSSES or (run.losses >= MAX_LOSSES and not _hopeful(run, others))
-    if run.state == "running" and too_many:
+    count_loss(run)
+    if run.state == "running" and too_many(run, others):
         run.state = states.next_state(run.state, "fail")
         run.error = f"{run.losses} attempts in a row were lost without a new checkpoint.\n{run.error}"
         events.add_event(run.id, "error", f"Failed: {run.losses} attempts in a row were lost.", run.step)
@@ -143,21 +136,6 @@ def progressed(run: tables.Run) -> None:
     """A new checkpoint was registered: what went wrong before it counts no more."""
     run.losses, run.lost_by = 0, None
     run.error = None
-
-
-def machine_of(worker: str) -> str:
-    """A worker without the number of its process: what fails one of its trainings fails the others too."""
-    return worker.partition("/")[0]
-
-
-def _exhausted(run: tables.Run, worker: str) -> bool:
-    """Whether this worker has lost the run so often that another one should try."""
-    return (run.lost_by or {}).get(machine_of(worker), 0) >= MAX_LOSSES
-
-
-def _hopeful(run: tables.Run, workers: Collection[str]) -> bool:
-    """Whether one of these workers has not lost the run that often."""
-    return any(not _exhausted(run, worker) for worker in workers)
 
 
 def _rewind(session: Session, run: tables.Run, checkpoint: tables.Checkpoint | None) -> None:

@@ -13,6 +13,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from server.errors import TooLargeError
 from server.ids import new_id
+from server.security.permissions import WORK
+from server.security.principal import Principal, PrincipalDep, principal_of
 from server.services import Services, ServicesDep
 from server.worker_api.attempts import FencedError
 from server.worker_api.batches import read_batch
@@ -20,7 +22,7 @@ from server.worker_api.errors import MalformedUploadError
 from server.worker_api.ingest import Ingest, Report
 from server.worker_api.links import OpenLink, OpenLinks
 from server.worker_api.service import WorkerService
-from workers.frames import FrameError
+from workers.errors import FrameError
 from workers.protocol import (
     CLOSE_FENCED,
     CLOSE_NOT_UNDERSTOOD,
@@ -42,31 +44,43 @@ def _service(services: ServicesDep) -> WorkerService:
 
 
 WorkerServiceDep = Annotated[WorkerService, Depends(_service)]
+# RFC 6455: the request violates the server's policy.
+_POLICY_VIOLATION = 1008
+
 AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
 StepPath = Annotated[int, Path(ge=0, le=MAX_INTEGER)]
 
 
-@router.post("/heartbeat")
+@router.post("/heartbeat", dependencies=[WORK])
 async def heartbeat(body: Heartbeat, service: WorkerServiceDep, services: ServicesDep) -> HeartbeatAnswer:
     """A worker is there, and hears what it should do."""
     return await services.lanes.workers.run(service.heartbeat, body)
 
 
-@router.post("/runs/{run_id}/claim")
-async def claim_run(run_id: str, body: ClaimRequest, service: WorkerServiceDep, services: ServicesDep) -> Claim:
+@router.post("/runs/{run_id}/claim", dependencies=[WORK])
+async def claim_run(
+    run_id: str, body: ClaimRequest, service: WorkerServiceDep, services: ServicesDep, principal: PrincipalDep
+) -> Claim:
     """Take up a run; 409 where it is not to be had."""
-    return await services.lanes.workers.run(service.claim, run_id, body)
+    return await services.lanes.workers.run(service.claim, run_id, body, principal)
 
 
 # The file store has a cap of its own, which the settings say.
-@router.put("/runs/{run_id}/checkpoints/{step}", status_code=204, max_body_size=sys.maxsize)
+@router.put("/runs/{run_id}/checkpoints/{step}", status_code=204, max_body_size=sys.maxsize, dependencies=[WORK])
 async def put_checkpoint(
-    run_id: str, step: StepPath, attempt: AttemptQuery, request: Request, services: ServicesDep, service: WorkerServiceDep
+    run_id: str,
+    step: StepPath,
+    attempt: AttemptQuery,
+    request: Request,
+    services: ServicesDep,
+    service: WorkerServiceDep,
+    principal: PrincipalDep,
 ) -> None:
     """One line of JSON (`CheckpointUpload`), then the archive."""
     stream = request.stream()
     upload, archive = await _split(stream, services.settings.max_body_bytes)
     lane = services.lanes.workers
+    await lane.run(service.check_claimed, run_id, principal)
     archive_id = new_id()
     await lane.run(service.announce, run_id, attempt, upload.after_seq, archive_id)
     file = await services.files.write(archive_id, archive, upload.sha256)
@@ -78,20 +92,26 @@ async def put_checkpoint(
             await lane.run(services.files.delete, file.id)
 
 
-@router.get("/checkpoints/{checkpoint_id}")
-async def get_checkpoint(checkpoint_id: str, service: WorkerServiceDep, services: ServicesDep) -> StreamingResponse:
-    """The archive of a checkpoint."""
+@router.get("/checkpoints/{checkpoint_id}", dependencies=[WORK])
+async def get_checkpoint(
+    checkpoint_id: str, service: WorkerServiceDep, services: ServicesDep, principal: PrincipalDep
+) -> StreamingResponse:
+    """The archive of a checkpoint, for the worker that has its run."""
     lane = services.lanes.workers
-    return StreamingResponse(lane.each(await lane.run(service.download, checkpoint_id)), media_type="application/zip")
+    return StreamingResponse(
+        lane.each(await lane.run(service.download, checkpoint_id, principal)), media_type="application/zip"
+    )
 
 
-@router.websocket("/runs/{run_id}/link")
+@router.websocket("/runs/{run_id}/link", dependencies=[WORK])
 async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, services: ServicesDep) -> None:
     """The link of a run: batches and frames come in, orders go out (`workers.protocol`)."""
     await websocket.accept()
     assert isinstance(services.links, OpenLinks)
     opened = OpenLink(websocket)
+    principal = principal_of(websocket)
     try:
+        await services.lanes.workers.run(WorkerService(services).check_claimed, run_id, principal)
         opened.tell(await services.links.ingest.receive(Report(run_id, attempt, Batch())))
     except FencedError:
         await websocket.close(CLOSE_FENCED, "this attempt is over")
@@ -100,14 +120,22 @@ async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, service
     services.links.add(run_id, opened)
     detach = services.live.attach(run_id, opened.watch)
     writer = asyncio.create_task(opened.write())
+    revoked = asyncio.create_task(_cut_once_revoked(websocket, services, principal))
     try:
         await _receive(websocket, run_id, attempt, services, services.links.ingest, opened)
     finally:
         detach()
         services.links.remove(run_id, opened)
+        revoked.cancel()
         writer.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await writer
+
+
+async def _cut_once_revoked(websocket: WebSocket, services: Services, principal: Principal) -> None:
+    await services.gate.until_changed(principal)
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+        await websocket.close(_POLICY_VIOLATION, "this token was revoked")
 
 
 async def _receive(

@@ -14,19 +14,21 @@ from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.errors import ConflictError, NotFoundError
 from server.events.changes import Change, ChangeKind
-from server.experiments.stored import read_training, training_of
+from server.experiments.stored import StoredTraining, read_training, training_of
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs import states
 from server.runs.repository import RunRepository
-from server.runs.service import RunService
+from server.runs.service import RunService, takers
+from server.security.principal import WORKER, Principal
 from server.services import Services
-from server.system.repository import SILENCE_SECONDS, WorkerRepository
+from server.system.repository import WorkerRepository
 from server.worker_api import attempts
 from server.worker_api.attempts import FencedError
 from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
 from server.worker_api.ingest import Outcome, Report
+from sim.extending.discovery import missing, wording
 from workers.config import TrainingConfig
 from workers.protocol import (
     CheckpointReference,
@@ -59,13 +61,13 @@ class WorkerService:
         """Note that a worker is there; what it should do."""
         with self._services.database.write() as session:
             workers = WorkerRepository(session)
-            workers.seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble)
+            workers.seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble, heartbeat.extensions)
             if heartbeat.first:
                 workers.drain([heartbeat.worker], None)
             return HeartbeatAnswer(drain=workers.is_drained(heartbeat.worker))
 
-    def claim(self, run_id: str, request: ClaimRequest) -> Claim:
-        """Give a run to a worker, if it is still to be had.
+    def claim(self, run_id: str, request: ClaimRequest, principal: Principal = WORKER) -> Claim:
+        """Give a run to a worker, if it is still to be had; the run remembers with whose token it was claimed.
 
         Raises:
             NotFoundError: there is no such run.
@@ -78,10 +80,16 @@ class WorkerService:
             if WorkerRepository(session).is_drained(request.worker) and run.claim_id != (request.claim_id or ""):
                 raise ConflictError("This worker was asked to take up no more runs.")
             stored = read_training(run.experiment.training)
+            _refuse_without_extensions(run, stored, request)
             training = _on_device(run, stored.training, request)
-            checkpoint = attempts.begin(session, run, request, _takers(session, run, stored.training))
+            if run.state in states.ACTIVE and run.claimed_with != principal.credential:
+                raise ConflictError(f"Run {run.id} was claimed with another token.")
+            checkpoint = attempts.begin(session, run, request, takers(session, run, stored.training))
+            if principal.credential is not None and run.claimed_with != principal.credential:
+                RunRepository(session).add_event(run.id, "info", f"Claimed with the token {principal.name}.", run.step)
+            run.claimed_with = principal.credential
             if stored.unreadable:
-                problem = f"This version can't read {', '.join(stored.unreadable)}: launch the training anew."
+                problem = stored.why_not
             try:
                 training = with_geometry(training, self._services.arenas)
             except NotFoundError as error:
@@ -146,7 +154,7 @@ class WorkerService:
                 self._store(session, run, batch.items)
                 if batch.final is not None:
                     damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
-                    attempts.end(session, run, batch.final, _takers(session, run, training_of(run.experiment)), damaged)
+                    attempts.end(session, run, batch.final, takers(session, run, training_of(run.experiment)), damaged)
                     ended.append(run)
                     lost += batch.final.outcome == "lost"
                 outcomes.append(
@@ -229,20 +237,33 @@ class WorkerService:
             ]
             for run in runs:
                 reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
-                attempts.lose(session, run, reason, _takers(session, run, training_of(run.experiment)))
+                attempts.lose(session, run, reason, takers(session, run, training_of(run.experiment)))
         self._services.instruments.losses.inc(len(runs))
         for run in runs:
             self._services.links.cut(run.id)
             self._announce(run)
 
-    def download(self, checkpoint_id: str) -> Iterator[bytes]:
+    def check_claimed(self, run_id: str, principal: Principal) -> None:
+        """Refuse a report on a run that was claimed with another token: one machine taken over is not all of them.
+
+        Raises:
+            FencedError: it was.
+        """
+        with self._services.database.read() as session:
+            run = RunRepository(session).find(run_id)
+            if run is not None and run.claimed_with != principal.credential:
+                raise attempts.FencedError(f"Run {run_id} was claimed with another token.")
+
+    def download(self, checkpoint_id: str, principal: Principal = WORKER) -> Iterator[bytes]:
         """A checkpoint's archive.
 
         Raises:
-            NotFoundError: there is no such checkpoint, or its file is gone.
+            NotFoundError: there is no such checkpoint, its run was claimed with another token, or its file is gone.
         """
         with self._services.database.read() as session:
-            CheckpointRepository(session).get(checkpoint_id)
+            checkpoint = CheckpointRepository(session).get(checkpoint_id)
+            if RunRepository(session).get(checkpoint.run_id).claimed_with != principal.credential:
+                raise NotFoundError.of("checkpoint", checkpoint_id)
         return self._services.files.read(checkpoint_id)
 
     def _store(self, session: Session, run: tables.Run, items: Sequence[MetricItem | EventItem]) -> None:
@@ -276,6 +297,19 @@ class WorkerService:
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))
 
 
+def _refuse_without_extensions(run: tables.Run, stored: StoredTraining, request: ClaimRequest) -> None:
+    """Leave a run that needs extensions to a worker that has them.
+
+    Raises:
+        ConflictError: this one lacks one, or the service itself does.
+    """
+    if stored.lacking:
+        raise ConflictError(stored.why_not)
+    there = {one.name: one.version for one in request.extensions}
+    if not stored.unreadable and (lacking := missing(stored.training.extensions, there)):
+        raise ConflictError(f"Run {run.id} needs {wording(lacking)}, which {request.worker} does not have.")
+
+
 def _on_device(run: tables.Run, training: TrainingConfig, request: ClaimRequest) -> TrainingConfig:
     """The training with the device that it is trained on, which the first claim decides where that is open.
 
@@ -292,9 +326,3 @@ def _on_device(run: tables.Run, training: TrainingConfig, request: ClaimRequest)
         return training
     run.device = device_of(request.queue)
     return training.model_copy(update={"device": run.device})
-
-
-def _takers(session: Session, run: tables.Run, training: TrainingConfig) -> Sequence[str]:
-    """The workers that would take up a run now."""
-    now = time.time()
-    return WorkerRepository(session).fit(queues_of(training, run.device), now - SILENCE_SECONDS, now)

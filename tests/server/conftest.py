@@ -13,6 +13,7 @@ from server.app import create_app
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+from tests.server.job_worker import working
 
 
 @pytest.fixture
@@ -41,6 +42,13 @@ def client(app: FastAPI) -> Iterator[TestClient]:
 def services(app: FastAPI) -> Services:
     services: Services = app.state.services
     return services
+
+
+@pytest.fixture
+def job_worker(client: TestClient, services: Services, tmp_path: Path) -> Iterator[None]:
+    """A worker that does jobs, with places as `mapless worker` has them."""
+    with working(client, services, tmp_path / "work"):
+        yield
 
 
 @pytest.fixture

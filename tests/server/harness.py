@@ -78,6 +78,11 @@ class Reports:
             for name, value in columns.items():
                 setattr(row, name, value)
 
+    def remove(self, experiment: dict[str, Any]) -> None:
+        """Remove an experiment that lies in the trash."""
+        action = {"action": "remove", "experiments": [experiment["id"]]}
+        assert self.client.post("/api/workbench/actions", json=action).json()["done"] == [experiment["id"]]
+
     def heard_of(self, worker: str, seconds_ago: float) -> None:
         """Have heard of a worker."""
         with self.services.database.write() as session:

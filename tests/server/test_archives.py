@@ -103,6 +103,7 @@ def test_what_another_installation_keeps_in_the_same_store_is_never_touched(serv
 
     sweep_archives(services, time.time() + LATER)
     ExperimentService(services).delete("e")
+    ExperimentService(services).remove("e")
     assert stored(neighbour) == ["registered.zip", "underway.zip.part", "written.zip"]
 
 
@@ -132,9 +133,10 @@ def test_what_a_deletion_left_behind_goes_at_the_next_sweep(services: Services, 
         removed.append(archive_id)
         delete(archive_id)
 
+    ExperimentService(services).delete("e")
     monkeypatch.setattr(services.files, "delete", break_off)
     with pytest.raises(OSError, match="away"):
-        ExperimentService(services).delete("e")
+        ExperimentService(services).remove("e")
     monkeypatch.undo()
     assert len(stored(services)) == 2
 

@@ -137,6 +137,9 @@ def test_only_an_arena_that_no_training_uses_can_be_deleted(client: TestClient) 
     response = client.delete(f"/api/arenas/imported/{sha256}")
     assert (response.status_code, response.json()["detail"][:10]) == (409, "1 training")
     client.delete(f"/api/experiments/{experiment['id']}")
+    # From the trash it could come back.
+    assert client.delete(f"/api/arenas/imported/{sha256}").status_code == 409
+    client.post("/api/workbench/actions", json={"action": "remove", "experiments": [experiment["id"]]})
     assert client.delete(f"/api/arenas/imported/{sha256}").status_code == 204
     assert client.get(f"/api/arenas/imported/{sha256}").status_code == 404
     assert client.delete(f"/api/arenas/imported/{sha256}").status_code == 404

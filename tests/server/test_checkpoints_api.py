@@ -161,6 +161,9 @@ def test_files_go_with_their_experiment(client: TestClient, reports: Reports, se
     kept = reports.checkpoint(stays["runs"][0], 5, None)
 
     assert client.delete(f"/api/experiments/{gone['id']}").status_code == 204
+    assert len(services.files.ids()) == 3  # in the trash nothing is lost
+    removal = {"action": "remove", "experiments": [gone["id"]]}
+    assert client.post("/api/workbench/actions", json=removal).json()["done"] == [gone["id"]]
 
     assert services.files.ids() == {kept}
 

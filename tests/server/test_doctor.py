@@ -24,7 +24,7 @@ from server.system.repository import WorkerRepository
 from tests.conftest import require_service
 from tests.server.test_serving import ROOT, environment, serving
 
-NAMES = ["versions", "data", "disk", "database", "clock", "broker", "store", "server"]
+NAMES = ["versions", "data", "disk", "database", "clock", "broker", "store", "extensions", "server"]
 
 
 def free_port() -> int:

@@ -3,7 +3,7 @@
 import asyncio
 import json
 import threading
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncIterator, Collection, Coroutine
 from typing import Any
 
 import pytest
@@ -247,5 +247,41 @@ def test_who_left_is_told_no_more_and_who_comes_late_finds_it_closed() -> None:
         left.close()
         with bus.subscribe() as late:
             assert [await told(left), await told(late)] == [[], []]
+
+    run(scenario())
+
+
+def test_who_may_see_some_projects_hears_of_these_only() -> None:
+    asked: list[set[str]] = []
+    there = {"a": "mine", "b": "theirs", "c": "theirs"}
+
+    def find(experiments: Collection[str]) -> dict[str, str]:
+        asked.append(set(experiments))
+        return {each: there[each] for each in experiments if each in there}
+
+    async def scenario() -> None:
+        bus = EventBus(PAUSE, find_projects=find)
+        with bus.subscribe() as everything, bus.subscribe(projects=frozenset({"mine"})) as some:
+            start = bus.position
+            for experiment in ("a", "b", "gone"):
+                bus.publish(change(experiment_id=experiment))
+            await asyncio.sleep(3 * PAUSE)
+            bus.belongs("b", "mine")
+            bus.publish(change(experiment_id="b"))
+            await asyncio.sleep(3 * PAUSE)
+            with bus.subscribe(since=start, projects=frozenset({"theirs"})) as later:
+                bus.belongs("gone", "theirs")
+            with bus.subscribe(since=start, projects=frozenset({"theirs"})) as known:
+                pass
+            bus.close()
+            for stream in (later, known):
+                stream.close()
+            assert await told(some) == [[change(experiment_id="a")], [change(experiment_id="b")]]
+            assert [len(changes) for changes in await told(everything)] == [3, 1]
+            # Where something belongs that nobody remembers, whoever comes back reads everything anew.
+            assert [name async for _, name, _ in events(later)] == ["opened", "resync"]
+            assert await told(known) == [[change(experiment_id="gone")]]
+        # Each is looked up once.
+        assert asked == [{"a", "b", "gone"}]
 
     run(scenario())

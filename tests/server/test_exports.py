@@ -14,7 +14,7 @@ from server.services import Services
 
 
 @pytest.fixture
-def store(client: TestClient, services: Services) -> Callable[[bytes], str]:
+def store(client: TestClient, services: Services, job_worker: None) -> Callable[[bytes], str]:
     """Registers an archive as the checkpoint of a new run and returns its id."""
 
     def register(archive: bytes) -> str:

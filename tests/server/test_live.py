@@ -36,7 +36,8 @@ from server.scene.themes import COLOURS, Theme
 from server.services import Services
 from sim.arenas import build_arena
 from sim.config import GeneratedArenaConfig, TaskConfig
-from workers.frames import Frame, FrameError
+from workers.errors import FrameError
+from workers.frames import Frame
 from workers.reporting import WatchRequest
 
 ORIGIN = {"Origin": "http://127.0.0.1:8400"}

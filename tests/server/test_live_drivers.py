@@ -2,9 +2,9 @@
 
 import asyncio
 import os
-import subprocess
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,10 +12,11 @@ from fastapi.testclient import TestClient
 
 from server.checkpoints.repository import CheckpointRepository
 from server.live.drivers import PolicyDrivers
-from server.live.hub import LiveHub, TooManyViewsError
+from server.live.hub import LiveHub
 from server.live.view import LiveView
 from server.services import Services
 from tests.server.harness import Reports
+from tests.server.job_worker import working
 from tests.server.test_live import Asked, connect, make_frame, receive_until, refused
 from workers.reporting import EvaluationResult
 from workers.shipped.library import shipped_policy
@@ -40,10 +41,9 @@ def finished_run(reports: Reports, services: Services, evaluations: dict[int, Ev
     return run
 
 
-def drivers_running() -> int:
-    listed = subprocess.run(["ps", "-eo", "ppid,args"], capture_output=True, text=True, check=True).stdout
-    lines = [line.split(maxsplit=1) for line in listed.splitlines()[1:]]
-    return sum(int(parent) == os.getpid() and "workers.live.drive" in command for parent, command in lines)
+def views(client: TestClient) -> list[str]:
+    """States of the view jobs that there have been."""
+    return [job["state"] for job in client.get("/api/jobs").json()["items"] if job["kind"] == "view"]
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
@@ -72,17 +72,25 @@ def services(services: Services) -> Services:
     return services
 
 
-def test_the_best_policy_of_a_finished_run_drives(client: TestClient, services: Services, reports: Reports) -> None:
+@pytest.fixture
+def view_worker(client: TestClient, services: Services, tmp_path: Path) -> Iterator[None]:
+    with working(client, services, tmp_path / "work", kinds=("view",)):
+        yield
+
+
+def test_the_best_policy_of_a_finished_run_drives(
+    client: TestClient, services: Services, reports: Reports, view_worker: None
+) -> None:
     run = finished_run(reports, services, {4096: RECORDED, 8192: None})
     score = live_score(client, run["id"])
     # The step is the archive's own.
     assert (score["mode"], score["after_training"], score["step"]) == ("policy", True, POLICY.card.step)
     assert len(score["robots"]) == 8
     assert client.get(f"/api/runs/{run['id']}/live").json()["status"]["receiving"]
-    wait_until(lambda: drivers_running() == 0)
+    wait_until(lambda: views(client) == ["cancelled"])
 
 
-def test_a_policy_that_ships_drives(client: TestClient, services: Services) -> None:
+def test_a_policy_that_ships_drives(client: TestClient, services: Services, view_worker: None) -> None:
     wanted = client.get("/api/policies/simple/live").json() | {"robots": 3}
     del wanted["status"]
     assert client.put("/api/policies/simple/live", json=wanted).json()["robots"] == 3
@@ -90,7 +98,7 @@ def test_a_policy_that_ships_drives(client: TestClient, services: Services) -> N
     assert (score["after_training"], len(score["robots"])) == (True, 3)
     page = client.get("/live/policy-simple/?darkMode")
     assert page.url.path == "/live/policy-simple/dark/"
-    wait_until(lambda: drivers_running() == 0)
+    wait_until(lambda: views(client) == ["cancelled"])
 
 
 def test_there_is_no_view_of_other_policies(client: TestClient) -> None:
@@ -106,7 +114,7 @@ def test_a_run_that_goes_on_is_its_workers(client: TestClient, services: Service
     reports.state(run, state)  # type: ignore[arg-type]
     with connect(client, f"/live/{run['id']}/light") as browser:
         receive_until(browser, b"/world/arena/floor")
-        assert drivers_running() == 0
+        assert views(client) == []
 
 
 def test_a_finished_run_without_a_checkpoint_has_nothing_to_drive(
@@ -115,7 +123,7 @@ def test_a_finished_run_without_a_checkpoint_has_nothing_to_drive(
     run = finished_run(reports, services, {})
     with connect(client, f"/live/{run['id']}/light") as browser:
         receive_until(browser, b"/world/arena/floor")
-        assert drivers_running() == 0
+        assert views(client) == []
 
 
 def test_a_linked_worker_is_shown_instead() -> None:
@@ -162,19 +170,15 @@ def test_who_finds_no_place_reads_why_in_the_picture(client: TestClient, service
         assert "live views are open already" in display.receive_json()["refusal"]
 
 
-def test_only_so_many_drive_at_the_same_time() -> None:
-    async def scenario() -> None:
-        drivers = PolicyDrivers(LiveHub(lambda *_: None), capacity=1)  # type: ignore[arg-type]
+def test_only_so_many_drive_at_the_same_time(client: TestClient, services: Services) -> None:
+    services.drivers = PolicyDrivers(services.live, capacity=1, linger=0.0)
+    with connect(client, "/live/policy-simple/light"), connect(client, "/live/policy-simple/dark"):
+        wait_until(lambda: views(client) == ["queued"])
+        assert refused(client, "/live/policy-complex/light")
+    wait_until(lambda: views(client) == ["cancelled"])
 
-        async def watch(subject: str) -> None:
-            async with drivers.driving(subject, lambda path: path.touch()):
-                pass
 
-        async with drivers.driving("one", lambda path: path.touch()):
-            await watch("one")
-            assert drivers.refusal("one") is None
-            with pytest.raises(TooManyViewsError, match="Close one of their pages"):
-                await watch("two")
-        await drivers.close()
-
-    asyncio.run(scenario())
+def test_without_a_worker_the_picture_says_so(client: TestClient, services: Services) -> None:
+    with connect(client, "/live/policy-simple/light"), connect(client, "/live/policy-simple/light/display") as display:
+        while "No worker is there" not in (display.receive_json()["refusal"] or ""):
+            pass

@@ -68,7 +68,7 @@ def test_runs_queues_and_sizes_are_told(client: TestClient, reports: Reports) ->
     assert found[sample("mapless_database_up")] == 1
     assert found[sample("mapless_event_streams")] == 0
     assert found[sample("mapless_live_views")] == 0
-    assert found[sample("mapless_lane_waiting", lane="exports")] == 0
+    assert found[sample("mapless_lane_waiting", lane="downloads")] == 0
 
 
 def test_claims_losses_and_reports_are_counted(client: TestClient, services: Services, reports: Reports) -> None:

@@ -2,7 +2,6 @@
 
 import asyncio
 import base64
-import dataclasses
 import os
 import re
 import shutil
@@ -17,8 +16,7 @@ from fastapi.testclient import TestClient
 
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
-from server.replays.recordings import RecordingStore
-from server.replays.subjects import policy_subject
+from server.jobs.results import ResultStore
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN
@@ -54,8 +52,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _keep(services: Services, kept: Path) -> None:
-    services.recordings = RecordingStore(kept, max_bytes=1)
+def _keep(services: Services, kept: Path, job_worker: None) -> None:
+    services.results = ResultStore(kept, max_bytes=1)
 
 
 @pytest.fixture
@@ -115,18 +113,15 @@ def test_a_shipped_policy_is_replayed_too(client: TestClient) -> None:
     assert 'data-theme="light"' in download.text
 
 
-def test_what_another_simulator_drove_is_driven_again(client: TestClient, kept: Path) -> None:
+def test_what_another_simulator_drove_is_driven_again(
+    client: TestClient, kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert client.get("/api/policies/complex/suites/complex-200/replays/0").status_code == 200
-
-    class DrivenAgain(Exception): ...
-
-    def save(_: Path) -> None:
-        raise DrivenAgain
-
-    subject = dataclasses.replace(policy_subject("complex", "complex-200"), save=save)
-    RecordingStore(kept, max_bytes=1).get(subject)
-    with pytest.raises(DrivenAgain):
-        RecordingStore(kept, max_bytes=1, simulator="another").get(subject)
+    jobs = client.get("/api/jobs").json()["total"]
+    monkeypatch.setattr("server.replays.recordings.simulator", lambda: "another")
+    assert client.get("/api/policies/complex/suites/complex-200/replays/0").status_code == 200
+    assert client.get("/api/jobs").json()["total"] == jobs + 1
+    assert any("another" in path.name for path in kept.iterdir())
 
 
 def test_what_ended_otherwise_than_recorded_says_so(client: TestClient, services: Services) -> None:
@@ -177,7 +172,7 @@ def test_a_suite_that_has_changed_is_not_passed_off_as_the_old_one(
     assert client.get("/api/policies/complex/suites/complex-200/replays/0").status_code == 200
     (made,) = (path for path in kept.iterdir() if RECORDED.suite_hash[:16] in path.name)
     shutil.copy(made, tmp_path / made.name.replace(RECORDED.suite_hash[:16], "0" * 16))
-    services.recordings = RecordingStore(tmp_path, max_bytes=1)
+    services.results = ResultStore(tmp_path, max_bytes=1)
     changed = RECORDED.model_copy(update={"suite_hash": "0" * 64})
     checkpoint = store_checkpoint(client, services, POLICY.archive.read_bytes(), changed)
     response = client.get(f"/api/checkpoints/{checkpoint}/replays/0")

@@ -7,6 +7,7 @@ from server.database import tables
 from server.experiments.stored import read_training
 from server.services import Services
 from server.sweeper import Sweeper
+from server.workbench.indexing import index_some
 from tests.server.harness import WORKER_TOKEN
 from workers.config import PpoConfig, TrainingConfig
 
@@ -51,6 +52,8 @@ def test_such_a_training_is_shown_and_its_runs_fail_with_the_reason(client: Test
     with services.database.write() as session:
         experiment = session.get_one(tables.Experiment, created["id"])
         experiment.training = {**experiment.training, "teleportation": True}
+        experiment.indexed_as = None
+    index_some(services)
 
     listed = client.get("/api/experiments").json()["items"]
     assert [(one["name"], one["unreadable"]) for one in listed] == [("of tomorrow", ["teleportation"])]

@@ -338,11 +338,14 @@ def test_a_stop_reaches_the_worker_at_once_and_again_on_a_new_link(
         assert hear(socket).stop
 
 
-def test_deleting_an_experiment_cuts_its_worker_off(client: TestClient, worker: TestClient, run_id: str) -> None:
+def test_removing_an_experiment_cuts_its_worker_off(client: TestClient, worker: TestClient, run_id: str) -> None:
     claim(worker, run_id)
+    experiment_id = state(client, run_id)["experiment_id"]
     with link(worker, run_id, 1) as socket:
         hear(socket)
-        client.delete(f"/api/experiments/{state(client, run_id)['experiment_id']}")
+        client.delete(f"/api/experiments/{experiment_id}")
+        assert hear(socket).stop
+        client.post("/api/workbench/actions", json={"action": "remove", "experiments": [experiment_id]})
         with pytest.raises(WebSocketDisconnect) as closed:
             socket.receive_text()
     assert closed.value.code == CLOSE_FENCED
@@ -376,7 +379,8 @@ def test_a_database_that_takes_its_time_costs_nobody_a_lease(worker: TestClient,
             while services.leases._until[run_id, 1] < 29.0:
                 assert time.monotonic() < deadline
                 time.sleep(0.01)
-            assert steps_of(services, run_id) == []
+            if services.database.engine.dialect.name == "sqlite":  # PostgreSQL takes several writers at a time
+                assert steps_of(services, run_id) == []
         assert hear(socket).ack == 1
 
 

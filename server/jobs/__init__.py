@@ -1,0 +1,1 @@
+"""Jobs: what people ask for beside trainings, done by workers. Views, replays, exports, evaluations."""

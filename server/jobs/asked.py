@@ -1,0 +1,22 @@
+"""What is asked for, before it is a job."""
+
+from dataclasses import dataclass
+
+from workers.job_protocol import JobSpec
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Something to be done.
+
+    Attributes:
+        spec: what.
+        key: what comes out of it; asked for twice, it is one job.
+        title: for people.
+        sha256: of the policy's archive, where there is one.
+    """
+
+    spec: JobSpec
+    key: str
+    title: str
+    sha256: str | None = None

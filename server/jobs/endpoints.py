@@ -1,0 +1,31 @@
+"""Routes of jobs: the queue, one of them, and taking one back."""
+
+from fastapi import APIRouter
+
+from server.jobs.schemas import Job, JobPage
+from server.jobs.service import JobService
+from server.jobs.views import job_view
+from server.paging import WindowDep
+from server.problems import NOT_FOUND
+from server.security.permissions import ADMINISTRATE
+from server.services import ServicesDep
+
+router = APIRouter(prefix="/api/jobs", tags=["jobs"])
+
+
+@router.get("", dependencies=[ADMINISTRATE])
+def list_jobs(window: WindowDep, services: ServicesDep) -> JobPage:
+    """Some of the jobs: those under way, those that wait in the order of their turn, then what has ended."""
+    return JobService(services).page(window)
+
+
+@router.get("/{job_id}", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
+def get_job(job_id: str, services: ServicesDep) -> Job:
+    """One of them, with its progress and the time that is left."""
+    return job_view(JobService(services).find(job_id), services.board)
+
+
+@router.post("/{job_id}/cancel", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
+def cancel_job(job_id: str, services: ServicesDep) -> Job:
+    """Take a job back; one that has ended stays as it is."""
+    return job_view(JobService(services).cancel(job_id), services.board)

@@ -1,0 +1,10 @@
+"""Under which names the results of jobs are kept."""
+
+from workers.job_protocol import JobKind
+
+_SUFFIXES: dict[JobKind, str] = {"replay": ".npz", "export": ".zip"}
+
+
+def result_name(kind: JobKind, key: str) -> str:
+    """The file of what comes out of a job of this kind and key."""
+    return f"{key}{_SUFFIXES.get(kind, '')}"

@@ -1,0 +1,150 @@
+"""Routes by which workers take up jobs and bring what comes out of them."""
+
+import asyncio
+import contextlib
+import hashlib
+import sys
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import StreamingResponse
+from pydantic import ValidationError
+
+from server.errors import CorruptUploadError, NotFoundError, TooLargeError
+from server.jobs.names import result_name
+from server.jobs.service import JobService
+from server.security.permissions import WORK
+from server.services import Services, ServicesDep
+from server.worker_api.errors import MalformedUploadError
+from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport
+from workers.protocol import MAX_INTEGER
+from workers.reporting import EvaluationResult
+
+router = APIRouter(prefix="/api/worker/jobs", tags=["worker"], include_in_schema=False)
+
+MAX_RESULT_BYTES = 512 * 2**20
+"""Of one recording or bundle."""
+
+
+def _service(services: ServicesDep) -> JobService:
+    return JobService(services)
+
+
+JobServiceDep = Annotated[JobService, Depends(_service)]
+AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
+
+
+@router.post("/claim", response_model=None, dependencies=[WORK])
+async def claim_job(
+    body: JobClaimRequest, request: Request, service: JobServiceDep, services: ServicesDep
+) -> JobClaim | Response:
+    """The next job; 204 where none came while the worker waited. A worker that has left gets none."""
+    deadline = time.monotonic() + body.wait_seconds
+    gone = asyncio.create_task(_until_gone(request))
+    try:
+        while not gone.done() and not services.board.closed:
+            services.board.heard(body.worker)
+            with services.board.listening() as bell:
+                claim = await services.lanes.jobs.run(service.claim, body)
+                if claim is not None:
+                    return claim
+                remaining = deadline - time.monotonic()
+                if remaining <= 0.0:
+                    break
+                rung = asyncio.create_task(bell.wait())
+                await asyncio.wait({gone, rung}, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)
+                rung.cancel()
+        return Response(status_code=204)
+    finally:
+        gone.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await gone
+
+
+@router.get("/{job_id}/archive", dependencies=[WORK])
+async def get_archive(
+    job_id: str, attempt: AttemptQuery, service: JobServiceDep, services: ServicesDep
+) -> StreamingResponse:
+    """The archive of the job's policy."""
+    lane = services.lanes.jobs
+    try:
+        blocks = await lane.run(service.archive, job_id, attempt)
+    except NotFoundError as error:
+        # It would be missed by the next worker too.
+        await lane.run(service.end, job_id, attempt, JobEnd(outcome="failed", error=error.message))
+        raise
+    return StreamingResponse(lane.each(blocks), media_type="application/zip")
+
+
+@router.post("/{job_id}/report", dependencies=[WORK])
+async def report_job(
+    job_id: str, attempt: AttemptQuery, body: JobReport, service: JobServiceDep, services: ServicesDep
+) -> JobOrders:
+    """A sign of life; 409 where the job is no longer this attempt's."""
+    await services.lanes.jobs.run(service.report, job_id, attempt, body.progress)
+    return JobOrders(watch=services.drivers.frames(job_id))
+
+
+@router.post("/{job_id}/frames", dependencies=[WORK])
+async def take_frames(
+    job_id: str, attempt: AttemptQuery, request: Request, service: JobServiceDep, services: ServicesDep
+) -> JobOrders:
+    """Moments of a view; answered as a report."""
+    frames = await request.body()
+    await services.lanes.jobs.run(service.report, job_id, attempt, 0.0)
+    return JobOrders(watch=services.drivers.frames(job_id, frames))
+
+
+# The store has a cap of its own.
+@router.put("/{job_id}/result", status_code=204, max_body_size=sys.maxsize, dependencies=[WORK])
+async def put_result(
+    job_id: str,
+    attempt: AttemptQuery,
+    sha256: Annotated[str, Query(pattern="^[0-9a-f]{64}$")],
+    request: Request,
+    service: JobServiceDep,
+    services: ServicesDep,
+) -> None:
+    """What came out of a job; refused where it is not what its checksum says."""
+    lane = services.lanes.jobs
+    job = await lane.run(service.current, job_id, attempt)
+    torn = await lane.run(services.results.begin)
+    try:
+        digest, size = hashlib.sha256(), 0
+        with torn.open("wb") as file:
+            async for block in request.stream():
+                size += len(block)
+                if size > MAX_RESULT_BYTES:
+                    raise TooLargeError(f"The result is larger than {MAX_RESULT_BYTES} bytes.")
+                digest.update(block)
+                await lane.run(file.write, block)
+        if digest.hexdigest() != sha256:
+            raise CorruptUploadError("What arrived does not have the SHA-256 that was announced: send it again.")
+        if job.kind == "evaluate":
+            await lane.run(_keep_evaluation, services, job_id, attempt, torn.read_bytes())
+        else:
+            await lane.run(service.current, job_id, attempt)
+            await lane.run(services.results.keep, torn, result_name(job.kind, job.key))
+    finally:
+        torn.unlink(missing_ok=True)
+
+
+@router.post("/{job_id}/end", status_code=204, dependencies=[WORK])
+async def end_job(job_id: str, attempt: AttemptQuery, body: JobEnd, service: JobServiceDep, services: ServicesDep) -> None:
+    """The worker's last word."""
+    await services.lanes.jobs.run(service.end, job_id, attempt, body)
+
+
+def _keep_evaluation(services: Services, job_id: str, attempt: int, data: bytes) -> None:
+    try:
+        result = EvaluationResult.model_validate_json(data)
+    except ValidationError as error:
+        raise MalformedUploadError(f"This is no evaluation: {error.errors()[0]['msg']}") from error
+    JobService(services).evaluated(job_id, attempt, result)
+
+
+async def _until_gone(request: Request) -> None:
+    """Until the worker has closed the connection; the body has been read."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
