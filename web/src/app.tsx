@@ -48,6 +48,30 @@ export const routes: RouteObject[] = [
             path: 'reproduction',
             lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },
+          {
+            path: 'join',
+            lazy: async () => ({ Component: (await import('./pages/JoinPage')).JoinPage }),
+          },
+          {
+            path: 'account',
+            lazy: async () => ({ Component: (await import('./pages/AccountPage')).AccountPage }),
+          },
+          {
+            path: 'projects',
+            lazy: async () => ({ Component: (await import('./pages/ProjectsPage')).ProjectsPage }),
+          },
+          {
+            path: 'projects/:projectId',
+            lazy: async () => ({ Component: (await import('./pages/ProjectPage')).ProjectPage }),
+          },
+          {
+            path: 'people',
+            lazy: async () => ({ Component: (await import('./pages/PeoplePage')).PeoplePage }),
+          },
+          {
+            path: 'audit',
+            lazy: async () => ({ Component: (await import('./pages/AuditPage')).AuditPage }),
+          },
           { path: '*', element: <NotFoundPage /> },
         ],
       },

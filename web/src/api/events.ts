@@ -15,7 +15,7 @@ export interface Change {
 export const ROUND_MS = 1_000
 /** The same where runs that report move figures of many: a list's progress, a comparison's curves. */
 export const SLOW_ROUND_MS = 5_000
-const SLOW_PATHS: readonly unknown[] = ['/api/experiments', '/api/compare/curves']
+const SLOW_PATHS: readonly unknown[] = ['/api/experiments', '/api/workbench/groups', '/api/compare/curves']
 /** What takes the server long to answer is left alone for so many times as long. */
 const REST = 3
 const TICK_MS = 250
@@ -41,6 +41,9 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   const ofCompared =
     change.experiment_id !== null && (params?.query?.experiment ?? []).includes(change.experiment_id)
   if (path === '/api/experiments') return true
+  if (path === '/api/workbench/groups') return true
+  // What there is to filter by grows with launches.
+  if (path === '/api/workbench/keys' || path === '/api/workbench/values') return change.kind === 'experiment'
   // Thirty runs report several times a second: while they go on, their page asks at its own pace.
   if (path === '/api/reproduction') return change.kind !== 'metrics'
   if (path === '/api/status') return change.kind !== 'metrics'
@@ -132,7 +135,7 @@ export function streamPath(client: QueryClient, since: string | undefined): stri
   for (const query of client.getQueryCache().findAll({ type: 'active' })) {
     const [, path, init] = query.queryKey
     const { params } = (init ?? {}) as Parameters
-    if (path === '/api/experiments') shown.add('reports=true')
+    if (path === '/api/experiments' || path === '/api/workbench/groups') shown.add('reports=true')
     const { experiment_id, run_id } = params?.path ?? {}
     if (run_id) shown.add(`run=${encodeURIComponent(run_id)}`)
     for (const id of [experiment_id, ...(params?.query?.experiment ?? [])]) {

@@ -4,6 +4,130 @@
  */
 
 export interface paths {
+    "/api/account": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Account
+         * @description Who asks.
+         */
+        get: operations["get_account_api_account_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/account/password": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Password
+         * @description Set a new password, and sign out every other browser.
+         */
+        put: operations["change_password_api_account_password_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/account/sessions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Sessions
+         * @description The browsers that are signed in, the newest first.
+         */
+        get: operations["list_sessions_api_account_sessions_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/account/sessions/{session_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * End Session
+         * @description Sign a browser out.
+         */
+        delete: operations["end_session_api_account_sessions__session_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/account/tokens": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Tokens
+         * @description One's tokens for programs, the newest first.
+         */
+        get: operations["list_tokens_api_account_tokens_get"];
+        put?: never;
+        /**
+         * Make Token
+         * @description A new token for programs, which is shown this once.
+         */
+        post: operations["make_token_api_account_tokens_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/account/tokens/{token_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Revoke Token
+         * @description Let a token open nothing any more.
+         */
+        delete: operations["revoke_token_api_account_tokens__token_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/arenas": {
         parameters: {
             query?: never;
@@ -108,6 +232,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/audit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Audit Entries
+         * @description Who did what, the newest first.
+         */
+        get: operations["list_audit_entries_api_audit_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/audit/csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Audit Entries
+         * @description The same as a table for a spreadsheet, all of it.
+         */
+        get: operations["export_audit_entries_api_audit_csv_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/checkpoints/{checkpoint_id}/bundle": {
         parameters: {
             query?: never;
@@ -117,7 +281,7 @@ export interface paths {
         };
         /**
          * Download Bundle
-         * @description All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch just now.
+         * @description All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch.
          */
         get: operations["download_bundle_api_checkpoints__checkpoint_id__bundle_get"];
         put?: never;
@@ -228,6 +392,74 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/evaluations": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Evaluations
+         * @description Some of the evaluations that were asked for, the newest first.
+         */
+        get: operations["list_evaluations_api_evaluations_get"];
+        put?: never;
+        /**
+         * Ask For Evaluation
+         * @description Measure a policy on a suite; a worker does it, and the answer says where it stands.
+         */
+        post: operations["ask_for_evaluation_api_evaluations_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/evaluations/{evaluation_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Evaluation
+         * @description One of them, with its progress and the time that is left.
+         */
+        get: operations["get_evaluation_api_evaluations__evaluation_id__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Evaluation
+         * @description Forget one that has ended.
+         */
+        delete: operations["delete_evaluation_api_evaluations__evaluation_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/evaluations/{evaluation_id}/episodes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Evaluation Episodes
+         * @description Every episode behind its figures, in the suite's order.
+         */
+        get: operations["list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/events": {
         parameters: {
             query?: never;
@@ -262,13 +494,13 @@ export interface paths {
         };
         /**
          * List Experiments
-         * @description Experiments, the newest first, in short.
+         * @description Experiments in short, the newest first where nothing else is asked for.
          */
         get: operations["list_experiments_api_experiments_get"];
         put?: never;
         /**
          * Create Experiment
-         * @description Launch: one run a seed.
+         * @description Launch into a project: one run a seed.
          */
         post: operations["create_experiment_api_experiments_post"];
         delete?: never;
@@ -293,16 +525,56 @@ export interface paths {
         post?: never;
         /**
          * Delete Experiment
-         * @description Remove it with everything that hangs on it; runs that are going on are cut off.
+         * @description Put it into the trash, where it lies for a week and can be taken out again; its runs are stopped.
          */
         delete: operations["delete_experiment_api_experiments__experiment_id__delete"];
         options?: never;
         head?: never;
         /**
-         * Rename Experiment
-         * @description Give it another name.
+         * Change Experiment
+         * @description Give it another name, or move it to another project.
          */
-        patch: operations["rename_experiment_api_experiments__experiment_id__patch"];
+        patch: operations["change_experiment_api_experiments__experiment_id__patch"];
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/marks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Marks
+         * @description Tags, star and notes of an experiment.
+         */
+        get: operations["get_marks_api_experiments__experiment_id__marks_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/notes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put Notes
+         * @description Replace an experiment's notes.
+         */
+        put: operations["put_notes_api_experiments__experiment_id__notes_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/experiments/{experiment_id}/resume": {
@@ -319,6 +591,26 @@ export interface paths {
          * @description Go on with every run of it that was stopped or failed.
          */
         post: operations["resume_experiment_api_experiments__experiment_id__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/seeds": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Seeds
+         * @description Train an experiment with more seeds.
+         */
+        post: operations["add_seeds_api_experiments__experiment_id__seeds_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -345,6 +637,150 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/invitations": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Invitations
+         * @description Invitations that still hold, to the projects that one administrates.
+         */
+        get: operations["list_invitations_api_invitations_get"];
+        put?: never;
+        /**
+         * Invite
+         * @description A link by which somebody joins, once.
+         */
+        post: operations["invite_api_invitations_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/invitations/{invitation_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Withdraw Invitation
+         * @description Let a link open nothing any more.
+         */
+        delete: operations["withdraw_invitation_api_invitations__invitation_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/invitations/accept": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Accept Invitation
+         * @description Join, or set the password, and be signed in.
+         */
+        post: operations["accept_invitation_api_invitations_accept_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/invitations/look": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Look At Invitation
+         * @description What a link is for.
+         */
+        post: operations["look_at_invitation_api_invitations_look_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/jobs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Jobs
+         * @description Some of the jobs: those under way, those that wait in the order of their turn, then what has ended.
+         */
+        get: operations["list_jobs_api_jobs_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/jobs/{job_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Job
+         * @description One of them, with its progress and the time that is left.
+         */
+        get: operations["get_job_api_jobs__job_id__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/jobs/{job_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cancel Job
+         * @description Take a job back; one that has ended stays as it is.
+         */
+        post: operations["cancel_job_api_jobs__job_id__cancel_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/login": {
         parameters: {
             query?: never;
@@ -359,6 +795,66 @@ export interface paths {
          * @description Exchange the token that the server printed at start for a cookie.
          */
         post: operations["login_api_login_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/people": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List People
+         * @description Everybody with an account, by name.
+         */
+        get: operations["list_people_api_people_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/people/{user_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        /**
+         * Change Person
+         * @description Let somebody administrate or not, and close or open their account.
+         */
+        patch: operations["change_person_api_people__user_id__patch"];
+        trace?: never;
+    };
+    "/api/people/{user_id}/password-link": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Make Password Link
+         * @description A link by which somebody sets a new password.
+         */
+        post: operations["make_password_link_api_people__user_id__password_link_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -414,7 +910,7 @@ export interface paths {
         };
         /**
          * Download Policy Bundle
-         * @description All that it takes to drive a robot with it; compared with torch just now.
+         * @description All that it takes to drive a robot with it; compared with torch.
          */
         get: operations["download_policy_bundle_api_policies__name__bundle_get"];
         put?: never;
@@ -504,6 +1000,94 @@ export interface paths {
         put?: never;
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/projects": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Projects
+         * @description The projects that one may see, by name.
+         */
+        get: operations["list_projects_api_projects_get"];
+        put?: never;
+        /**
+         * Create Project
+         * @description Add an empty project.
+         */
+        post: operations["create_project_api_projects_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/projects/{project_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        /**
+         * Rename Project
+         * @description Give it another name.
+         */
+        patch: operations["rename_project_api_projects__project_id__patch"];
+        trace?: never;
+    };
+    "/api/projects/{project_id}/members": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Members
+         * @description The people of a project, by name; administrators of the installation may do everything without being listed.
+         */
+        get: operations["list_members_api_projects__project_id__members_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/projects/{project_id}/members/{user_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Member
+         * @description Let a member do more, or less.
+         */
+        put: operations["change_member_api_projects__project_id__members__user_id__put"];
+        post?: never;
+        /**
+         * Remove Member
+         * @description Take somebody out of a project.
+         */
+        delete: operations["remove_member_api_projects__project_id__members__user_id__delete"];
         options?: never;
         head?: never;
         patch?: never;
@@ -757,6 +1341,50 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sign-in": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Sign In Options
+         * @description How one may sign in here.
+         */
+        get: operations["get_sign_in_options_api_sign_in_get"];
+        put?: never;
+        /**
+         * Sign In
+         * @description Exchange name and password for a session, which a cookie keeps.
+         */
+        post: operations["sign_in_api_sign_in_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sign-out": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Sign Out
+         * @description End the session, and forget the login.
+         */
+        post: operations["sign_out_api_sign_out_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/status": {
         parameters: {
             query?: never;
@@ -817,6 +1445,194 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/workbench/actions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Act
+         * @description Do one thing to several experiments, and say which were left out, and why.
+         */
+        post: operations["act_api_workbench_actions_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/groups": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Groups
+         * @description The experiments that a query finds by the values of one key, with intervals over all runs of each group.
+         */
+        get: operations["list_groups_api_workbench_groups_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/ids": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Ids
+         * @description The ids of what a query finds, as many as one action may be about.
+         */
+        get: operations["list_ids_api_workbench_ids_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/keys": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Keys
+         * @description Everything that experiments can be filtered, sorted and grouped by.
+         */
+        get: operations["list_keys_api_workbench_keys_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/values": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Values
+         * @description Some values that a key has, the most frequent first.
+         */
+        get: operations["list_values_api_workbench_values_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/views": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Views
+         * @description The named views of the table, by name.
+         */
+        get: operations["list_views_api_workbench_views_get"];
+        /**
+         * Save View
+         * @description Keep a view under a name; one of that name is replaced.
+         */
+        put: operations["save_view_api_workbench_views_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workbench/views/{view_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Remove View
+         * @description Forget a view.
+         */
+        delete: operations["remove_view_api_workbench_views__view_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/worker-tokens": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Worker Tokens
+         * @description Tokens of workers' machines, by name.
+         */
+        get: operations["list_worker_tokens_api_worker_tokens_get"];
+        put?: never;
+        /**
+         * Make Worker Token
+         * @description A new token for the workers of a machine, which is shown this once.
+         */
+        post: operations["make_worker_token_api_worker_tokens_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/worker-tokens/{token_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Revoke Worker Token
+         * @description Let a workers' token open nothing any more; links that it opened are cut.
+         */
+        delete: operations["revoke_worker_token_api_worker_tokens__token_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/workers/drain": {
         parameters: {
             query?: never;
@@ -841,6 +1657,185 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /**
+         * Account
+         * @description Who asks.
+         */
+        Account: {
+            /**
+             * Administrates
+             * @description May administrate people, workers' tokens and the audit log.
+             */
+            administrates: boolean;
+            /** Email */
+            email: string | null;
+            /** Has Password */
+            has_password: boolean;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "owner" | "person" | "token";
+            /**
+             * May Launch
+             * @description Is an editor in some project.
+             */
+            may_launch: boolean;
+            /**
+             * Name
+             * @description "owner" for who holds the token that the server printed at start.
+             */
+            name: string;
+            /**
+             * People
+             * @description There are accounts.
+             */
+            people: boolean;
+        };
+        /**
+         * AckermannDrive
+         * @description Steered front wheels, as a car's: it drives on circles about points abeam of its rear axle, and never on the spot.
+         *
+         *     The body's middle is half-way between the axles. Speeds are those of the rear axle's middle, which turns on a circle of
+         *     radius wheel base / tan(steering angle).
+         */
+        "AckermannDrive-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ackermann";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 1
+             */
+            reverse: number;
+            /**
+             * Steering limit
+             * @description Degrees to either side.
+             * @default 30
+             */
+            steering_limit: number;
+            /**
+             * Steering rate
+             * @description Degrees per second that the steering angle changes at most; 0 is unlimited.
+             * @default 0
+             */
+            steering_rate: number;
+            /**
+             * Wheel base
+             * @description Metres between the axles.
+             * @default 0.16
+             */
+            wheel_base: number;
+        };
+        /**
+         * AckermannDrive
+         * @description Steered front wheels, as a car's: it drives on circles about points abeam of its rear axle, and never on the spot.
+         *
+         *     The body's middle is half-way between the axles. Speeds are those of the rear axle's middle, which turns on a circle of
+         *     radius wheel base / tan(steering angle).
+         */
+        "AckermannDrive-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ackermann";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 1
+             */
+            reverse: number;
+            /**
+             * Steering limit
+             * @description Degrees to either side.
+             * @default 30
+             */
+            steering_limit: number;
+            /**
+             * Steering rate
+             * @description Degrees per second that the steering angle changes at most; 0 is unlimited.
+             * @default 0
+             */
+            steering_rate: number;
+            /**
+             * Wheel base
+             * @description Metres between the axles.
+             * @default 0.16
+             */
+            wheel_base: number;
+        };
+        /**
+         * Action
+         * @description Something to do to several experiments at once.
+         *
+         *     `repeat` queues their failed runs again, from the last checkpoint where there is one. `delete` puts them into the trash,
+         *     `restore` takes them out of it, `remove` removes them for good.
+         */
+        Action: {
+            /**
+             * Action
+             * @enum {string}
+             */
+            action: "stop" | "resume" | "repeat" | "star" | "unstar" | "archive" | "unarchive" | "tag" | "untag" | "delete" | "restore" | "remove";
+            /** Experiments */
+            experiments: string[];
+            /**
+             * Tag
+             * @description To put on or take off; of those actions only.
+             */
+            tag?: string | null;
+        };
+        /**
+         * ActionDone
+         * @description What has become of an action.
+         */
+        ActionDone: {
+            /**
+             * Done
+             * @description The experiments that it was done to.
+             */
+            done: string[];
+            /** Left Out */
+            left_out: components["schemas"]["LeftOut"][];
+        };
+        /**
+         * ActionsPart
+         * @description What was commanded last, whether it was followed by then or not, as fractions of the limits.
+         */
+        "ActionsPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "actions";
+        };
+        /**
+         * ActionsPart
+         * @description What was commanded last, whether it was followed by then or not, as fractions of the limits.
+         */
+        "ActionsPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "actions";
+        };
         /**
          * AlignmentTerm
          * @description Facing away from the target: |bearing of the target| / pi.
@@ -874,6 +1869,57 @@ export interface components {
              * @default -5
              */
             weight: number;
+        };
+        /**
+         * ApiToken
+         * @description A token for programs; the token itself is shown when it is made, and never again.
+         */
+        ApiToken: {
+            /** Created At */
+            created_at: number;
+            /** Expires At */
+            expires_at: number | null;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Projects */
+            projects: string[] | null;
+            /**
+             * Scope
+             * @enum {string}
+             */
+            scope: "read" | "launch" | "admin";
+            /**
+             * Seen At
+             * @description Last used, noted every ten minutes at most.
+             */
+            seen_at: number | null;
+        };
+        /**
+         * ApiTokenCreate
+         * @description A token for programs.
+         */
+        ApiTokenCreate: {
+            /**
+             * Days
+             * @description Until it ends by itself; null for never.
+             * @default 90
+             */
+            days: number | null;
+            /** Name */
+            name: string;
+            /**
+             * Projects
+             * @description Ids; all of its owner's where it is null.
+             */
+            projects?: string[] | null;
+            /**
+             * Scope
+             * @description `read` looks, `launch` launches and stops, `admin` does all that its owner may.
+             * @enum {string}
+             */
+            scope: "read" | "launch" | "admin";
         };
         /**
          * ArenaConfig
@@ -998,6 +2044,32 @@ export interface components {
             width: number;
         };
         /**
+         * ArenaSuite
+         * @description The suite that is drawn for an arena: a family at a difficulty, an imported one, a built-in one.
+         */
+        "ArenaSuite-Input": {
+            /** Arena */
+            arena: components["schemas"]["ArenaConfig-Input"] | components["schemas"]["GeneratedArenaConfig-Input"] | components["schemas"]["ImportedArenaConfig-Input"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "arena";
+        };
+        /**
+         * ArenaSuite
+         * @description The suite that is drawn for an arena: a family at a difficulty, an imported one, a built-in one.
+         */
+        "ArenaSuite-Output": {
+            /** Arena */
+            arena: components["schemas"]["ArenaConfig-Output"] | components["schemas"]["GeneratedArenaConfig-Output"] | components["schemas"]["ImportedArenaConfig-Output"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "arena";
+        };
+        /**
          * ArenaSummary
          * @description An arena in the gallery.
          */
@@ -1120,6 +2192,418 @@ export interface components {
             weight: number;
         };
         /**
+         * AskedEpisodes
+         * @description Every episode behind an evaluation's figures.
+         */
+        AskedEpisodes: {
+            /** Episodes */
+            episodes: components["schemas"]["EpisodeResult"][];
+            /** Suite */
+            suite: string | null;
+            /** Suite Hash */
+            suite_hash: string | null;
+        };
+        /**
+         * AskedEvaluation
+         * @description A policy or a baseline on a suite.
+         */
+        AskedEvaluation: {
+            /** Choice */
+            choice: components["schemas"]["NamedSuite-Output"] | components["schemas"]["ArenaSuite-Output"] | components["schemas"]["OwnSuite-Output"];
+            /** Created At */
+            created_at: number;
+            /** Error */
+            error: string | null;
+            /** @description Null until it is measured. */
+            figures: components["schemas"]["EvaluationFigures"] | null;
+            /** Id */
+            id: string;
+            /** Job Id */
+            job_id: string;
+            /** Policy */
+            policy: components["schemas"]["CheckpointPolicy-Output"] | components["schemas"]["ShippedPolicyName-Output"] | components["schemas"]["BaselineName-Output"];
+            /**
+             * Progress
+             * @description Share of the work that is done, 0 to 1.
+             */
+            progress: number;
+            /**
+             * Seconds Left
+             * @description Null where that is not known yet, and once it has ended.
+             */
+            seconds_left: number | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "queued" | "running" | "done" | "failed" | "cancelled";
+            /**
+             * Suite
+             * @description Its name; null until it is measured.
+             */
+            suite: string | null;
+            /** Suite Hash */
+            suite_hash: string | null;
+            /**
+             * Title
+             * @description Of the policy.
+             */
+            title: string;
+        };
+        /**
+         * AskedEvaluationPage
+         * @description Some of the evaluations, the newest first.
+         */
+        AskedEvaluationPage: {
+            /** Items */
+            items: components["schemas"]["AskedEvaluation"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
+         * AuditEntry
+         * @description Somebody did something.
+         */
+        AuditEntry: {
+            /**
+             * Action
+             * @description What was done, as KIND.DEED.
+             */
+            action: string;
+            /**
+             * Actor
+             * @description A name; "owner" is who holds the token that the server printed at start.
+             */
+            actor: string;
+            /**
+             * Address
+             * @description Of the client.
+             */
+            address: string;
+            /**
+             * At
+             * @description Seconds since the epoch, UTC.
+             */
+            at: number;
+            /** Details */
+            details: string | null;
+            /** Id */
+            id: number;
+            /**
+             * Name
+             * @description Of what it was done to, as it was then.
+             */
+            name: string | null;
+            /** Project Id */
+            project_id: string | null;
+            /**
+             * Target
+             * @description Id of what it was done to.
+             */
+            target: string | null;
+        };
+        /**
+         * BaselineName
+         * @description A controller that needs no training, with the robot of `task`.
+         */
+        "BaselineName-Input": {
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "random" | "go-to-goal" | "dynamic window";
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "baseline";
+            /**
+             * @default {
+             *       "arena": {
+             *         "movers": {
+             *           "count": 0,
+             *           "kind": "pedestrian",
+             *           "radius": 0.25,
+             *           "sees_robots": false,
+             *           "speed": 1
+             *         },
+             *         "name": "simple"
+             *       },
+             *       "robot": {
+             *         "drive": {
+             *           "name": "differential",
+             *           "reverse": 0
+             *         },
+             *         "max_angular_acceleration": 0,
+             *         "max_angular_speed": 1,
+             *         "max_linear_acceleration": 0,
+             *         "max_linear_speed": 0.25,
+             *         "name": "burger",
+             *         "radius": 0.105
+             *       },
+             *       "lidar": {
+             *         "dropout": 0,
+             *         "field_of_view": 180,
+             *         "mount": {
+             *           "name": "centre"
+             *         },
+             *         "noise": 0,
+             *         "range": 3.5,
+             *         "rate": 0,
+             *         "rays": 30
+             *       },
+             *       "odometry": {
+             *         "distance_noise": 0,
+             *         "heading_noise": 0
+             *       },
+             *       "observation": {
+             *         "parts": [
+             *           {
+             *             "batches": 10,
+             *             "frames": 1,
+             *             "inverse": true,
+             *             "name": "ranges"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "speeds"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "distance",
+             *             "scaling": "saturating"
+             *           },
+             *           {
+             *             "encoding": "angle",
+             *             "frames": 1,
+             *             "name": "bearing"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "heading",
+             *             "scaling": "signed"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "deviation"
+             *           }
+             *         ]
+             *       },
+             *       "reward": {
+             *         "terms": [
+             *           {
+             *             "name": "arrival",
+             *             "weight": 120
+             *           },
+             *           {
+             *             "name": "collision",
+             *             "weight": -100
+             *           },
+             *           {
+             *             "exponential": false,
+             *             "name": "progress",
+             *             "weight": 500
+             *           }
+             *         ]
+             *       },
+             *       "control_period": 0.2,
+             *       "arrival_distance": 0.2,
+             *       "collision_distance": 0.2,
+             *       "step_limit": 500,
+             *       "command_delay": 0,
+             *       "randomisation": {
+             *         "command_delay": [],
+             *         "distance_noise": [],
+             *         "dropout": [],
+             *         "field_of_view": [],
+             *         "heading_noise": [],
+             *         "max_angular_speed": [],
+             *         "max_linear_speed": [],
+             *         "noise": [],
+             *         "range": [],
+             *         "rate": []
+             *       }
+             *     }
+             */
+            task: components["schemas"]["TaskConfig-Input"];
+        };
+        /**
+         * BaselineName
+         * @description A controller that needs no training, with the robot of `task`.
+         */
+        "BaselineName-Output": {
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "random" | "go-to-goal" | "dynamic window";
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "baseline";
+            /**
+             * @default {
+             *       "arena": {
+             *         "movers": {
+             *           "count": 0,
+             *           "kind": "pedestrian",
+             *           "radius": 0.25,
+             *           "sees_robots": false,
+             *           "speed": 1
+             *         },
+             *         "name": "simple"
+             *       },
+             *       "robot": {
+             *         "drive": {
+             *           "name": "differential",
+             *           "reverse": 0
+             *         },
+             *         "max_angular_acceleration": 0,
+             *         "max_angular_speed": 1,
+             *         "max_linear_acceleration": 0,
+             *         "max_linear_speed": 0.25,
+             *         "name": "burger",
+             *         "radius": 0.105
+             *       },
+             *       "lidar": {
+             *         "dropout": 0,
+             *         "field_of_view": 180,
+             *         "mount": {
+             *           "name": "centre"
+             *         },
+             *         "noise": 0,
+             *         "range": 3.5,
+             *         "rate": 0,
+             *         "rays": 30
+             *       },
+             *       "odometry": {
+             *         "distance_noise": 0,
+             *         "heading_noise": 0
+             *       },
+             *       "observation": {
+             *         "parts": [
+             *           {
+             *             "batches": 10,
+             *             "frames": 1,
+             *             "inverse": true,
+             *             "name": "ranges"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "speeds"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "distance",
+             *             "scaling": "saturating"
+             *           },
+             *           {
+             *             "encoding": "angle",
+             *             "frames": 1,
+             *             "name": "bearing"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "heading",
+             *             "scaling": "signed"
+             *           },
+             *           {
+             *             "frames": 1,
+             *             "name": "deviation"
+             *           }
+             *         ]
+             *       },
+             *       "reward": {
+             *         "terms": [
+             *           {
+             *             "name": "arrival",
+             *             "weight": 120
+             *           },
+             *           {
+             *             "name": "collision",
+             *             "weight": -100
+             *           },
+             *           {
+             *             "exponential": false,
+             *             "name": "progress",
+             *             "weight": 500
+             *           }
+             *         ]
+             *       },
+             *       "control_period": 0.2,
+             *       "arrival_distance": 0.2,
+             *       "collision_distance": 0.2,
+             *       "step_limit": 500,
+             *       "command_delay": 0,
+             *       "randomisation": {
+             *         "command_delay": [],
+             *         "distance_noise": [],
+             *         "dropout": [],
+             *         "field_of_view": [],
+             *         "heading_noise": [],
+             *         "max_angular_speed": [],
+             *         "max_linear_speed": [],
+             *         "noise": [],
+             *         "range": [],
+             *         "rate": []
+             *       }
+             *     }
+             */
+            task: components["schemas"]["TaskConfig-Output"];
+        };
+        /**
+         * BearingPart
+         * @description Where the target is against the heading, left positive.
+         */
+        "BearingPart-Input": {
+            /**
+             * Encoding
+             * @description Angle: bearing / pi, which jumps behind the robot. Sine and cosine: two numbers, which do not.
+             * @default angle
+             * @enum {string}
+             */
+            encoding: "angle" | "sine_cosine";
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "bearing";
+        };
+        /**
+         * BearingPart
+         * @description Where the target is against the heading, left positive.
+         */
+        "BearingPart-Output": {
+            /**
+             * Encoding
+             * @description Angle: bearing / pi, which jumps behind the robot. Sine and cosine: two numbers, which do not.
+             * @default angle
+             * @enum {string}
+             */
+            encoding: "angle" | "sine_cosine";
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "bearing";
+        };
+        /**
          * Box
          * @description A rectangular obstacle; `angle` is that of its length against the x axis, degrees, anticlockwise.
          */
@@ -1180,14 +2664,19 @@ export interface components {
          */
         "BurgerConfig-Input": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1
              */
             max_angular_speed: number;
@@ -1199,7 +2688,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.25
              */
             max_linear_speed: number;
@@ -1226,14 +2715,19 @@ export interface components {
          */
         "BurgerConfig-Output": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1
              */
             max_angular_speed: number;
@@ -1245,7 +2739,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.25
              */
             max_linear_speed: number;
@@ -1369,6 +2863,28 @@ export interface components {
             id: string;
         };
         /**
+         * CentredMount
+         * @description One LiDAR in the body's middle, looking ahead.
+         */
+        "CentredMount-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "centre";
+        };
+        /**
+         * CentredMount
+         * @description One LiDAR in the body's middle, looking ahead.
+         */
+        "CentredMount-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "centre";
+        };
+        /**
          * Checkpoint
          * @description A policy at a step of a run.
          */
@@ -1412,6 +2928,32 @@ export interface components {
              * @description How many there are on all pages.
              */
             total: number;
+        };
+        /**
+         * CheckpointPolicy
+         * @description The policy of a checkpoint.
+         */
+        "CheckpointPolicy-Input": {
+            /** Id */
+            id: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "checkpoint";
+        };
+        /**
+         * CheckpointPolicy
+         * @description The policy of a checkpoint.
+         */
+        "CheckpointPolicy-Output": {
+            /** Id */
+            id: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "checkpoint";
         };
         /**
          * Circle
@@ -1610,6 +3152,84 @@ export interface components {
             word: "compatible" | "one seed's luck" | "not compatible";
         };
         /**
+         * ConvNetwork
+         * @description Convolutions along the scan, one channel for each stacked frame; every other number joins behind them.
+         */
+        "ConvNetwork-Input": {
+            /**
+             * Channels
+             * @description Of each convolution along the scan, 1 to 128. Worth it with many LiDAR batches.
+             * @default [
+             *       8,
+             *       16
+             *     ]
+             */
+            channels: number[];
+            /**
+             * Kernel size
+             * @description Neighbouring ranges that one number sees.
+             * @default 5
+             * @enum {integer}
+             */
+            kernel_size: 3 | 5 | 7 | 9;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "conv";
+            /**
+             * Stride
+             * @description Ranges between two numbers of a convolution.
+             * @default 2
+             */
+            stride: number;
+            /**
+             * Units
+             * @description Of the hidden layer behind it.
+             * @default 64
+             */
+            units: number;
+        };
+        /**
+         * ConvNetwork
+         * @description Convolutions along the scan, one channel for each stacked frame; every other number joins behind them.
+         */
+        "ConvNetwork-Output": {
+            /**
+             * Channels
+             * @description Of each convolution along the scan, 1 to 128. Worth it with many LiDAR batches.
+             * @default [
+             *       8,
+             *       16
+             *     ]
+             */
+            channels: number[];
+            /**
+             * Kernel size
+             * @description Neighbouring ranges that one number sees.
+             * @default 5
+             * @enum {integer}
+             */
+            kernel_size: 3 | 5 | 7 | 9;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "conv";
+            /**
+             * Stride
+             * @description Ranges between two numbers of a convolution.
+             * @default 2
+             */
+            stride: number;
+            /**
+             * Units
+             * @description Of the hidden layer behind it.
+             * @default 64
+             */
+            units: number;
+        };
+        /**
          * Curves
          * @description One metric of several experiments on one grid of environment steps.
          */
@@ -1679,7 +3299,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"] | components["schemas"]["ConvNetwork-Input"] | components["schemas"]["GruNetwork-Input"];
             /**
              * Memory
              * @description Transitions kept.
@@ -1775,7 +3395,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"] | components["schemas"]["ConvNetwork-Output"] | components["schemas"]["GruNetwork-Output"];
             /**
              * Memory
              * @description Transitions kept.
@@ -1812,6 +3432,40 @@ export interface components {
              * @default 10000
              */
             warmup_steps: number;
+        };
+        /**
+         * DeviationPart
+         * @description How far the robot is turned away from the target: |bearing| / pi.
+         */
+        "DeviationPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "deviation";
+        };
+        /**
+         * DeviationPart
+         * @description How far the robot is turned away from the target: |bearing| / pi.
+         */
+        "DeviationPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "deviation";
         };
         /**
          * Diagnoses
@@ -1879,6 +3533,216 @@ export interface components {
              * @description One an experiment, in their order; null where it has no such setting.
              */
             values: unknown[];
+        };
+        /**
+         * DifferentialDrive
+         * @description Two driven wheels: it drives forwards or backwards, and turns about its middle.
+         */
+        "DifferentialDrive-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "differential";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 0
+             */
+            reverse: number;
+        };
+        /**
+         * DifferentialDrive
+         * @description Two driven wheels: it drives forwards or backwards, and turns about its middle.
+         */
+        "DifferentialDrive-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "differential";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 0
+             */
+            reverse: number;
+        };
+        /**
+         * DirectionPart
+         * @description Where the target is, in the arena's frame: part of a turn.
+         */
+        "DirectionPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "direction";
+        };
+        /**
+         * DirectionPart
+         * @description Where the target is, in the arena's frame: part of a turn.
+         */
+        "DirectionPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "direction";
+        };
+        /**
+         * DistancePart
+         * @description How far the target is.
+         */
+        "DistancePart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "distance";
+            /**
+             * Scaling
+             * @description Saturating: d / (d + 1 m). Diagonal: over the arena's, as in the paper.
+             * @default saturating
+             * @enum {string}
+             */
+            scaling: "saturating" | "diagonal";
+        };
+        /**
+         * DistancePart
+         * @description How far the target is.
+         */
+        "DistancePart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "distance";
+            /**
+             * Scaling
+             * @description Saturating: d / (d + 1 m). Diagonal: over the arena's, as in the paper.
+             * @default saturating
+             * @enum {string}
+             */
+            scaling: "saturating" | "diagonal";
+        };
+        /**
+         * DoubleMount
+         * @description Two LiDARs of one kind; the scan is the first one's rays, then the second one's.
+         */
+        "DoubleMount-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "double";
+            /**
+             * Second, ahead
+             * @description Metres from the body's middle, within the body.
+             * @default -0.05
+             */
+            second_x: number;
+            /**
+             * Second, to the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            second_y: number;
+            /**
+             * Second, turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 180
+             */
+            second_yaw: number;
+            /**
+             * First, ahead
+             * @description Metres from the body's middle, within the body.
+             * @default 0.05
+             */
+            x: number;
+            /**
+             * First, to the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            y: number;
+            /**
+             * First, turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 0
+             */
+            yaw: number;
+        };
+        /**
+         * DoubleMount
+         * @description Two LiDARs of one kind; the scan is the first one's rays, then the second one's.
+         */
+        "DoubleMount-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "double";
+            /**
+             * Second, ahead
+             * @description Metres from the body's middle, within the body.
+             * @default -0.05
+             */
+            second_x: number;
+            /**
+             * Second, to the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            second_y: number;
+            /**
+             * Second, turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 180
+             */
+            second_yaw: number;
+            /**
+             * First, ahead
+             * @description Metres from the body's middle, within the body.
+             * @default 0.05
+             */
+            x: number;
+            /**
+             * First, to the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            y: number;
+            /**
+             * First, turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 0
+             */
+            yaw: number;
         };
         /**
          * DrainRequest
@@ -2073,6 +3937,49 @@ export interface components {
             every_steps: number;
         };
         /**
+         * EvaluationFigures
+         * @description How a policy did; rates are shares of the episodes, 0 to 1.
+         */
+        EvaluationFigures: {
+            /** Collision */
+            collision: number;
+            /** Episodes */
+            episodes: number;
+            /**
+             * Min Clearance
+             * @description Mean of the episodes' smallest distance to anything else, metres.
+             */
+            min_clearance: number;
+            /**
+             * Spl
+             * @description Success weighted by path length.
+             */
+            spl: number;
+            /**
+             * Steps
+             * @description Control steps of the episodes that arrived; null where none did.
+             */
+            steps: number | null;
+            success: components["schemas"]["Estimate"];
+            /** Timeout */
+            timeout: number;
+        };
+        /**
+         * EvaluationRequest
+         * @description Which policy is to be measured on which suite.
+         */
+        EvaluationRequest: {
+            /** Policy */
+            policy: components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["BaselineName-Input"];
+            /**
+             * Suite
+             * @default {
+             *       "by": "own"
+             *     }
+             */
+            suite: components["schemas"]["NamedSuite-Input"] | components["schemas"]["ArenaSuite-Input"] | components["schemas"]["OwnSuite-Input"];
+        };
+        /**
          * Evidence
          * @description A number that a diagnosis rests on.
          */
@@ -2107,8 +4014,15 @@ export interface components {
             created_at: number;
             /** Id */
             id: string;
+            /**
+             * Lacking
+             * @description Extensions for want of which settings can't be read here.
+             */
+            lacking: components["schemas"]["UsedExtension-Output"][];
             /** Name */
             name: string;
+            /** Project Id */
+            project_id: string;
             /**
              * Runs
              * @description One a seed, by seed.
@@ -2132,29 +4046,7 @@ export interface components {
          * ExperimentCreate
          * @description One configuration, to be trained once with each seed.
          */
-        "ExperimentCreate-Input": {
-            /**
-             * Name
-             * @description What you will know it by.
-             * @default My first policy
-             */
-            name: string;
-            /**
-             * Seeds
-             * @description One run each. One is enough to get a policy; five or more to claim anything about the configuration.
-             * @default [
-             *       0
-             *     ]
-             */
-            seeds: number[];
-            /** Training */
-            training?: components["schemas"]["TrainingConfig-Input"];
-        };
-        /**
-         * ExperimentCreate
-         * @description One configuration, to be trained once with each seed.
-         */
-        "ExperimentCreate-Output": {
+        ExperimentCreate: {
             /**
              * Name
              * @description What you will know it by.
@@ -2199,12 +4091,79 @@ export interface components {
             seeds: components["schemas"]["SeedCurve"][];
         };
         /**
+         * ExperimentLaunch
+         * @description An experiment, and where it belongs.
+         */
+        ExperimentLaunch: {
+            /**
+             * Name
+             * @description What you will know it by.
+             * @default My first policy
+             */
+            name: string;
+            /**
+             * Project Id
+             * @description Of the project that it is launched into.
+             * @default default
+             */
+            project_id: string;
+            /**
+             * Seeds
+             * @description One run each. One is enough to get a policy; five or more to claim anything about the configuration.
+             * @default [
+             *       0
+             *     ]
+             */
+            seeds: number[];
+            /** Training */
+            training?: components["schemas"]["TrainingConfig-Input"];
+        };
+        /**
+         * ExperimentMarks
+         * @description What an experiment's page shows beside its runs.
+         */
+        ExperimentMarks: {
+            /** Archived */
+            archived: boolean;
+            /**
+             * Notes
+             * @description Markdown; empty where there are none.
+             */
+            notes: string;
+            /** Starred */
+            starred: boolean;
+            /** Tags */
+            tags: string[];
+        };
+        /**
          * ExperimentPatch
-         * @description What may be changed after launch.
+         * @description What may be changed after launch; what is absent stays as it is.
          */
         ExperimentPatch: {
             /** Name */
+            name?: string | null;
+            /**
+             * Project Id
+             * @description Of the project that it is moved to.
+             */
+            project_id?: string | null;
+        };
+        /**
+         * ExtensionState
+         * @description An extension that was found where a worker, or the service, runs.
+         *
+         *     Attributes:
+         *         name: of the extension.
+         *         version: of the extension; None where it is refused.
+         *         refused: why it is not used; None where it is.
+         */
+        ExtensionState: {
+            /** Name */
             name: string;
+            /** Refused */
+            refused: string | null;
+            /** Version */
+            version: string | null;
         };
         /**
          * FailedSeeds
@@ -2288,7 +4247,7 @@ export interface components {
         };
         /**
          * GeneratedArenaConfig
-         * @description A pool of arenas drawn from a seed; the robots are spread over all of them.
+         * @description A pool of arenas of a family that is built in.
          */
         "GeneratedArenaConfig-Input": {
             /**
@@ -2325,7 +4284,7 @@ export interface components {
         };
         /**
          * GeneratedArenaConfig
-         * @description A pool of arenas drawn from a seed; the robots are spread over all of them.
+         * @description A pool of arenas of a family that is built in.
          */
         "GeneratedArenaConfig-Output": {
             /**
@@ -2359,6 +4318,157 @@ export interface components {
              * @default 0
              */
             seed: number;
+        };
+        /**
+         * Group
+         * @description The experiments that have the same value under a key.
+         */
+        Group: {
+            /** Experiments */
+            experiments: number;
+            /**
+             * Metrics
+             * @description Newest values of those asked for, over all of its runs, by name.
+             */
+            metrics: {
+                [key: string]: components["schemas"]["SeedMean"];
+            };
+            /**
+             * Query
+             * @description Finds exactly these, within the query that was grouped.
+             */
+            query: string;
+            /** Runs */
+            runs: number;
+            /**
+             * States
+             * @description How many of the runs are in each state.
+             */
+            states: {
+                [key: string]: number;
+            };
+            /** @description Success rate over all of its runs that were last evaluated on the suite that most of them were. */
+            success: components["schemas"]["SeedMean"] | null;
+            /**
+             * Value
+             * @description Null for those that have none.
+             */
+            value: number | string | null;
+        };
+        /**
+         * Groups
+         * @description A list of experiments by the values of one key.
+         */
+        Groups: {
+            /**
+             * By
+             * @description The key's whole name.
+             */
+            by: string;
+            /**
+             * Items
+             * @description The largest first.
+             */
+            items: components["schemas"]["Group"][];
+            /**
+             * Total
+             * @description How many groups there are; the smallest may be left out.
+             */
+            total: number;
+        };
+        /**
+         * GruNetwork
+         * @description A hidden layer, then gated recurrent units (Cho et al. 2014): for PPO, it remembers what it saw in an episode.
+         */
+        "GruNetwork-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "gru";
+            /**
+             * Sequence
+             * @description Steps that gradients go back through time; a rollout is a whole number of sequences.
+             * @default 16
+             */
+            sequence_length: number;
+            /**
+             * Units
+             * @description Of the hidden layer, and of the memory.
+             * @default 32
+             */
+            units: number;
+        };
+        /**
+         * GruNetwork
+         * @description A hidden layer, then gated recurrent units (Cho et al. 2014): for PPO, it remembers what it saw in an episode.
+         */
+        "GruNetwork-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "gru";
+            /**
+             * Sequence
+             * @description Steps that gradients go back through time; a rollout is a whole number of sequences.
+             * @default 16
+             */
+            sequence_length: number;
+            /**
+             * Units
+             * @description Of the hidden layer, and of the memory.
+             * @default 32
+             */
+            units: number;
+        };
+        /**
+         * HeadingPart
+         * @description Where the robot points, in the arena's frame.
+         */
+        "HeadingPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "heading";
+            /**
+             * Scaling
+             * @description Signed: over pi, left positive. Turn: part of a turn, as in the paper.
+             * @default signed
+             * @enum {string}
+             */
+            scaling: "signed" | "turn";
+        };
+        /**
+         * HeadingPart
+         * @description Where the robot points, in the arena's frame.
+         */
+        "HeadingPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "heading";
+            /**
+             * Scaling
+             * @description Signed: over pi, left positive. Turn: part of a turn, as in the paper.
+             * @default signed
+             * @enum {string}
+             */
+            scaling: "signed" | "turn";
         };
         /** HTTPValidationError */
         HTTPValidationError: {
@@ -2408,6 +4518,110 @@ export interface components {
             sha256: string;
         };
         /**
+         * Invitation
+         * @description A link that lets somebody join once.
+         */
+        Invitation: {
+            /** Admin */
+            admin: boolean;
+            /** Expires At */
+            expires_at: number;
+            /** Id */
+            id: string;
+            /** Invited By */
+            invited_by: string;
+            /** Note */
+            note: string;
+            /** Project */
+            project: string | null;
+            /** Project Id */
+            project_id: string | null;
+            /** Role */
+            role: ("viewer" | "editor" | "admin") | null;
+        };
+        /**
+         * InvitationAccept
+         * @description Who accepts: a new name and password, or nothing more where somebody is signed in.
+         */
+        InvitationAccept: {
+            /** Code */
+            code: string;
+            /** Name */
+            name?: string | null;
+            /** Password */
+            password?: string | null;
+        };
+        /**
+         * InvitationCode
+         * @description What an invitation's link ends with.
+         */
+        InvitationCode: {
+            /** Code */
+            code: string;
+        };
+        /**
+         * InvitationCreate
+         * @description A link that lets somebody join.
+         */
+        InvitationCreate: {
+            /**
+             * Admin
+             * @description They administrate the installation.
+             * @default false
+             */
+            admin: boolean;
+            /**
+             * Days
+             * @description Until it ends.
+             * @default 7
+             */
+            days: number;
+            /**
+             * Note
+             * @description For whom it is, say.
+             * @default
+             */
+            note: string;
+            /**
+             * Project Id
+             * @description Of the project that they join; null for none.
+             */
+            project_id?: string | null;
+            /**
+             * Role
+             * @description In that project.
+             * @default viewer
+             * @enum {string}
+             */
+            role: "viewer" | "editor" | "admin";
+        };
+        /**
+         * InvitationView
+         * @description What an invitation is for, for who holds its link.
+         */
+        InvitationView: {
+            /** Admin */
+            admin: boolean;
+            /** Expires At */
+            expires_at: number;
+            /** Invited By */
+            invited_by: string;
+            /**
+             * Name
+             * @description Whose password it sets; null where somebody joins.
+             */
+            name: string | null;
+            /** Project */
+            project: string | null;
+            /**
+             * Purpose
+             * @enum {string}
+             */
+            purpose: "join" | "password";
+            /** Role */
+            role: ("viewer" | "editor" | "admin") | null;
+        };
+        /**
          * JackalConfig
          * @description A robot like Clearpath's Jackal: 508 x 430 mm, 2 m/s, 4 rad/s.
          *
@@ -2418,6 +4632,11 @@ export interface components {
          */
         "JackalConfig-Input": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
              * Length
              * @description Of the body, metres; it turns about its middle.
              * @default 0.508
@@ -2425,13 +4644,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 4
              */
             max_angular_speed: number;
@@ -2443,7 +4662,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 2
              */
             max_linear_speed: number;
@@ -2470,6 +4689,11 @@ export interface components {
          */
         "JackalConfig-Output": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
              * Length
              * @description Of the body, metres; it turns about its middle.
              * @default 0.508
@@ -2477,13 +4701,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 4
              */
             max_angular_speed: number;
@@ -2495,7 +4719,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 2
              */
             max_linear_speed: number;
@@ -2510,6 +4734,69 @@ export interface components {
              * @default 0.43
              */
             width: number;
+        };
+        /**
+         * Job
+         * @description Something that was asked for beside trainings.
+         */
+        Job: {
+            /** Attempt */
+            attempt: number;
+            /** Created At */
+            created_at: number;
+            /** Error */
+            error: string | null;
+            /** Finished At */
+            finished_at: number | null;
+            /** Id */
+            id: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "view" | "replay" | "export" | "evaluate";
+            /**
+             * Progress
+             * @description Share of the work that is done, 0 to 1.
+             */
+            progress: number;
+            /**
+             * Seconds Left
+             * @description Null where that is not known yet, and once it has ended.
+             */
+            seconds_left: number | null;
+            /** Started At */
+            started_at: number | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "queued" | "running" | "done" | "failed" | "cancelled";
+            /**
+             * Title
+             * @description Whose: a policy's name.
+             */
+            title: string;
+            /** Worker */
+            worker: string | null;
+        };
+        /**
+         * JobPage
+         * @description Some of the jobs: those under way, those that wait in the order of their turn, then what has ended.
+         */
+        JobPage: {
+            /** Items */
+            items: components["schemas"]["Job"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+            /**
+             * Workers
+             * @description Workers that take up jobs now.
+             */
+            workers: number;
         };
         /**
          * Keyframe
@@ -2527,16 +4814,53 @@ export interface components {
             y: number;
         };
         /**
+         * KnownKey
+         * @description Something to filter, sort and group by.
+         */
+        KnownKey: {
+            /** Key */
+            key: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "text" | "number" | "time" | "yes";
+            /** Meaning */
+            meaning: string;
+            /**
+             * Of
+             * @enum {string}
+             */
+            of: "property" | "setting" | "metric";
+            /**
+             * Values
+             * @description That it may have, where they are few.
+             */
+            values: string[];
+        };
+        /**
+         * KnownKeys
+         * @description Everything to filter, sort and group by.
+         */
+        KnownKeys: {
+            /** Items */
+            items: components["schemas"]["KnownKey"][];
+        };
+        /**
+         * LeftOut
+         * @description An experiment to which an action was not done.
+         */
+        LeftOut: {
+            /** Id */
+            id: string;
+            /** Reason */
+            reason: string;
+        };
+        /**
          * LidarConfig
-         * @description A planar scanner that looks ahead; the observation holds the minimum of each batch of neighbouring rays.
+         * @description A planar scanner, or two alike, where they are mounted.
          */
         "LidarConfig-Input": {
-            /**
-             * Batches
-             * @description Numbers of the scan that the policy sees; must divide the rays.
-             * @default 10
-             */
-            batches: number;
             /**
              * Dropout
              * @description Probability that a ray sees nothing and reads the full range.
@@ -2545,10 +4869,15 @@ export interface components {
             dropout: number;
             /**
              * Field of view
-             * @description Degrees, symmetric about the heading.
+             * @description Degrees, symmetric about where it looks.
              * @default 180
              */
             field_of_view: number;
+            /**
+             * Mount
+             * @description Where it stands on the body, above what would hide anything from it.
+             */
+            mount?: components["schemas"]["CentredMount-Input"] | components["schemas"]["SingleMount-Input"] | components["schemas"]["DoubleMount-Input"];
             /**
              * Noise
              * @description Standard deviation of each range that hits something, metres.
@@ -2576,15 +4905,9 @@ export interface components {
         };
         /**
          * LidarConfig
-         * @description A planar scanner that looks ahead; the observation holds the minimum of each batch of neighbouring rays.
+         * @description A planar scanner, or two alike, where they are mounted.
          */
         "LidarConfig-Output": {
-            /**
-             * Batches
-             * @description Numbers of the scan that the policy sees; must divide the rays.
-             * @default 10
-             */
-            batches: number;
             /**
              * Dropout
              * @description Probability that a ray sees nothing and reads the full range.
@@ -2593,10 +4916,15 @@ export interface components {
             dropout: number;
             /**
              * Field of view
-             * @description Degrees, symmetric about the heading.
+             * @description Degrees, symmetric about where it looks.
              * @default 180
              */
             field_of_view: number;
+            /**
+             * Mount
+             * @description Where it stands on the body, above what would hide anything from it.
+             */
+            mount: components["schemas"]["CentredMount-Output"] | components["schemas"]["SingleMount-Output"] | components["schemas"]["DoubleMount-Output"];
             /**
              * Noise
              * @description Standard deviation of each range that hits something, metres.
@@ -2629,6 +4957,8 @@ export interface components {
         ListedExperiment: {
             /** Algorithm */
             algorithm: string;
+            /** Archived */
+            archived: boolean;
             /** Arena */
             arena: string;
             /**
@@ -2638,8 +4968,20 @@ export interface components {
             campaign: string | null;
             /** Created At */
             created_at: number;
+            /**
+             * Deleted At
+             * @description When it was put into the trash; null unless it lies there.
+             */
+            deleted_at: number | null;
             /** Id */
             id: string;
+            /**
+             * Metrics
+             * @description Newest values of those asked for, over its runs, by name.
+             */
+            metrics: {
+                [key: string]: components["schemas"]["SeedMean"];
+            };
             /**
              * Movers
              * @description Moving obstacles.
@@ -2650,10 +4992,17 @@ export interface components {
             /** Network */
             network: string;
             /**
+             * Noted
+             * @description Whether it has notes.
+             */
+            noted: boolean;
+            /**
              * Progress
              * @description Steps done by all runs over the steps that they were given, 0 to 1.
              */
             progress: number;
+            /** Project Id */
+            project_id: string;
             /** Reward */
             reward: string;
             /** Robot */
@@ -2666,6 +5015,15 @@ export interface components {
              */
             seconds_left: number | null;
             /**
+             * Settings
+             * @description Those asked for, by dotted name; what it does not have is absent.
+             */
+            settings: {
+                [key: string]: number | string;
+            };
+            /** Starred */
+            starred: boolean;
+            /**
              * State
              * @description Of its runs together; mixed where they ended differently.
              */
@@ -2677,11 +5035,31 @@ export interface components {
             states: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed")[];
             /** @description Success rate of its runs' last evaluated checkpoints; null before the first evaluation. */
             success: components["schemas"]["Estimate"] | null;
+            /** Tags */
+            tags: string[];
             /**
              * Unreadable
              * @description Settings that another version stored and this one can't read, dotted: the defaults are shown in their place.
              */
             unreadable: string[];
+        };
+        /**
+         * ListedPage
+         * @description A part of the list of experiments.
+         */
+        ListedPage: {
+            /** Items */
+            items: components["schemas"]["ListedExperiment"][];
+            /**
+             * Next
+             * @description What to ask for as `after` to get what follows; null at the end.
+             */
+            next: string | null;
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
         };
         /**
          * LiveSettings
@@ -2780,6 +5158,44 @@ export interface components {
             token: string;
         };
         /**
+         * MatchingIds
+         * @description The experiments that a query finds.
+         */
+        MatchingIds: {
+            /** Ids */
+            ids: string[];
+            /** Total */
+            total: number;
+        };
+        /**
+         * Member
+         * @description Somebody who may see a project.
+         */
+        Member: {
+            /** Disabled */
+            disabled: boolean;
+            /** Name */
+            name: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "editor" | "admin";
+            /** User Id */
+            user_id: string;
+        };
+        /**
+         * MemberEdit
+         * @description What somebody may do in the project.
+         */
+        MemberEdit: {
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "editor" | "admin";
+        };
+        /**
          * Metrics
          * @description The series of a run, by name.
          */
@@ -2840,13 +5256,21 @@ export interface components {
             name: "mlp";
         };
         /**
+         * MoreSeeds
+         * @description Seeds to add to an experiment.
+         */
+        MoreSeeds: {
+            /** Seeds */
+            seeds: number[];
+        };
+        /**
          * MoversConfig
          * @description Movers that are put into every arena of a task.
          */
         "MoversConfig-Input": {
             /**
              * Moving obstacles
-             * @description In each arena; they never give way to a robot.
+             * @description In each arena.
              * @default 0
              */
             count: number;
@@ -2863,6 +5287,12 @@ export interface components {
              * @default 0.25
              */
             radius: number;
+            /**
+             * See robots
+             * @description They give way to robots as to one another, and walk into none that stands; else they walk as if there were no robot.
+             * @default false
+             */
+            sees_robots: boolean;
             /**
              * Speed
              * @description Top speed, metres per second.
@@ -2877,7 +5307,7 @@ export interface components {
         "MoversConfig-Output": {
             /**
              * Moving obstacles
-             * @description In each arena; they never give way to a robot.
+             * @description In each arena.
              * @default 0
              */
             count: number;
@@ -2895,11 +5325,168 @@ export interface components {
              */
             radius: number;
             /**
+             * See robots
+             * @description They give way to robots as to one another, and walk into none that stands; else they walk as if there were no robot.
+             * @default false
+             */
+            sees_robots: boolean;
+            /**
              * Speed
              * @description Top speed, metres per second.
              * @default 1
              */
             speed: number;
+        };
+        /**
+         * NamedSuite
+         * @description A suite by its name: a frozen one, or that of the policy's own task.
+         */
+        "NamedSuite-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "name";
+            /** Name */
+            name: string;
+        };
+        /**
+         * NamedSuite
+         * @description A suite by its name: a frozen one, or that of the policy's own task.
+         */
+        "NamedSuite-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "name";
+            /** Name */
+            name: string;
+        };
+        /**
+         * NetworkConfig
+         * @description Base of every network's configuration: a form of its own, chosen by `name`.
+         *
+         *     Attributes:
+         *         name: one literal value, its default: the network's name in files and in the API; its title is that in the form.
+         *         recurrent: whether it remembers: such a network takes and gives a memory beside its inputs and outputs.
+         */
+        NetworkConfig: {
+            /** Name */
+            name: string;
+        };
+        /**
+         * NewApiToken
+         * @description A token that was just made.
+         */
+        NewApiToken: {
+            /** Created At */
+            created_at: number;
+            /** Expires At */
+            expires_at: number | null;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Projects */
+            projects: string[] | null;
+            /**
+             * Scope
+             * @enum {string}
+             */
+            scope: "read" | "launch" | "admin";
+            /**
+             * Seen At
+             * @description Last used, noted every ten minutes at most.
+             */
+            seen_at: number | null;
+            /**
+             * Token
+             * @description To be copied now: only its hash is kept.
+             */
+            token: string;
+        };
+        /**
+         * NewInvitation
+         * @description An invitation that was just made.
+         */
+        NewInvitation: {
+            /** Admin */
+            admin: boolean;
+            /** Expires At */
+            expires_at: number;
+            /** Id */
+            id: string;
+            /** Invited By */
+            invited_by: string;
+            /** Note */
+            note: string;
+            /**
+             * Path
+             * @description The link on this server; only its hash is kept.
+             */
+            path: string;
+            /** Project */
+            project: string | null;
+            /** Project Id */
+            project_id: string | null;
+            /** Role */
+            role: ("viewer" | "editor" | "admin") | null;
+        };
+        /**
+         * NewWorkerToken
+         * @description A worker token that was just made.
+         */
+        NewWorkerToken: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Seen At
+             * @description Last used, noted every ten minutes at most.
+             */
+            seen_at: number | null;
+            /**
+             * Token
+             * @description To be copied now: only its hash is kept.
+             */
+            token: string;
+        };
+        /**
+         * Notes
+         * @description What people have written about an experiment.
+         */
+        Notes: {
+            /**
+             * Notes
+             * @description Markdown.
+             */
+            notes: string;
+        };
+        /**
+         * ObservationConfig
+         * @description The parts that a policy sees.
+         */
+        "ObservationConfig-Input": {
+            /**
+             * Parts
+             * @description What the policy sees. Leave one out to learn what it is worth.
+             */
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"])[];
+        };
+        /**
+         * ObservationConfig
+         * @description The parts that a policy sees.
+         */
+        "ObservationConfig-Output": {
+            /**
+             * Parts
+             * @description What the policy sees. Leave one out to learn what it is worth.
+             */
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"])[];
         };
         /**
          * OdometryConfig
@@ -2943,10 +5530,108 @@ export interface components {
              */
             heading_noise: number;
         };
-        /** Page[ListedExperiment] */
-        Page_ListedExperiment_: {
+        /**
+         * OmnidirectionalDrive
+         * @description Wheels that also roll sideways: it drives any way while it turns about its middle; speeds hold for each axis.
+         */
+        "OmnidirectionalDrive-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "omnidirectional";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 1
+             */
+            reverse: number;
+            /**
+             * Sideways
+             * @description Fastest to either side, as a share of the top speed.
+             * @default 1
+             */
+            sideways: number;
+        };
+        /**
+         * OmnidirectionalDrive
+         * @description Wheels that also roll sideways: it drives any way while it turns about its middle; speeds hold for each axis.
+         */
+        "OmnidirectionalDrive-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "omnidirectional";
+            /**
+             * Reverse
+             * @description Fastest backwards, as a share of the top speed; 0 never reverses.
+             * @default 1
+             */
+            reverse: number;
+            /**
+             * Sideways
+             * @description Fastest to either side, as a share of the top speed.
+             * @default 1
+             */
+            sideways: number;
+        };
+        /**
+         * OwnSuite
+         * @description The suite of the policy's own task.
+         */
+        "OwnSuite-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "own";
+        };
+        /**
+         * OwnSuite
+         * @description The suite of the policy's own task.
+         */
+        "OwnSuite-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "own";
+        };
+        /** Page[AuditEntry] */
+        Page_AuditEntry_: {
             /** Items */
-            items: components["schemas"]["ListedExperiment"][];
+            items: components["schemas"]["AuditEntry"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /** Page[Member] */
+        Page_Member_: {
+            /** Items */
+            items: components["schemas"]["Member"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /** Page[Person] */
+        Page_Person_: {
+            /** Items */
+            items: components["schemas"]["Person"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /** Page[Project] */
+        Page_Project_: {
+            /** Items */
+            items: components["schemas"]["Project"][];
             /**
              * Total
              * @description How many there are on all pages.
@@ -2980,6 +5665,16 @@ export interface components {
             title: string;
         };
         /**
+         * PasswordChange
+         * @description A new password. The other browsers that were signed in are signed out.
+         */
+        PasswordChange: {
+            /** New */
+            new: string;
+            /** Old */
+            old: string;
+        };
+        /**
          * Patrol
          * @description Goes round its waypoints in straight lines, from the last one back to the first; it starts anywhere on its way.
          */
@@ -2995,6 +5690,12 @@ export interface components {
              * @default 0.25
              */
             radius: number;
+            /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
             /**
              * Speed
              * @description Top speed, metres per second.
@@ -3025,6 +5726,12 @@ export interface components {
              */
             radius: number;
             /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
+            /**
              * Speed
              * @description Top speed, metres per second.
              * @default 1
@@ -3039,7 +5746,7 @@ export interface components {
         };
         /**
          * Pedestrian
-         * @description Walks from place to place and avoids the others.
+         * @description Walks from place to place, or along its route, and avoids the others.
          */
         "Pedestrian-Input": {
             /**
@@ -3054,15 +5761,33 @@ export interface components {
              */
             radius: number;
             /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
+            /**
              * Speed
              * @description Top speed, metres per second.
              * @default 1
              */
             speed: number;
+            /**
+             * Stays
+             * @description Whether it stays at the end of its route; it begins anew otherwise.
+             * @default false
+             */
+            stays: boolean;
+            /**
+             * Waypoints
+             * @description Its route from its start on; one alone is where it stands. Without any it goes where it likes.
+             * @default []
+             */
+            waypoints: components["schemas"]["Waypoint"][];
         };
         /**
          * Pedestrian
-         * @description Walks from place to place and avoids the others.
+         * @description Walks from place to place, or along its route, and avoids the others.
          */
         "Pedestrian-Output": {
             /**
@@ -3077,11 +5802,29 @@ export interface components {
              */
             radius: number;
             /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
+            /**
              * Speed
              * @description Top speed, metres per second.
              * @default 1
              */
             speed: number;
+            /**
+             * Stays
+             * @description Whether it stays at the end of its route; it begins anew otherwise.
+             * @default false
+             */
+            stays: boolean;
+            /**
+             * Waypoints
+             * @description Its route from its start on; one alone is where it stands. Without any it goes where it likes.
+             * @default []
+             */
+            waypoints: components["schemas"]["Waypoint"][];
         };
         /**
          * PeopleTerm
@@ -3128,6 +5871,62 @@ export interface components {
              * @default -5
              */
             weight: number;
+        };
+        /**
+         * Person
+         * @description An account.
+         */
+        Person: {
+            /**
+             * Admin
+             * @description Administrates the installation.
+             */
+            admin: boolean;
+            /** Created At */
+            created_at: number;
+            /** Disabled */
+            disabled: boolean;
+            /** Email */
+            email: string | null;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Roles */
+            roles: components["schemas"]["PersonRole"][];
+            /**
+             * Seen At
+             * @description When a browser of theirs was last seen; null where none is signed in.
+             */
+            seen_at: number | null;
+        };
+        /**
+         * PersonPatch
+         * @description What is changed of an account; what is absent stays as it is.
+         */
+        PersonPatch: {
+            /** Admin */
+            admin?: boolean | null;
+            /**
+             * Disabled
+             * @description Signed out everywhere, and not let in again.
+             */
+            disabled?: boolean | null;
+        };
+        /**
+         * PersonRole
+         * @description What somebody may do in a project.
+         */
+        PersonRole: {
+            /** Project */
+            project: string;
+            /** Project Id */
+            project_id: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "editor" | "admin";
         };
         /**
          * PolicyEpisodes
@@ -3212,7 +6011,7 @@ export interface components {
              */
             name: "ppo";
             /** Network */
-            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"] | components["schemas"]["ConvNetwork-Input"] | components["schemas"]["GruNetwork-Input"];
             /**
              * Robots
              * @description Robots that collect experience side by side.
@@ -3303,7 +6102,7 @@ export interface components {
              */
             name: "ppo";
             /** Network */
-            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"] | components["schemas"]["ConvNetwork-Output"] | components["schemas"]["GruNetwork-Output"];
             /**
              * Robots
              * @description Robots that collect experience side by side.
@@ -3386,6 +6185,37 @@ export interface components {
             weight: number;
         };
         /**
+         * Project
+         * @description Experiments that belong together.
+         */
+        Project: {
+            /** Created At */
+            created_at: number;
+            /**
+             * Experiments
+             * @description How many are in it.
+             */
+            experiments: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Role
+             * @description What who asks may do in it.
+             * @enum {string}
+             */
+            role: "viewer" | "editor" | "admin";
+        };
+        /**
+         * ProjectEdit
+         * @description What a project is called; no two have the same name.
+         */
+        ProjectEdit: {
+            /** Name */
+            name: string;
+        };
+        /**
          * ProximityTerm
          * @description Near to anything: max(0, 1 - distance from the body / margin).
          */
@@ -3432,10 +6262,122 @@ export interface components {
             weight: number;
         };
         /**
+         * RacecarConfig
+         * @description A car like F1TENTH's: 0.58 x 0.31 m, axles 0.33 m apart, steering up to 24 degrees at 183 degrees a second.
+         *
+         *     From the vehicle parameters of its simulator (f1tenth/f1tenth_gym: gym/f110_gym/envs/f110_env.py: length, width, lf + lr,
+         *     s_max, sv_max), whose middle of mass is within 7 mm of half-way between the axles. The real one drives 20 m/s; here it
+         *     goes at 1 m/s.
+         */
+        "RacecarConfig-Input": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.58
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
+             * @default 3
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second forwards.
+             * @default 1
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "racecar";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.31
+             */
+            width: number;
+        };
+        /**
+         * RacecarConfig
+         * @description A car like F1TENTH's: 0.58 x 0.31 m, axles 0.33 m apart, steering up to 24 degrees at 183 degrees a second.
+         *
+         *     From the vehicle parameters of its simulator (f1tenth/f1tenth_gym: gym/f110_gym/envs/f110_env.py: length, width, lf + lr,
+         *     s_max, sv_max), whose middle of mass is within 7 mm of half-way between the axles. The real one drives 20 m/s; here it
+         *     goes at 1 m/s.
+         */
+        "RacecarConfig-Output": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.58
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
+             * @default 3
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second forwards.
+             * @default 1
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "racecar";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.31
+             */
+            width: number;
+        };
+        /**
          * RandomisationConfig
          * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
          *
-         *     Rays and batches decide how many numbers an observation has, so they cannot be drawn.
+         *     Rays decide how many numbers an observation has, so they cannot be drawn.
          */
         "RandomisationConfig-Input": {
             /**
@@ -3503,7 +6445,7 @@ export interface components {
          * RandomisationConfig
          * @description What every robot draws uniformly at the start of each episode: two numbers, or none for what stays as it is.
          *
-         *     Rays and batches decide how many numbers an observation has, so they cannot be drawn.
+         *     Rays decide how many numbers an observation has, so they cannot be drawn.
          */
         "RandomisationConfig-Output": {
             /**
@@ -3568,10 +6510,73 @@ export interface components {
             rate: number[];
         };
         /**
+         * RangesPart
+         * @description What the LiDAR sees, from right to left: the nearest ray of each batch of neighbours.
+         */
+        "RangesPart-Input": {
+            /**
+             * Batches
+             * @description Numbers of each LiDAR's scan; must divide the rays. As many as rays: all of them.
+             * @default 10
+             */
+            batches: number;
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * Inverse
+             * @description 1 where a collision is, less with distance; otherwise ranges over the LiDAR's.
+             * @default true
+             */
+            inverse: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ranges";
+        };
+        /**
+         * RangesPart
+         * @description What the LiDAR sees, from right to left: the nearest ray of each batch of neighbours.
+         */
+        "RangesPart-Output": {
+            /**
+             * Batches
+             * @description Numbers of each LiDAR's scan; must divide the rays. As many as rays: all of them.
+             * @default 10
+             */
+            batches: number;
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * Inverse
+             * @description 1 where a collision is, less with distance; otherwise ranges over the LiDAR's.
+             * @default true
+             */
+            inverse: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ranges";
+        };
+        /**
          * RectangularConfig
          * @description Any robot with a rectangular body.
          */
         "RectangularConfig-Input": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
             /**
              * Length
              * @description Of the body, metres; it turns about its middle.
@@ -3580,13 +6585,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.5
              */
             max_angular_speed: number;
@@ -3598,7 +6603,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.5
              */
             max_linear_speed: number;
@@ -3620,6 +6625,11 @@ export interface components {
          */
         "RectangularConfig-Output": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
              * Length
              * @description Of the body, metres; it turns about its middle.
              * @default 0.5
@@ -3627,13 +6637,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.5
              */
             max_angular_speed: number;
@@ -3645,7 +6655,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.5
              */
             max_linear_speed: number;
@@ -3777,19 +6787,136 @@ export interface components {
             terms: (components["schemas"]["ArrivalTerm-Output"] | components["schemas"]["CollisionTerm-Output"] | components["schemas"]["TimeoutTerm-Output"] | components["schemas"]["ProgressTerm-Output"] | components["schemas"]["TimeTerm-Output"] | components["schemas"]["ClearanceTerm-Output"] | components["schemas"]["ProximityTerm-Output"] | components["schemas"]["AlignmentTerm-Output"] | components["schemas"]["SmoothnessTerm-Output"] | components["schemas"]["SpeedTerm-Output"] | components["schemas"]["PeopleTerm-Output"] | components["schemas"]["FormulaTerm-Output"])[];
         };
         /**
-         * RoundConfig
-         * @description Any robot with a round body.
+         * RidgebackConfig
+         * @description A robot like Clearpath's Ridgeback: 0.96 x 0.793 m on mecanum wheels, 1 m/s along each axis and 4 rad/s.
+         *
+         *     The speeds are the limits of its controller (ridgeback/ridgeback: ridgeback_control/config/control.yaml), which also
+         *     allows 1 m/s² and 25 rad/s². The size is the
+         *     one that is quoted as the maker's specification; the data sheet itself was not at hand.
          */
-        "RoundConfig-Input": {
+        "RidgebackConfig-Input": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.96
+             */
+            length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
+             * @default 4
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second forwards.
+             * @default 1
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ridgeback";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.793
+             */
+            width: number;
+        };
+        /**
+         * RidgebackConfig
+         * @description A robot like Clearpath's Ridgeback: 0.96 x 0.793 m on mecanum wheels, 1 m/s along each axis and 4 rad/s.
+         *
+         *     The speeds are the limits of its controller (ridgeback/ridgeback: ridgeback_control/config/control.yaml), which also
+         *     allows 1 m/s² and 25 rad/s². The size is the
+         *     one that is quoted as the maker's specification; the data sheet itself was not at hand.
+         */
+        "RidgebackConfig-Output": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
+             * Length
+             * @description Of the body, metres; it turns about its middle.
+             * @default 0.96
+             */
+            length: number;
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
+             * @default 4
+             */
+            max_angular_speed: number;
+            /**
+             * Linear acceleration
+             * @description Metres per second squared, also when braking; 0 is unlimited.
+             * @default 0
+             */
+            max_linear_acceleration: number;
+            /**
+             * Top speed
+             * @description Metres per second forwards.
+             * @default 1
+             */
+            max_linear_speed: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "ridgeback";
+            /**
+             * Width
+             * @description Of the body, metres.
+             * @default 0.793
+             */
+            width: number;
+        };
+        /**
+         * RoundConfig
+         * @description Any robot with a round body.
+         */
+        "RoundConfig-Input": {
+            /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
+             * Angular acceleration
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
+             * @default 0
+             */
+            max_angular_acceleration: number;
+            /**
+             * Top turning rate
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.5
              */
             max_angular_speed: number;
@@ -3801,7 +6928,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.5
              */
             max_linear_speed: number;
@@ -3823,14 +6950,19 @@ export interface components {
          */
         "RoundConfig-Output": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.5
              */
             max_angular_speed: number;
@@ -3842,7 +6974,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.5
              */
             max_linear_speed: number;
@@ -3966,6 +7098,11 @@ export interface components {
             /** Id */
             id: string;
             /**
+             * Lacking
+             * @description Extensions for want of which settings can't be read here.
+             */
+            lacking: components["schemas"]["UsedExtension-Output"][];
+            /**
              * Seconds Left
              * @description Null unless running.
              */
@@ -4002,6 +7139,11 @@ export interface components {
              * @description Settings that another version stored and this one can't read, dotted: the defaults are shown in their place.
              */
             unreadable: string[];
+            /**
+             * Waits For
+             * @description Extensions that it needs, while it is queued and no worker that is there has them all.
+             */
+            waits_for: components["schemas"]["UsedExtension-Output"][];
             /**
              * Worker
              * @description The worker that has it, or had it last.
@@ -4074,7 +7216,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"] | components["schemas"]["ConvNetwork-Input"] | components["schemas"]["GruNetwork-Input"];
             /**
              * Memory
              * @description Transitions kept.
@@ -4165,7 +7307,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"] | components["schemas"]["ConvNetwork-Output"] | components["schemas"]["GruNetwork-Output"];
             /**
              * Memory
              * @description Transitions kept.
@@ -4210,6 +7352,47 @@ export interface components {
             warmup_steps: number;
         };
         /**
+         * SavedView
+         * @description A view that was saved.
+         */
+        SavedView: {
+            /**
+             * Address
+             * @description The query of the table's address.
+             */
+            address: string;
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * SavedViewEdit
+         * @description A view of the table under a name.
+         */
+        SavedViewEdit: {
+            /**
+             * Address
+             * @description The query of the table's address.
+             */
+            address: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * SavedViews
+         * @description All named views.
+         */
+        SavedViews: {
+            /**
+             * Items
+             * @description By name.
+             */
+            items: components["schemas"]["SavedView"][];
+        };
+        /**
          * SeedCurve
          * @description One run on the common grid; null before its first point and after its last.
          */
@@ -4218,6 +7401,32 @@ export interface components {
             seed: number;
             /** Values */
             values: (number | null)[];
+        };
+        /**
+         * SeedMean
+         * @description A number over runs, in short.
+         */
+        SeedMean: {
+            /**
+             * High
+             * @description Upper end; null for one run.
+             */
+            high: number | null;
+            /**
+             * Low
+             * @description Lower end of the mean's 95 % interval over seeds; null for one run.
+             */
+            low: number | null;
+            /**
+             * Runs
+             * @description Behind it.
+             */
+            runs: number;
+            /**
+             * Value
+             * @description Mean over the runs.
+             */
+            value: number;
         };
         /**
          * Series
@@ -4243,6 +7452,30 @@ export interface components {
             steps: number[];
             /** Values */
             values: (number | null)[];
+        };
+        /**
+         * Session
+         * @description A browser that was signed in.
+         */
+        Session: {
+            /** Address */
+            address: string;
+            /** Browser */
+            browser: string;
+            /** Created At */
+            created_at: number;
+            /**
+             * Current
+             * @description It is the one that asks.
+             */
+            current: boolean;
+            /** Id */
+            id: string;
+            /**
+             * Seen At
+             * @description Lately: noted every ten minutes at most.
+             */
+            seen_at: number;
         };
         /**
          * ShippedPolicy
@@ -4280,8 +7513,113 @@ export interface components {
             training: components["schemas"]["TrainingConfig-Output"];
         };
         /**
+         * ShippedPolicyName
+         * @description A policy that ships.
+         */
+        "ShippedPolicyName-Input": {
+            /** Name */
+            name: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "shipped";
+        };
+        /**
+         * ShippedPolicyName
+         * @description A policy that ships.
+         */
+        "ShippedPolicyName-Output": {
+            /** Name */
+            name: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "shipped";
+        };
+        /**
+         * SignIn
+         * @description Name and password of an account.
+         */
+        SignIn: {
+            /** Name */
+            name: string;
+            /** Password */
+            password: string;
+        };
+        /**
+         * SignInOptions
+         * @description How one may sign in here.
+         */
+        SignInOptions: {
+            /**
+             * People
+             * @description There are accounts; without them the server's own token is all there is.
+             */
+            people: boolean;
+        };
+        /**
+         * SingleMount
+         * @description One LiDAR anywhere on the body.
+         */
+        "SingleMount-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "single";
+            /**
+             * Ahead
+             * @description Metres from the body's middle, within the body.
+             * @default 0.05
+             */
+            x: number;
+            /**
+             * To the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            y: number;
+            /**
+             * Turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 0
+             */
+            yaw: number;
+        };
+        /**
+         * SingleMount
+         * @description One LiDAR anywhere on the body.
+         */
+        "SingleMount-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "single";
+            /**
+             * Ahead
+             * @description Metres from the body's middle, within the body.
+             * @default 0.05
+             */
+            x: number;
+            /**
+             * To the left
+             * @description Metres from the body's middle, within the body.
+             * @default 0
+             */
+            y: number;
+            /**
+             * Turned by
+             * @description Degrees that its field of view is turned to the left.
+             * @default 0
+             */
+            yaw: number;
+        };
+        /**
          * SmoothnessTerm
-         * @description Changes of the command: (change of linear)² + (change of angular velocity)², both as fractions of their limits.
+         * @description Changes of the command: the squared changes of its numbers, as fractions of their limits, added up.
          */
         "SmoothnessTerm-Input": {
             /**
@@ -4298,7 +7636,7 @@ export interface components {
         };
         /**
          * SmoothnessTerm
-         * @description Changes of the command: (change of linear)² + (change of angular velocity)², both as fractions of their limits.
+         * @description Changes of the command: the squared changes of its numbers, as fractions of their limits, added up.
          */
         "SmoothnessTerm-Output": {
             /**
@@ -4314,8 +7652,42 @@ export interface components {
             weight: number;
         };
         /**
+         * SpeedsPart
+         * @description How fast it drove and turned in the last step, as fractions of its limits.
+         */
+        "SpeedsPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "speeds";
+        };
+        /**
+         * SpeedsPart
+         * @description How fast it drove and turned in the last step, as fractions of its limits.
+         */
+        "SpeedsPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "speeds";
+        };
+        /**
          * SpeedTerm
-         * @description Linear speed, metres per second.
+         * @description Speed forwards, metres per second; less than nothing backwards.
          */
         "SpeedTerm-Input": {
             /**
@@ -4332,7 +7704,7 @@ export interface components {
         };
         /**
          * SpeedTerm
-         * @description Linear speed, metres per second.
+         * @description Speed forwards, metres per second; less than nothing backwards.
          */
         "SpeedTerm-Output": {
             /**
@@ -4399,6 +7771,11 @@ export interface components {
              * @description Git commit, short; null where it is not known.
              */
             commit: string | null;
+            /**
+             * Extensions
+             * @description That were found where the service runs.
+             */
+            extensions: components["schemas"]["ExtensionState"][];
             /**
              * Queued
              * @description Runs that wait for a worker.
@@ -4512,7 +7889,7 @@ export interface components {
             arrival_distance: number;
             /**
              * Collision distance
-             * @description A ray shorter than this is a collision; touching the body always is. Metres.
+             * @description Metres from the body's middle within which what a ray meets is a collision; touching it always is.
              * @default 0.2
              */
             collision_distance: number;
@@ -4528,21 +7905,10 @@ export interface components {
              * @default 0.2
              */
             control_period: number;
-            /**
-             * Stacked frames
-             * @description Observations that the policy sees at once: the newest and those of the steps before it.
-             * @default 1
-             */
-            frames: number;
             /** LiDAR */
             lidar?: components["schemas"]["LidarConfig-Input"];
-            /**
-             * Observation
-             * @description Improved: inverse ranges and a signed bearing. Paper: ranges and angles as published.
-             * @default improved
-             * @enum {string}
-             */
-            observation: "paper" | "improved";
+            /** Observation */
+            observation?: components["schemas"]["ObservationConfig-Input"];
             /** Odometry */
             odometry?: components["schemas"]["OdometryConfig-Input"];
             /** Domain randomisation */
@@ -4553,7 +7919,7 @@ export interface components {
              * Robot
              * @description Its body and its limits; under Advanced each can be changed.
              */
-            robot?: components["schemas"]["BurgerConfig-Input"] | components["schemas"]["WaffleConfig-Input"] | components["schemas"]["JackalConfig-Input"] | components["schemas"]["RoundConfig-Input"] | components["schemas"]["RectangularConfig-Input"];
+            robot?: components["schemas"]["BurgerConfig-Input"] | components["schemas"]["WaffleConfig-Input"] | components["schemas"]["JackalConfig-Input"] | components["schemas"]["RacecarConfig-Input"] | components["schemas"]["RidgebackConfig-Input"] | components["schemas"]["RoundConfig-Input"] | components["schemas"]["RectangularConfig-Input"];
             /**
              * Step limit
              * @description Steps per target before the attempt times out.
@@ -4576,7 +7942,7 @@ export interface components {
             arrival_distance: number;
             /**
              * Collision distance
-             * @description A ray shorter than this is a collision; touching the body always is. Metres.
+             * @description Metres from the body's middle within which what a ray meets is a collision; touching it always is.
              * @default 0.2
              */
             collision_distance: number;
@@ -4592,21 +7958,10 @@ export interface components {
              * @default 0.2
              */
             control_period: number;
-            /**
-             * Stacked frames
-             * @description Observations that the policy sees at once: the newest and those of the steps before it.
-             * @default 1
-             */
-            frames: number;
             /** LiDAR */
             lidar: components["schemas"]["LidarConfig-Output"];
-            /**
-             * Observation
-             * @description Improved: inverse ranges and a signed bearing. Paper: ranges and angles as published.
-             * @default improved
-             * @enum {string}
-             */
-            observation: "paper" | "improved";
+            /** Observation */
+            observation: components["schemas"]["ObservationConfig-Output"];
             /** Odometry */
             odometry: components["schemas"]["OdometryConfig-Output"];
             /** Domain randomisation */
@@ -4617,7 +7972,7 @@ export interface components {
              * Robot
              * @description Its body and its limits; under Advanced each can be changed.
              */
-            robot: components["schemas"]["BurgerConfig-Output"] | components["schemas"]["WaffleConfig-Output"] | components["schemas"]["JackalConfig-Output"] | components["schemas"]["RoundConfig-Output"] | components["schemas"]["RectangularConfig-Output"];
+            robot: components["schemas"]["BurgerConfig-Output"] | components["schemas"]["WaffleConfig-Output"] | components["schemas"]["JackalConfig-Output"] | components["schemas"]["RacecarConfig-Output"] | components["schemas"]["RidgebackConfig-Output"] | components["schemas"]["RoundConfig-Output"] | components["schemas"]["RectangularConfig-Output"];
             /**
              * Step limit
              * @description Steps per target before the attempt times out.
@@ -4683,7 +8038,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"];
+            network?: components["schemas"]["ResBlockNetwork-Input"] | components["schemas"]["MlpNetwork-Input"] | components["schemas"]["ConvNetwork-Input"] | components["schemas"]["GruNetwork-Input"];
             /**
              * Policy delay
              * @description Critic updates for each of the actor.
@@ -4796,7 +8151,7 @@ export interface components {
              * Network
              * @description Of actor and critics.
              */
-            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"];
+            network: components["schemas"]["ResBlockNetwork-Output"] | components["schemas"]["MlpNetwork-Output"] | components["schemas"]["ConvNetwork-Output"] | components["schemas"]["GruNetwork-Output"];
             /**
              * Policy delay
              * @description Critic updates for each of the actor.
@@ -4992,6 +8347,12 @@ export interface components {
             /** Evaluation */
             evaluation?: components["schemas"]["EvaluationConfig-Input"];
             /**
+             * Extensions
+             * @description Whose parts it is made of, as they were when it was launched.
+             * @default []
+             */
+            extensions: components["schemas"]["UsedExtension-Input"][];
+            /**
              * Steps
              * @description Environment steps of all robots together.
              * @default 300000
@@ -5017,6 +8378,12 @@ export interface components {
             /** Evaluation */
             evaluation: components["schemas"]["EvaluationConfig-Output"];
             /**
+             * Extensions
+             * @description Whose parts it is made of, as they were when it was launched.
+             * @default []
+             */
+            extensions: components["schemas"]["UsedExtension-Output"][];
+            /**
              * Steps
              * @description Environment steps of all robots together.
              * @default 300000
@@ -5030,7 +8397,7 @@ export interface components {
          * @description Everything that the launch form is made of.
          */
         TrainingForm: {
-            defaults: components["schemas"]["ExperimentCreate-Output"];
+            defaults: components["schemas"]["ExperimentCreate"];
             /** Presets */
             presets: components["schemas"]["Preset"][];
             /**
@@ -5040,6 +8407,46 @@ export interface components {
             schema: {
                 [key: string]: unknown;
             };
+        };
+        /**
+         * UsedExtension
+         * @description An extension that a configuration needs.
+         *
+         *     Attributes:
+         *         name: of the extension.
+         *         version: that it was launched with.
+         *         source: how to get it, in the words of its author.
+         */
+        "UsedExtension-Input": {
+            /** Name */
+            name: string;
+            /**
+             * Source
+             * @default
+             */
+            source: string;
+            /** Version */
+            version: string;
+        };
+        /**
+         * UsedExtension
+         * @description An extension that a configuration needs.
+         *
+         *     Attributes:
+         *         name: of the extension.
+         *         version: that it was launched with.
+         *         source: how to get it, in the words of its author.
+         */
+        "UsedExtension-Output": {
+            /** Name */
+            name: string;
+            /**
+             * Source
+             * @default
+             */
+            source: string;
+            /** Version */
+            version: string;
         };
         /** ValidationError */
         ValidationError: {
@@ -5112,6 +8519,11 @@ export interface components {
          */
         "WaffleConfig-Input": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive?: components["schemas"]["DifferentialDrive-Input"] | components["schemas"]["OmnidirectionalDrive-Input"] | components["schemas"]["AckermannDrive-Input"];
+            /**
              * Length
              * @description Of the body, metres; it turns about its middle.
              * @default 0.281
@@ -5119,13 +8531,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.82
              */
             max_angular_speed: number;
@@ -5137,7 +8549,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.26
              */
             max_linear_speed: number;
@@ -5163,6 +8575,11 @@ export interface components {
          */
         "WaffleConfig-Output": {
             /**
+             * Drive
+             * @description How its wheels move it.
+             */
+            drive: components["schemas"]["DifferentialDrive-Output"] | components["schemas"]["OmnidirectionalDrive-Output"] | components["schemas"]["AckermannDrive-Output"];
+            /**
              * Length
              * @description Of the body, metres; it turns about its middle.
              * @default 0.281
@@ -5170,13 +8587,13 @@ export interface components {
             length: number;
             /**
              * Angular acceleration
-             * @description Radians per second squared, both ways; 0 is unlimited.
+             * @description Radians per second squared, both ways; 0 is unlimited. An Ackermann drive has a steering rate instead.
              * @default 0
              */
             max_angular_acceleration: number;
             /**
              * Top turning rate
-             * @description Radians per second, both ways.
+             * @description Radians per second, both ways; an Ackermann drive steers less where it would turn faster.
              * @default 1.82
              */
             max_angular_speed: number;
@@ -5188,7 +8605,7 @@ export interface components {
             max_linear_acceleration: number;
             /**
              * Top speed
-             * @description Metres per second; the robot does not reverse.
+             * @description Metres per second forwards.
              * @default 0.26
              */
             max_linear_speed: number;
@@ -5221,6 +8638,12 @@ export interface components {
              */
             radius: number;
             /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
+            /**
              * Speed
              * @description Top speed, metres per second.
              * @default 1
@@ -5243,6 +8666,12 @@ export interface components {
              * @default 0.25
              */
             radius: number;
+            /**
+             * Sees Robots
+             * @description Whether it gives way to robots; else it goes as if there were none.
+             * @default false
+             */
+            sees_robots: boolean;
             /**
              * Speed
              * @description Top speed, metres per second.
@@ -5270,6 +8699,11 @@ export interface components {
              * @description It was asked to finish its runs and take up no more.
              */
             draining: boolean;
+            /**
+             * Extensions
+             * @description That were found where it runs.
+             */
+            extensions: components["schemas"]["ExtensionState"][];
             /** Last Seen */
             last_seen: number;
             /** Name */
@@ -5285,6 +8719,31 @@ export interface components {
              */
             trouble: string | null;
         };
+        /**
+         * WorkerToken
+         * @description A token for the workers of a machine.
+         */
+        WorkerToken: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Seen At
+             * @description Last used, noted every ten minutes at most.
+             */
+            seen_at: number | null;
+        };
+        /**
+         * WorkerTokenCreate
+         * @description A token for the workers of a machine.
+         */
+        WorkerTokenCreate: {
+            /** Name */
+            name: string;
+        };
     };
     responses: never;
     parameters: never;
@@ -5294,6 +8753,305 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
+    get_account_api_account_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Account"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    change_password_api_account_password_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PasswordChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_sessions_api_account_sessions_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Session"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    end_session_api_account_sessions__session_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_tokens_api_account_tokens_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ApiToken"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    make_token_api_account_tokens_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ApiTokenCreate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewApiToken"];
+                };
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    revoke_token_api_account_tokens__token_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                token_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     list_arenas_api_arenas_get: {
         parameters: {
             query?: never;
@@ -5367,7 +9125,7 @@ export interface operations {
         parameters: {
             query: {
                 difficulty?: number;
-                name: "clutter" | "corridors" | "rooms" | "warehouse" | "maze" | "passages" | "thicket" | "mixed";
+                name: string;
                 seed?: number;
             };
             header?: never;
@@ -5387,6 +9145,15 @@ export interface operations {
             };
             /** @description No valid login */
             401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5543,6 +9310,110 @@ export interface operations {
             };
             /** @description Not in this state */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_audit_entries_api_audit_get: {
+        parameters: {
+            query?: {
+                /** @description KIND.DEED, or all of a KIND. */
+                action?: string | null;
+                actor?: string | null;
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+                /** @description Its id. */
+                project?: string | null;
+                /** @description Seconds since the epoch, included. */
+                since?: number | null;
+                /** @description Id of what it was done to. */
+                target?: string | null;
+                /** @description Seconds since the epoch, not included. */
+                until?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    export_audit_entries_api_audit_csv_get: {
+        parameters: {
+            query?: {
+                /** @description KIND.DEED, or all of a KIND. */
+                action?: string | null;
+                actor?: string | null;
+                /** @description Its id. */
+                project?: string | null;
+                /** @description Seconds since the epoch, included. */
+                since?: number | null;
+                /** @description Id of what it was done to. */
+                target?: string | null;
+                /** @description Seconds since the epoch, not included. */
+                until?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/csv": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5900,6 +9771,263 @@ export interface operations {
             };
         };
     };
+    list_evaluations_api_evaluations_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AskedEvaluationPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    ask_for_evaluation_api_evaluations_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["EvaluationRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AskedEvaluation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_evaluation_api_evaluations__evaluation_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AskedEvaluation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_evaluation_api_evaluations__evaluation_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AskedEpisodes"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     stream_changes_api_events_get: {
         parameters: {
             query?: {
@@ -5958,12 +10086,21 @@ export interface operations {
     list_experiments_api_experiments_get: {
         parameters: {
             query?: {
+                /** @description `next` of the part before; with the same query and order. */
+                after?: string | null;
+                /** @description Keys of settings and metrics that the rows should have. */
+                column?: string[];
                 /** @description Items at most. */
                 limit?: number;
                 /** @description Items to leave out before them. */
                 offset?: number;
-                /** @description Part of the name, in any case. */
+                place?: "live" | "archived" | "trash";
+                /** @description Id of the project; all without it. */
+                project?: string | null;
+                /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
                 query?: string;
+                /** @description A key; with a minus before it the largest first. */
+                sort?: string;
                 state?: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed" | null;
             };
             header?: never;
@@ -5978,7 +10115,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Page_ListedExperiment_"];
+                    "application/json": components["schemas"]["ListedPage"];
                 };
             };
             /** @description No valid login */
@@ -6010,7 +10147,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["ExperimentCreate-Input"];
+                "application/json": components["schemas"]["ExperimentLaunch"];
             };
         };
         responses: {
@@ -6025,6 +10162,15 @@ export interface operations {
             };
             /** @description No valid login */
             401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6139,7 +10285,7 @@ export interface operations {
             };
         };
     };
-    rename_experiment_api_experiments__experiment_id__patch: {
+    change_experiment_api_experiments__experiment_id__patch: {
         parameters: {
             query?: never;
             header?: never;
@@ -6192,6 +10338,108 @@ export interface operations {
             };
         };
     };
+    get_marks_api_experiments__experiment_id__marks_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExperimentMarks"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    put_notes_api_experiments__experiment_id__notes_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Notes"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExperimentMarks"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     resume_experiment_api_experiments__experiment_id__resume_post: {
         parameters: {
             query?: never;
@@ -6211,6 +10459,66 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Experiment"];
                 };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    add_seeds_api_experiments__experiment_id__seeds_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MoreSeeds"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -6308,6 +10616,428 @@ export interface operations {
             };
         };
     };
+    list_invitations_api_invitations_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Invitation"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    invite_api_invitations_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["InvitationCreate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewInvitation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Takes more rights */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    withdraw_invitation_api_invitations__invitation_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                invitation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    accept_invitation_api_invitations_accept_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["InvitationAccept"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wrong tokens */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    look_at_invitation_api_invitations_look_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["InvitationCode"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["InvitationView"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wrong tokens */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_jobs_api_jobs_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_job_api_jobs__job_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    cancel_job_api_jobs__job_id__cancel_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     login_api_login_post: {
         parameters: {
             query?: never;
@@ -6353,6 +11083,160 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_people_api_people_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_Person_"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_person_api_people__user_id__patch: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                user_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PersonPatch"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Person"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    make_password_link_api_people__user_id__password_link_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                user_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewInvitation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -6772,6 +11656,318 @@ export interface operations {
             };
         };
     };
+    list_projects_api_projects_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_Project_"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    create_project_api_projects_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ProjectEdit"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Project"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    rename_project_api_projects__project_id__patch: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                project_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ProjectEdit"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Project"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_members_api_projects__project_id__members_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path: {
+                project_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_Member_"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_member_api_projects__project_id__members__user_id__put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                project_id: string;
+                user_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MemberEdit"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Member"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    remove_member_api_projects__project_id__members__user_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                project_id: string;
+                user_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_reproduction_api_reproduction_get: {
         parameters: {
             query?: {
@@ -6824,7 +12020,10 @@ export interface operations {
     };
     launch_reproduction_api_reproduction_post: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Id of the project that it is launched into. */
+                project?: string;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -6846,6 +12045,15 @@ export interface operations {
             };
             /** @description No valid login */
             401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7511,6 +12719,111 @@ export interface operations {
             };
         };
     };
+    get_sign_in_options_api_sign_in_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignInOptions"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    sign_in_api_sign_in_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SignIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wrong tokens */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    sign_out_api_sign_out_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
     get_status_api_status_get: {
         parameters: {
             query?: never;
@@ -7594,6 +12907,468 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    act_api_workbench_actions_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Action"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ActionDone"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_groups_api_workbench_groups_get: {
+        parameters: {
+            query: {
+                by: string;
+                /** @description Keys of settings and metrics that the rows should have. */
+                column?: string[];
+                place?: "live" | "archived" | "trash";
+                /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
+                query?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Groups"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_ids_api_workbench_ids_get: {
+        parameters: {
+            query?: {
+                place?: "live" | "archived" | "trash";
+                /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
+                query?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MatchingIds"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_keys_api_workbench_keys_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KnownKeys"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_values_api_workbench_values_get: {
+        parameters: {
+            query: {
+                key: string;
+                part?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string[];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_views_api_workbench_views_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SavedViews"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    save_view_api_workbench_views_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SavedViewEdit"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SavedViews"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    remove_view_api_workbench_views__view_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                view_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_worker_tokens_api_worker_tokens_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WorkerToken"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    make_worker_token_api_worker_tokens_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WorkerTokenCreate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewWorkerToken"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    revoke_worker_token_api_worker_tokens__token_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                token_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

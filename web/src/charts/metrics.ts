@@ -104,7 +104,9 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
         note: 'standard deviation',
         metrics: [
           { name: 'policy/std_linear', label: 'linear' },
+          { name: 'policy/std_lateral', label: 'lateral' },
           { name: 'policy/std_angular', label: 'angular' },
+          { name: 'policy/std_steering', label: 'steering' },
         ],
         format: significant,
       },
@@ -135,7 +137,9 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
         note: 'fractions of the limits',
         metrics: [
           { name: 'train/linear_speed', label: 'linear' },
+          { name: 'train/lateral_speed', label: 'lateral' },
           { name: 'train/angular_speed', label: 'angular' },
+          { name: 'train/steering', label: 'steering' },
           { name: 'train/spin', label: 'turning one way' },
         ],
         smoothable: true,

@@ -98,8 +98,8 @@ function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
           })
         }
       >
-        Its {plural(experiment.runs, 'run')}, curves and checkpoints are removed for good. Runs that are going
-        on are ended.
+        Its {plural(experiment.runs, 'run')}, curves and checkpoints lie in the trash for a week, from where
+        they can be taken back. Runs that are going on are stopped.
       </DeleteDialog>
     </>
   )

@@ -9,19 +9,22 @@ import {
   useMantineColorScheme,
 } from '@mantine/core'
 import { Suspense } from 'react'
-import { Link, NavLink, Outlet } from 'react-router'
+import { Link, NavLink, Outlet, useLocation } from 'react-router'
 import { isUnauthorized } from '../api/errors'
 import { useServerEvents } from '../api/events'
 import type { Status } from '../api/types'
 import { useStatus } from '../api/useStatus'
 import { plural } from '../lib/format'
 import { LoginPage } from '../pages/LoginPage'
+import { AccountMenu } from './AccountMenu'
 import { IconMoon, IconSun } from './icons'
 import classes from './Shell.module.css'
 
 export function Shell() {
   const { data: status, error, isError } = useStatus()
   const locked = isUnauthorized(error)
+  // Who follows an invitation has no login yet.
+  const joining = useLocation().pathname === '/join'
   const offline = isError && !locked
   useServerEvents(status !== undefined && !locked)
 
@@ -51,6 +54,7 @@ export function Shell() {
         )}
         <Group gap={10} ml="auto" wrap="nowrap">
           {!locked && <ServiceState status={status} offline={offline} />}
+          {!locked && <AccountMenu />}
           <SchemeSwitch />
         </Group>
       </header>
@@ -61,7 +65,7 @@ export function Shell() {
         </div>
       )}
       <main id="main" className={classes.main} tabIndex={-1}>
-        {locked ? (
+        {locked && !joining ? (
           <LoginPage />
         ) : (
           <Suspense fallback={null}>
@@ -85,25 +89,36 @@ function ServiceState({ status, offline }: { status: Status | undefined; offline
   if (offline) return <Badge tone="bad" text="Offline" hint="The server cannot be reached" />
   if (!status) return <Badge tone="none" text="" hint="" />
   const { workers, running, queued } = status
+  const refused = status.extensions.filter((extension) => extension.refused)
+  const refusals = refused.map(({ name, refused: reason }) => `Extension ${name} is refused: ${reason}`)
   const waiting = queued > 0 ? `, ${queued} queued` : ''
   if (workers.length === 0) {
     return (
       <Badge
         tone="bad"
         text={`No worker${waiting}`}
-        hint="Trainings wait until a worker is started: mapless worker"
+        hint={['Trainings wait until a worker is started: mapless worker', ...refusals].join('\n')}
       />
     )
   }
   return (
     <Badge
       tone={running > 0 ? 'busy' : 'idle'}
-      text={`${plural(workers.length, 'worker')}${running > 0 ? `, ${running} running` : ''}${waiting}`}
-      hint={workers
-        .map((worker) => `${worker.name}: ${worker.trouble ?? (worker.run_id ? 'training' : 'free')}`)
-        .join('\n')}
+      text={[
+        plural(workers.length, 'worker') + (running > 0 ? `, ${running} running` : '') + waiting,
+        ...(refused.length > 0 ? [`${plural(refused.length, 'extension')} refused`] : []),
+      ].join(', ')}
+      hint={[...workers.map(workerInShort), ...refusals].join('\n')}
     />
   )
+}
+
+/** "worker-1: free, my_lab 1.2; other is refused: it can't be imported". */
+function workerInShort({ name, trouble, run_id, extensions }: Status['workers'][number]): string {
+  const there = extensions.map((one) =>
+    one.refused ? `; ${one.name} is refused: ${one.refused}` : `, ${one.name} ${one.version}`,
+  )
+  return `${name}: ${trouble ?? (run_id ? 'training' : 'free')}${there.join('')}`
 }
 
 function Badge({ tone, text, hint }: { tone: 'bad' | 'busy' | 'idle' | 'none'; text: string; hint: string }) {

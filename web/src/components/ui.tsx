@@ -14,16 +14,19 @@ export function Page({
   above,
   below,
   actions,
+  wide = false,
   children,
 }: {
   title: ReactNode
+  /** Whether it takes all of a large screen. */
+  wide?: boolean
   above?: ReactNode
   below?: ReactNode
   actions?: ReactNode
   children: ReactNode
 }) {
   return (
-    <div className={classes.page}>
+    <div className={classes.page} data-wide={wide || undefined}>
       <div className={classes.top}>
         <div className={classes.topText}>
           {above}

@@ -7,6 +7,7 @@ import { type Field, initialOf } from './layout'
 import { problemOf } from './problems'
 import { type Json, range, type Schema } from './schema'
 import { TermsInput } from './TermsInput'
+import { TicksInput } from './TicksInput'
 import type { Form } from './useForm'
 import { sameValue, valueAt } from './values'
 
@@ -88,7 +89,11 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
     case 'numbers':
       return <NumbersInput {...common} value={value} placeholder={listed(fresh)} onChange={set} />
     case 'terms':
-      return <TermsInput field={field} form={form} root={root} />
+      return field.schema['x-ticks'] ? (
+        <TicksInput field={field} form={form} root={root} />
+      ) : (
+        <TermsInput field={field} form={form} root={root} />
+      )
     case 'text':
       return (
         <TextInput

@@ -1,24 +1,15 @@
 /** A list of objects of several kinds, such as a reward's terms: a row for each, with its own few settings. */
-import {
-  ActionIcon,
-  Button,
-  Group,
-  Input,
-  Menu,
-  NumberInput,
-  Select,
-  Switch,
-  Text,
-  TextInput,
-} from '@mantine/core'
+import { ActionIcon, Button, Input, Menu, Text } from '@mantine/core'
 import { IconTrash } from '../components/icons'
 import { fieldId } from './FieldInput'
 import classes from './form.module.css'
 import type { Field } from './layout'
+import { PresetSelect } from './PresetSelect'
 import { problemOf } from './problems'
+import { Setting } from './Setting'
 import { branches, defaults, type Json, resolve, type Schema, withoutNull } from './schema'
 import type { Form } from './useForm'
-import { pathKey, sameValue, valueAt } from './values'
+import { pathKey, valueAt } from './values'
 
 interface TermsInputProps {
   field: Field & { kind: 'terms' }
@@ -33,8 +24,6 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
   const terms = (Array.isArray(value) ? value : []) as Term[]
   const kinds = branches(field.item, root)
   const tag = field.item.discriminator?.propertyName ?? 'name'
-  const presets = Object.entries(field.presets)
-  const preset = presets.find(([, one]) => sameValue(one, terms as Json))?.[0]
   const set = (next: Term[]) => form.set(field.path, next)
   const left = kinds.filter(
     ({ tag: kind }) => kind === 'formula' || !terms.some((term) => term[tag] === kind),
@@ -50,25 +39,7 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
 
   return (
     <section id={fieldId(field.key)} className={classes.terms} aria-label={field.label} tabIndex={-1}>
-      <Group gap="md" align="end" justify="space-between">
-        {presets.length > 0 && (
-          <Select
-            label={field.trail.at(-1) ?? field.label}
-            description={field.schema.description}
-            data={[
-              ...presets.map(([title]) => title),
-              ...(preset ? [] : [{ value: '', label: 'Terms of your own' }]),
-            ]}
-            value={preset ?? ''}
-            allowDeselect={false}
-            inputWrapperOrder={['label', 'input', 'description']}
-            onChange={(title) => {
-              const chosen = presets.find(([one]) => one === title)
-              if (chosen) form.set(field.path, chosen[1])
-            }}
-          />
-        )}
-      </Group>
+      <PresetSelect field={field} form={form} own="Terms of your own" />
       <Input.Error>{form.problems[field.key]}</Input.Error>
       <ul className={classes.rows}>
         {terms.map((term, index) => {
@@ -88,7 +59,7 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
               {Object.entries(kind?.schema.properties ?? {})
                 .filter(([name]) => name !== tag)
                 .map(([name, one]) => (
-                  <Part
+                  <Setting
                     key={name}
                     schema={withoutNull(resolve(one, root)).schema}
                     value={term[name] ?? null}
@@ -138,60 +109,4 @@ function freeLabel(label: string, terms: readonly Term[]): string {
   let free = label
   for (let number = 2; taken.has(free); number += 1) free = `${label}_${number}`
   return free
-}
-
-interface PartProps {
-  schema: Schema
-  value: Json
-  error: string | undefined
-  onChange: (value: Json) => void
-}
-
-/** One setting of a term. */
-function Part({ schema, value, error, onChange }: PartProps) {
-  const common = {
-    label: schema.title,
-    description: schema.description,
-    error,
-    size: 'xs' as const,
-    inputWrapperOrder: ['label', 'input', 'error', 'description'] as (
-      | 'label'
-      | 'input'
-      | 'error'
-      | 'description'
-    )[],
-  }
-  if (schema.type === 'boolean')
-    return (
-      <Switch
-        label={schema.title}
-        description={schema.description}
-        error={error}
-        size="xs"
-        className={classes.part}
-        checked={value === true}
-        onChange={(event) => onChange(event.currentTarget.checked)}
-      />
-    )
-  if (schema.type === 'number')
-    return (
-      <NumberInput
-        {...common}
-        className={classes.part}
-        value={typeof value === 'number' || typeof value === 'string' ? value : ''}
-        onChange={(next) => onChange(next === '' ? null : next)}
-        clampBehavior="none"
-        decimalScale={10}
-      />
-    )
-  return (
-    <TextInput
-      {...common}
-      className={schema.maxLength && schema.maxLength > 100 ? classes.formula : classes.part}
-      value={typeof value === 'string' ? value : ''}
-      maxLength={schema.maxLength}
-      spellCheck={false}
-      onChange={(event) => onChange(event.currentTarget.value)}
-    />
-  )
 }

@@ -7,6 +7,8 @@ export interface ValidationProblem {
   loc: (string | number)[]
   msg: string
   type: string
+  /** Of a query: where its fault is, in characters. */
+  ctx?: { position?: number }
 }
 
 /** Messages by path; '' holds those about the form as a whole. */

@@ -31,6 +31,8 @@ export interface Schema {
   'x-needs'?: string
   /** Lists to start from, by title. */
   'x-presets'?: Record<string, Json>
+  /** A list of which each kind may be there once: ticks, no rows to add. */
+  'x-ticks'?: boolean
 }
 
 /** Values of a form: what JSON can hold. */

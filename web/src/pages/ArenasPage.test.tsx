@@ -10,7 +10,7 @@ vi.stubGlobal('EventSource', FakeEventSource)
 
 const HASH = 'a'.repeat(64)
 
-const movers = { count: 0, kind: 'pedestrian', speed: 1, radius: 0.25 } as const
+const movers = { count: 0, kind: 'pedestrian', speed: 1, radius: 0.25, sees_robots: false } as const
 
 const GALLERY: ArenaSummary[] = [
   { kind: 'fixed', key: 'simple', title: 'Simple', config: { name: 'simple', movers }, imported_at: null },

@@ -10,7 +10,7 @@ const routes = {
   'GET /api/compare': comparison,
   'GET /api/compare/curves': curves,
   'GET /api/training/form': form,
-  'GET /api/experiments': { items: [listed], total: 1 },
+  'GET /api/experiments': { items: [listed], total: 1, next: null },
 }
 
 test('figures with intervals and N, warnings, curves, and what differs', async () => {

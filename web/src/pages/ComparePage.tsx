@@ -9,7 +9,6 @@ import charts from '../charts/MetricChart.module.css'
 import { ComparisonVerdicts } from '../components/ComparisonVerdicts'
 import { settingText } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
-import { ExperimentList } from '../components/ExperimentList'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
 import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
@@ -19,6 +18,7 @@ import type { Schema } from '../form/schema'
 import { MAX_COMPARED } from '../lib/comparison'
 import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
+import { Trainings, usePickerView } from '../workbench/Trainings'
 
 /** Success rates that differ by less are equivalent, unless the address says otherwise. */
 const MARGIN = 0.02
@@ -73,6 +73,7 @@ interface PickerProps {
 
 function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
   const tooMany = chosen.length > MAX_COMPARED
+  const [view, setView] = usePickerView()
   return (
     <Page
       title="Compare"
@@ -91,9 +92,10 @@ function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
         </Button>
       }
     >
-      <ExperimentList
+      <Trainings
+        view={view}
+        onView={setView}
         ticked={chosen}
-        menu={false}
         onTick={(ids) => {
           onStart()
           onChoose(ids)

@@ -33,3 +33,41 @@ test('stopping it stops its runs', async () => {
   await user.click(await screen.findByRole('button', { name: 'Stop' }))
   await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/experiments/exp1/stop'))
 })
+
+test('notes are Markdown without their HTML, and are written here', async () => {
+  const marks = {
+    tags: ['baseline'],
+    starred: false,
+    archived: false,
+    notes: '**Why** <img src=x onerror=alert(1)> [bad](javascript:alert(1))',
+  }
+  const server = startServer({
+    ...routes,
+    'GET /api/experiments/exp1/marks': marks,
+    'PUT /api/experiments/exp1/notes': marks,
+  })
+  const { user } = open('/experiments/exp1')
+  expect((await screen.findByText('Why')).tagName).toBe('STRONG')
+  expect(document.querySelector('img[src="x"]')).toBeNull()
+  expect(screen.getByText('bad')).not.toHaveAttribute('href', expect.stringContaining('javascript'))
+  expect(screen.getByText('baseline')).toBeInTheDocument()
+  await user.click(screen.getByRole('button', { name: 'Edit' }))
+  const text = await screen.findByRole('textbox', { name: 'Markdown' })
+  await user.clear(text)
+  await user.type(text, 'Better')
+  await user.click(screen.getByRole('button', { name: 'Save' }))
+  await waitFor(() =>
+    expect(server.changes).toEqual([{ route: 'PUT /api/experiments/exp1/notes', body: { notes: 'Better' } }]),
+  )
+})
+
+test('seeds are added behind the last', async () => {
+  const server = startServer({
+    ...routes,
+    'POST /api/experiments/exp1/seeds': new Response(null, { status: 204 }),
+  })
+  const { user } = open('/experiments/exp1')
+  await user.click(await screen.findByRole('button', { name: 'Seeds' }))
+  await user.click(await screen.findByRole('button', { name: 'Train' }))
+  await waitFor(() => expect(server.changes[0]?.body).toEqual({ seeds: [2, 3, 4, 5] }))
+})

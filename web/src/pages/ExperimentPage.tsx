@@ -18,6 +18,8 @@ import { Page, Panel, QueryError, StateLabel } from '../components/ui'
 import { inShort, summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
+import { NotesPanel } from '../workbench/NotesPanel'
+import { SeedsButton } from '../workbench/SeedsButton'
 
 export function ExperimentPage() {
   const { experimentId = '' } = useParams()
@@ -105,6 +107,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
               Resume
             </Button>
           )}
+          <SeedsButton experiment={experiment} />
           <Button
             variant="default"
             leftSection={<IconCopy size={16} />}
@@ -129,7 +132,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
       }
     >
       <Stack gap="md">
-        <UnreadableSettings names={experiment.unreadable} />
+        <UnreadableSettings names={experiment.unreadable} lacking={experiment.lacking} />
         <Panel
           flush
           title={plural(experiment.runs.length, 'run')}
@@ -153,6 +156,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         <Panel title="Configuration">
           <Configuration training={experiment.training} />
         </Panel>
+        <NotesPanel experimentId={experiment.id} />
       </Stack>
     </Page>
   )

@@ -1,5 +1,5 @@
 /** The launch form, rendered from the schema that the server derives from its own configuration models. */
-import { Anchor, Button, Group, Input, SegmentedControl, Skeleton, Stack, Text } from '@mantine/core'
+import { Anchor, Button, Group, Input, SegmentedControl, Select, Skeleton, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
@@ -7,6 +7,7 @@ import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
 import type { Experiment, Preset, ShippedPolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
+import { useLaunchProject } from '../components/people/useLaunchProject'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
@@ -22,7 +23,7 @@ import classes from './NewTrainingPage.module.css'
 /** Leaves room for what is added, within the server's 120 characters. */
 const LONGEST_COPIED_NAME = 110
 
-type ExperimentCreate = components['schemas']['ExperimentCreate-Input']
+type ExperimentLaunch = components['schemas']['ExperimentLaunch']
 
 export function NewTrainingPage() {
   useTitle('New training')
@@ -141,6 +142,7 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
     if (changed) sessionStorage.setItem(draft, JSON.stringify(form.values))
     else sessionStorage.removeItem(draft)
   }, [draft, changed, form.values])
+  const { projects, project, choose } = useLaunchProject()
   const launch = $api.useMutation('post', '/api/experiments', {
     onSuccess: (experiment) => {
       sessionStorage.removeItem(draft)
@@ -169,7 +171,8 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       aria-label="New training"
       onSubmit={(event) => {
         event.preventDefault()
-        launch.mutate({ body: form.values as unknown as ExperimentCreate })
+        const values = form.values as unknown as ExperimentLaunch
+        launch.mutate({ body: project === undefined ? values : { ...values, project_id: project } })
       }}
     >
       <Stack gap="md" className={classes.fields}>
@@ -215,6 +218,16 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       <aside className={classes.launch}>
         <Panel>
           <Stack gap="md">
+            {projects.length > 1 && (
+              <Select
+                label="Project"
+                allowDeselect={false}
+                searchable
+                data={projects.map(({ id, name }) => ({ value: id, label: name }))}
+                value={project ?? null}
+                onChange={(value) => value && choose(value)}
+              />
+            )}
             {seeds && <SeedsInput key={Array.isArray(runs) ? 'list' : 'none'} field={seeds} form={form} />}
             <Text size="sm" className={classes.sum} data-testid="launch-summary">
               {Array.isArray(runs) && typeof steps === 'number'

@@ -9,6 +9,7 @@ import { isRefusal } from '../api/errors'
 import type { Reproduction } from '../api/types'
 import { DeleteDialog } from '../components/DeleteDialog'
 import { IconPlayerPlay, IconPlayerStop, IconRocket, IconTrash } from '../components/icons'
+import { useLaunchProject } from '../components/people/useLaunchProject'
 import { CampaignState } from '../components/reproduction/CampaignState'
 import { Claims } from '../components/reproduction/Claims'
 import { PaperFigures } from '../components/reproduction/PaperFigures'
@@ -88,8 +89,15 @@ export function ReproductionPage() {
   )
 }
 
+/** The project that a campaign is launched into. */
+function useInto() {
+  const { project } = useLaunchProject()
+  return project === undefined ? {} : { params: { query: { project } } }
+}
+
 function Invitation({ reproduction: { seconds, workers, rows } }: { reproduction: Reproduction }) {
   const { launchReproduction } = useActions()
+  const into = useInto()
   return (
     <Panel data-testid="invitation">
       <Message
@@ -99,14 +107,14 @@ function Invitation({ reproduction: { seconds, workers, rows } }: { reproduction
           <Group gap="xs" justify="center">
             <Button
               loading={launchReproduction.isPending}
-              onClick={() => launchReproduction.mutate({ body: { seeds: SEEDS, effort: 1 } })}
+              onClick={() => launchReproduction.mutate({ ...into, body: { seeds: SEEDS, effort: 1 } })}
             >
               Reproduce the paper
             </Button>
             <Button
               variant="default"
               disabled={launchReproduction.isPending}
-              onClick={() => launchReproduction.mutate({ body: TRIAL })}
+              onClick={() => launchReproduction.mutate({ ...into, body: TRIAL })}
             >
               Try it out first
             </Button>
@@ -130,6 +138,7 @@ function CampaignActions({
   onLaunched: () => void
 }) {
   const actions = useActions()
+  const into = useInto()
   if (!campaign) return null
   const states = rows.flatMap((row) => row.runs.map((run) => run.state))
   const of = { params: { path: { campaign_id: campaign.id } } }
@@ -162,7 +171,10 @@ function CampaignActions({
         leftSection={<IconRocket size={16} />}
         loading={actions.launchReproduction.isPending}
         onClick={() =>
-          actions.launchReproduction.mutate({ body: { seeds: SEEDS, effort: 1 } }, { onSuccess: onLaunched })
+          actions.launchReproduction.mutate(
+            { ...into, body: { seeds: SEEDS, effort: 1 } },
+            { onSuccess: onLaunched },
+          )
         }
       >
         {campaign.effort < 1 ? 'Reproduce the paper' : 'Reproduce again'}

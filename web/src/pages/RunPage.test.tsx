@@ -57,6 +57,28 @@ test('settings that another version stored are named', async () => {
   expect(await screen.findByTestId('unreadable')).toHaveTextContent('algorithm.magic')
 })
 
+test('what a run waits for, and what a training was made with that is not here', async () => {
+  const my_lab = { name: 'my_lab', version: '1.2', source: 'pip install my_lab==1.2' }
+  const queued = { ...runDetail, state: 'queued' as const, waits_for: [my_lab] }
+  startServer({ ...routes, 'GET /api/runs/run1': queued })
+  open('/runs/run1')
+  expect(await screen.findByTestId('waits-for')).toHaveTextContent(
+    /Waits for a worker with my_lab\s1\.2.*pip install my_lab==1\.2/,
+  )
+})
+
+test('a training whose extension is not here says which, and how to get it', async () => {
+  const my_lab = { name: 'my_lab', version: '1.2', source: 'pip install my_lab==1.2' }
+  startServer({
+    ...routes,
+    'GET /api/runs/run1': { ...runDetail, unreadable: ['algorithm'], lacking: [my_lab] },
+  })
+  open('/runs/run1')
+  expect(await screen.findByTestId('unreadable')).toHaveTextContent(
+    /Made with my_lab\s1\.2, which is not here.*pip install my_lab==1\.2.*algorithm/,
+  )
+})
+
 test('its policies, the newest first, the best marked, each to take away', async () => {
   startServer(routes)
   open('/runs/run1')

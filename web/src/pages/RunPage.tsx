@@ -16,6 +16,7 @@ import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
 import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
+import { WaitsForExtensions } from '../components/Extensions'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
@@ -120,7 +121,8 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Text>
           </Notice>
         )}
-        <UnreadableSettings names={run.unreadable} />
+        <WaitsForExtensions extensions={run.waits_for} />
+        <UnreadableSettings names={run.unreadable} lacking={run.lacking} />
         <Diagnoses runId={run.id} state={run.state} />
         <div className={classes.stage}>
           <Panel flush>

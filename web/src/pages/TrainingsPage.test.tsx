@@ -15,7 +15,7 @@ const other = {
   arena: 'complex',
   movers: 4,
 }
-const two = { items: [listed, other], total: 2 }
+const two = { items: [listed, other], total: 2, next: null }
 
 test('each training with its state, what it trains, and its success with interval and N', async () => {
   startServer({ 'GET /api/experiments': two })
@@ -28,12 +28,12 @@ test('each training with its state, what it trains, and its success with interva
   expect(first).toHaveTextContent('PPO, MLP')
   expect(first).toHaveTextContent(/98\.4\s%\s*96\.1–99\.3\s%\s*N = 2 seeds, none failed: up to 78 % may/)
   expect(rows[1]).toHaveTextContent('Failed')
-  expect(rows[1]).toHaveTextContent('Complex, 4 moving · PPO, MLP')
+  expect(rows[1]).toHaveTextContent('Complex')
   expect(document.title).toBe('Trainings – Mapless')
 })
 
 test('who has nothing yet is invited to launch the first', async () => {
-  startServer({ 'GET /api/experiments': { items: [], total: 0 } })
+  startServer({ 'GET /api/experiments': { items: [], total: 0, next: null } })
   open('/')
   expect(await screen.findByRole('link', { name: 'Launch your first training' })).toHaveAttribute(
     'href',
@@ -46,27 +46,31 @@ test('ticked trainings are compared', async () => {
   const { router, user } = open('/')
   await user.click(await screen.findByRole('checkbox', { name: 'Tick Corridor' }))
   await user.click(screen.getByRole('checkbox', { name: 'Tick Maze' }))
-  await user.click(screen.getByRole('button', { name: 'Compare 2' }))
+  await user.click(screen.getByRole('link', { name: 'Compare 2' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/compare'))
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
 })
 
-test('a thousand trainings come in pages, and what was ticked on one stays ticked on the next', async () => {
+test('of a thousand trainings those in sight are drawn; by keyboard they are ticked and opened', async () => {
   const named = (index: number) => ({ ...listed, id: `exp${index}`, name: `Training ${index}` })
   startServer({
     'GET /api/experiments': (request: Request) => {
-      const offset = Number(new URL(request.url).searchParams.get('offset'))
-      return { items: Array.from({ length: 50 }, (_, index) => named(offset + index)), total: 1_030 }
+      const after = Number(new URL(request.url).searchParams.get('after') ?? 0)
+      const items = Array.from({ length: 100 }, (_, index) => named(after + index))
+      return { items, total: 1_030, next: String(after + 100) }
     },
   })
   const { router, user } = open('/')
   await user.click(await screen.findByRole('checkbox', { name: 'Tick Training 0' }))
-  await user.click(screen.getByRole('button', { name: 'Next page' }))
-  await user.click(await screen.findByRole('checkbox', { name: 'Tick Training 50' }))
-  expect(router.state.location.search).toBe('?page=2')
-  expect(screen.getByText(/51–100 of 1\s030/)).toBeInTheDocument()
-  await user.click(screen.getByRole('button', { name: 'Compare 2' }))
-  await waitFor(() => expect(router.state.location.search).toBe('?experiment=exp0&experiment=exp50'))
+  expect(screen.getAllByTestId('experiment').length).toBeLessThan(60)
+  expect(screen.getByText(/1\s030 trainings/)).toBeInTheDocument()
+  screen.getAllByTestId('experiment')[0]?.focus()
+  await user.keyboard('{ArrowDown}')
+  await waitFor(() => expect(document.activeElement).toHaveTextContent('Training 1'))
+  await user.keyboard(' ')
+  expect(screen.getByRole('checkbox', { name: 'Tick Training 1' })).toBeChecked()
+  await user.keyboard('{Enter}')
+  await waitFor(() => expect(router.state.location.pathname).toBe('/experiments/exp1'))
 })
 
 test('more than fifty are not compared, and the button says why', async () => {
@@ -75,7 +79,7 @@ test('more than fifty are not compared, and the button says why', async () => {
     id: `exp${index}`,
     name: `T${index}`,
   }))
-  startServer({ 'GET /api/experiments': { items, total: 51 } })
+  startServer({ 'GET /api/experiments': { items, total: 51, next: null } })
   const { user } = open('/')
   await screen.findAllByTestId('experiment')
   await user.click(screen.getByRole('checkbox', { name: 'Tick all' }))
@@ -87,8 +91,54 @@ test('more than fifty are not compared, and the button says why', async () => {
 test('the search is the server’s', async () => {
   const server = startServer({ 'GET /api/experiments': two })
   const { user } = open('/')
-  await user.type(await screen.findByRole('textbox', { name: 'Search by name' }), 'corr')
+  await user.type(await screen.findByRole('textbox', { name: 'Search and filter' }), 'corr')
   await waitFor(() => expect(server.asked.some((path) => path.includes('query=corr'))).toBe(true))
+})
+
+test('a query that makes no sense is marked where it is at fault', async () => {
+  const detail = [{ loc: ['query', 'query'], msg: 'No such key.', type: 'value_error', ctx: { position: 6 } }]
+  startServer({ 'GET /api/experiments': refusal(422, detail) })
+  open('/?q=alpha+gamme+%3D+1')
+  const fault = await screen.findByRole('alert')
+  expect(fault).toHaveTextContent('No such key.')
+  expect(fault.querySelector('mark')).toHaveTextContent('gamme')
+})
+
+test('what the columns, the order and the place are is in the address', async () => {
+  const server = startServer({ 'GET /api/experiments': two })
+  open('/?columns=state,train/return&sort=-train/return&place=archived&q=corr')
+  expect(await screen.findByRole('columnheader', { name: /train\/return/ })).toHaveAttribute(
+    'aria-sort',
+    'descending',
+  )
+  const asked = new URLSearchParams(
+    server.asked.find((path) => path.startsWith('/api/experiments?'))?.split('?')[1],
+  )
+  expect(Object.fromEntries(asked)).toMatchObject({
+    query: 'corr',
+    sort: '-train/return',
+    place: 'archived',
+    column: 'train/return',
+  })
+})
+
+test('several trainings are deleted at once, and taken back', async () => {
+  const server = startServer({
+    'GET /api/experiments': two,
+    'POST /api/workbench/actions': { done: ['exp1', 'exp2'], left_out: [] },
+  })
+  const { user } = open('/')
+  await screen.findAllByTestId('experiment')
+  await user.click(screen.getByRole('checkbox', { name: 'Tick all' }))
+  const bar = screen.getByRole('region', { name: 'Ticked trainings' })
+  await user.click(within(bar).getByRole('button', { name: 'Delete' }))
+  await user.click(await screen.findByRole('button', { name: 'Undo' }))
+  await waitFor(() =>
+    expect(server.changes.map(({ body }) => (body as { action: string }).action)).toEqual([
+      'delete',
+      'restore',
+    ]),
+  )
 })
 
 test('deleting asks first', async () => {

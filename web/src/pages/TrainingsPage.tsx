@@ -1,41 +1,43 @@
-/** Home: all experiments, to find, to tick for comparison, and to act upon. */
+/** Home: all trainings, to find, to order, and to act upon. */
 import { Button, Group } from '@mantine/core'
 import { useState } from 'react'
-import { Link, useNavigate } from 'react-router'
-import { ExperimentList } from '../components/ExperimentList'
-import { IconArrowsDiff, IconPlus, IconRobot } from '../components/icons'
+import { Link } from 'react-router'
+import { IconPlus, IconRobot } from '../components/icons'
 import { Message, Page } from '../components/ui'
-import { MAX_COMPARED } from '../lib/comparison'
 import { useTitle } from '../lib/hooks'
+import { ChosenBar, useAct } from '../workbench/ChosenBar'
+import { Trainings } from '../workbench/Trainings'
+import { ViewsMenu } from '../workbench/ViewsMenu'
+import { useView } from '../workbench/view'
 
 export function TrainingsPage() {
   useTitle('Trainings')
-  const navigate = useNavigate()
+  const [view, setView] = useView()
   const [ticked, setTicked] = useState<readonly string[]>([])
-  const comparison = ticked.map((id) => `experiment=${id}`).join('&')
-  const tooMany = ticked.length > MAX_COMPARED
-
+  const { act } = useAct()
   return (
     <Page
       title="Trainings"
+      wide
       actions={
-        <Group gap="xs">
-          <Button
-            variant="default"
-            leftSection={<IconArrowsDiff size={16} />}
-            disabled={ticked.length === 0 || tooMany}
-            title={tooMany ? `At most ${MAX_COMPARED} can be laid side by side` : undefined}
-            onClick={() => navigate(`/compare?${comparison}`)}
-          >
-            {ticked.length === 0 ? 'Compare' : `Compare ${ticked.length}`}
-          </Button>
-          <Button component={Link} to="/new" leftSection={<IconPlus size={16} />}>
-            New training
-          </Button>
-        </Group>
+        <Button component={Link} to="/new" leftSection={<IconPlus size={16} />}>
+          New training
+        </Button>
       }
     >
-      <ExperimentList ticked={ticked} onTick={setTicked} empty={<Invitation />} />
+      <Trainings
+        view={view}
+        onView={(change) => {
+          if (change.place) setTicked([])
+          setView(change)
+        }}
+        ticked={ticked}
+        onTick={setTicked}
+        empty={<Invitation />}
+        tools={<ViewsMenu view={view} />}
+        above={<ChosenBar ticked={ticked} onTick={setTicked} view={view} />}
+        onStar={({ id, starred }) => void act(starred ? 'unstar' : 'star', [id])}
+      />
     </Page>
   )
 }

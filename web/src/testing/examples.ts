@@ -24,10 +24,11 @@ export const status: Status = {
   version: '0.1.0',
   commit: 'c0ffee1',
   workers: [
-    { name: 'worker-1', last_seen: NOW, run_id: 'run1', draining: false, trouble: null },
-    { name: 'worker-2', last_seen: NOW, run_id: null, draining: false, trouble: null },
+    { name: 'worker-1', last_seen: NOW, run_id: 'run1', draining: false, trouble: null, extensions: [] },
+    { name: 'worker-2', last_seen: NOW, run_id: null, draining: false, trouble: null, extensions: [] },
   ],
   queued: 0,
+  extensions: [],
   running: 1,
 }
 
@@ -100,10 +101,12 @@ const onePolicy = (value: number, low: number, high: number, episodes: number): 
 
 export const experiment: Experiment = {
   id: 'exp1',
+  project_id: 'default',
   name: 'Corridor',
   created_at: NOW - 7200,
   training,
   unreadable: [],
+  lacking: [],
   state: 'running',
   campaign: null,
   runs: [
@@ -124,6 +127,7 @@ export const experiment: Experiment = {
 /** The same in short. */
 export const listed: ListedExperiment = {
   id: experiment.id,
+  project_id: experiment.project_id,
   name: experiment.name,
   created_at: experiment.created_at,
   arena: 'simple',
@@ -140,9 +144,23 @@ export const listed: ListedExperiment = {
   seconds_left: 12.9,
   campaign: null,
   success: experiment.success,
+  tags: [],
+  starred: false,
+  noted: false,
+  archived: false,
+  deleted_at: null,
+  settings: {},
+  metrics: {},
 }
 
-export const runDetail: RunDetail = { ...run, experiment_name: 'Corridor', training, unreadable: [] }
+export const runDetail: RunDetail = {
+  ...run,
+  experiment_name: 'Corridor',
+  training,
+  unreadable: [],
+  lacking: [],
+  waits_for: [],
+}
 
 export const live: LiveState = {
   mode: 'policy',

@@ -29,6 +29,9 @@ class NoObserver {
   disconnect() {}
 }
 vi.stubGlobal('ResizeObserver', NoObserver)
+// What scrolls draws only what is in sight.
+Object.defineProperty(Element.prototype, 'clientHeight', { configurable: true, get: () => 800 })
+Object.defineProperty(Element.prototype, 'clientWidth', { configurable: true, get: () => 1200 })
 Element.prototype.scrollIntoView = () => {}
 
 // uPlot draws on a canvas; what it draws is looked at in a real browser, not here.
