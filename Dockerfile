@@ -1,16 +1,29 @@
 # The whole application: one image for the server and for its workers (docker-compose.yml says which is which).
 
-# --- build: packages from the lock with its hashes, and the pages -----------------------------------------------------
-FROM python:3.13-slim-bookworm AS build
+# Where everything comes from, for places that have mirrors of their own:
+#   BASE_IMAGE     Python 3.11 or newer on glibc, with venv
+#   PACKAGE_INDEX  of Python packages; NPM_REGISTRY of the pages'; without them those that pip, uv and npm know
+#   LOCK           hash-pinned requirements, one of this folder's files
+ARG BASE_IMAGE=python:3.13-slim-bookworm
 
+# --- build: packages from the lock with its hashes, and the pages -----------------------------------------------------
+FROM ${BASE_IMAGE} AS build
+
+ARG BASE_IMAGE
+ARG PACKAGE_INDEX=""
+ARG NPM_REGISTRY=""
+ARG LOCK=requirements.txt
 WORKDIR /app
-COPY requirements-uv.txt requirements.txt ./
-RUN python -m venv .venv \
+COPY requirements-uv.txt ${LOCK} ./
+RUN echo "Built on $BASE_IMAGE, $(python3 -V), with the packages of $LOCK from ${PACKAGE_INDEX:-pip's own index}." \
+ && if [ -n "$PACKAGE_INDEX" ]; then export PIP_INDEX_URL="$PACKAGE_INDEX" UV_DEFAULT_INDEX="$PACKAGE_INDEX"; fi \
+ && python3 -m venv .venv \
  && .venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements-uv.txt \
- && .venv/bin/uv pip install --no-cache --python .venv/bin/python --require-hashes -r requirements.txt
+ && .venv/bin/uv pip install --no-cache --python .venv/bin/python --require-hashes -r "$LOCK"
 
 COPY web web
-RUN .venv/bin/python web/build.py && rm -rf web/node_modules
+RUN if [ -n "$NPM_REGISTRY" ]; then export NPM_CONFIG_REGISTRY="$NPM_REGISTRY"; fi \
+ && .venv/bin/python web/build.py && rm -rf web/node_modules
 
 COPY pyproject.toml README.md LICENSE ./
 COPY sim sim
@@ -19,7 +32,7 @@ COPY server server
 RUN .venv/bin/uv pip install --no-cache --python .venv/bin/python --no-build-isolation --no-deps -e .
 
 # --- run: nothing that only the build needs, and no rights ------------------------------------------------------------
-FROM python:3.13-slim-bookworm
+FROM ${BASE_IMAGE}
 
 RUN useradd --create-home --uid 10001 mapless \
  && install -d -o mapless -g mapless /data /home/mapless/.cache/numba

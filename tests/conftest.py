@@ -12,12 +12,14 @@ import psycopg
 import pytest
 from hypothesis import settings
 
+from sim.actions import action_layout
 from sim.config import TaskConfig
 from sim.observations import observation_layout
 from workers.checkpoints import Checkpoint, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
-from workers.networks.layout import layout, weight_shapes
+from workers.networks.inputs import inputs_of
+from workers.networks.layout import layout, policy_shapes
 
 POSTGRES = ("127.0.0.1", 5432)
 
@@ -88,7 +90,7 @@ def make_checkpoint(tmp_path: Path) -> Callable[..., Path]:
                 ),
             ),
             action=(),
-            network=layout(network),
+            network=layout(network, inputs_of(task), action_layout(task.robot)),
             evaluation=EvaluationSummary(suite="simple-200", suite_hash="0f" * 32, episodes=200, arrivals=198),
             versions={},
             files={},
@@ -96,7 +98,7 @@ def make_checkpoint(tmp_path: Path) -> Callable[..., Path]:
         rng = np.random.default_rng(4)
         weights = {
             name: rng.normal(scale=1.2 / np.sqrt(shape[-1]), size=shape).astype(np.float32)
-            for name, shape in weight_shapes(network, numbers.size).items()
+            for name, shape in policy_shapes(network, inputs_of(task), action_layout(task.robot)).items()
         }
         archive = tmp_path / "checkpoint.zip"
         counters = TrainingCounters(step=81_920, updates=20, evaluations=1)

@@ -14,7 +14,7 @@ from workers.shipped.library import shipped_policy
 
 ROOT = Path(__file__).parents[1]
 # What the arena and the README's lines need; versions are those that are locked.
-PACKAGES = ("gymnasium", "numba", "numpy", "pydantic", "pymunk", "safetensors")
+PACKAGES = ("gymnasium", "numba", "numpy", "pydantic", "pymunk", "safetensors", "scipy")
 
 
 @pytest.fixture(scope="module")

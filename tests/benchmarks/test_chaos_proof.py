@@ -18,6 +18,7 @@ from benchmarks.chaos.recovery import Recovery
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.database.engine import Database
+from server.database.migrate import upgrade
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
 from workers.checkpoints import read_checkpoint, write_checkpoint
@@ -46,7 +47,7 @@ ATTEMPTS = [
 def database(tmp_path: Path) -> Iterator[Database]:
     """What the service would have stored of `ATTEMPTS`."""
     database = Database(f"sqlite:///{tmp_path / 'mapless.db'}")
-    tables.Base.metadata.create_all(database.engine)
+    upgrade(database)
     with database.write() as session:
         session.add(tables.Experiment(id="e", name="e", training={}))
         for run_id in (RUN, REFERENCE):

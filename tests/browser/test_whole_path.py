@@ -128,7 +128,7 @@ def test_two_trainings_run_to_their_end_and_are_compared(context: BrowserContext
     started = seconds.input_value()
     expect(seconds).not_to_have_value(started, timeout=SOON)
     page.get_by_role("dialog").locator(".mantine-Modal-close").click()
-    expect(page.get_by_role("dialog")).to_have_count(0)
+    expect(page.get_by_role("dialog")).to_have_count(0, timeout=SOON)
 
     # What is taken away is as good as it was said to be.
     best = page.locator("[data-testid=checkpoint][data-best]").get_by_role("link", name=re.compile("Download"))
@@ -147,7 +147,7 @@ def test_two_trainings_run_to_their_end_and_are_compared(context: BrowserContext
     page.goto("/")
     for name in ("ResBlock in simple", "MLP in simple"):
         page.get_by_role("checkbox", name=f"Tick {name}").check()
-    page.get_by_role("button", name="Compare 2").click()
+    page.get_by_role("link", name="Compare 2").click()
     figures = page.get_by_test_id("figures")
     expect(figures.get_by_role("row")).to_have_count(3)
     expect(figures).to_contain_text("1 seed × 200 episodes")

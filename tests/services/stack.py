@@ -98,7 +98,7 @@ class Service:
 
     def start_worker(self, name: str = "w", concurrency: int = 1) -> "subprocess.Popen[bytes]":
         self.workers[name] = process = self.start(
-            name, "workers", "worker", f"--concurrency={concurrency}", f"--name={name}"
+            name, "workers", "worker", f"--concurrency={concurrency}", f"--name={name}", "--jobs=0"
         )
         until(lambda: any(worker["name"].startswith(f"{name}@") for worker in self.api.get("/api/status").json()["workers"]))
         return process
