@@ -14,11 +14,11 @@ from pathlib import Path
 import torch
 
 from benchmarks.report import finish, parser
-from benchmarks.training_throughput import Silent
+from benchmarks.training_rates import Silent
 from workers.algorithms.ddpg import Ddpg
 from workers.algorithms.gradients.actor_critic import action_value
 from workers.live.viewing import Unwatched
-from workers.networks.modules import bound_actions
+from workers.networks.squashing import bound_actions
 from workers.presets import paper_ddpg
 from workers.reproduction.rows import ROW_BY_ID
 from workers.training.trainer import REPORT_INTERVAL, Training

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.actions import action_layout
 from sim.arrays import PolicyFunction
 from sim.config import TaskConfig
 from sim.envs.vector import NavigationVectorEnv
@@ -18,13 +19,13 @@ class Attempts:
     Attributes:
         success, timeouts: parts of them, 0 to 1; the others collided.
         steps: mean length.
-        actions: mean linear and angular action, in the actions' own units.
+        actions: mean of each number of an action, in fractions of its limit.
     """
 
     success: float
     timeouts: float
     steps: float
-    actions: tuple[float, float]
+    actions: tuple[float, ...]
 
 
 def first_attempts(policy: PolicyFunction, task: TaskConfig, seed: int) -> Attempts:
@@ -32,7 +33,7 @@ def first_attempts(policy: PolicyFunction, task: TaskConfig, seed: int) -> Attem
     env = NavigationVectorEnv(task, EPISODES, seed=seed, copy=False)
     observations, _ = env.reset(seed=seed)
     outcomes = np.zeros(EPISODES, np.uint8)
-    commands, steps = np.zeros(2), 0
+    commands, steps = np.zeros(action_layout(task.robot).size), 0
     while not outcomes.all():
         actions = policy(observations)
         driving = outcomes == 0
@@ -40,10 +41,9 @@ def first_attempts(policy: PolicyFunction, task: TaskConfig, seed: int) -> Attem
         steps += int(driving.sum())
         observations, *_ = env.step(actions)
         outcomes = np.where(outcomes, outcomes, env.outcomes)
-    linear, angular = (commands / steps).round(2).tolist()
     return Attempts(
         success=float((outcomes == 1).mean()),
         timeouts=float((outcomes == 3).mean()),
         steps=steps / EPISODES,
-        actions=(linear, angular),
+        actions=tuple((commands / steps).round(2).tolist()),
     )

@@ -16,7 +16,7 @@ from typing import Any
 import torch
 
 from benchmarks.report import finish, parser
-from benchmarks.training_throughput import NEVER, Silent
+from benchmarks.training_rates import NEVER, Silent
 from workers.config import EvaluationConfig
 from workers.live.viewing import Unwatched
 from workers.policy import torch_policy

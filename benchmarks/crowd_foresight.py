@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
-from sim.config import LidarConfig, TaskConfig
+from sim.config import LidarConfig, ObservationConfig, TaskConfig
 from sim.kernels.sensing import clearance_at
 from sim.shapes import pack_shapes
 from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller
@@ -26,7 +26,9 @@ from sim.world import World
 
 Floats = NDArray[np.float32]
 
-TASK = TaskConfig(lidar=LidarConfig(rays=60, batches=30, field_of_view=360.0))
+TASK = TaskConfig(
+    lidar=LidarConfig(rays=60, field_of_view=360.0), observation=ObservationConfig.preset("improved", batches=30)
+)
 KEEP = 0.21  # m from everything: the collision distance and a little
 EXTRAPOLATED = 4.0  # s
 FORESIGHT = (1.0, 2.0, 3.0, 4.0)  # s

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
 from sim.baselines.dwa import dynamic_window
-from sim.config import GeneratedArenaConfig, LidarConfig, MoversConfig, TaskConfig
+from sim.config import GeneratedArenaConfig, LidarConfig, MoversConfig, ObservationConfig, TaskConfig
 from sim.suites import Suite, load_suite, run_controller, run_suite, suite_for, suite_in, suite_places
 from workers.checkpoints import read_policy
 from workers.policy import torch_policy
@@ -30,7 +30,9 @@ CROWD, FIRST_CROWD_MAP = 4000, 20_000  # scenarios, one a map; the first of thes
 POLICIES = ("clutter", "thickets", "crowd")
 PLANNERS = {
     "180 degrees": TaskConfig(),
-    "360 degrees": TaskConfig(lidar=LidarConfig(rays=60, batches=30, field_of_view=360.0)),
+    "360 degrees": TaskConfig(
+        lidar=LidarConfig(rays=60, field_of_view=360.0), observation=ObservationConfig.preset("improved", batches=30)
+    ),
 }
 
 
@@ -60,7 +62,7 @@ def arrivals(policy: ShippedPolicy, suite: Suite) -> NDArray[np.bool_]:
     if suite.name in (result.suite for result in policy.card.results):
         return np.array([episode.outcome == "arrival" for episode in policy.evaluation(suite.name).episodes])
     _, numpy_policy = read_policy(policy.archive)
-    table = run_suite(torch_policy(numpy_policy.network, numpy_policy.weights), policy.card.training.task, suite)
+    table = run_suite(torch_policy(numpy_policy), policy.card.training.task, suite)
     return np.asarray(table.outcomes == 1)
 
 

@@ -17,8 +17,8 @@ import torch
 
 from benchmarks.attempts import Attempts, first_attempts
 from benchmarks.report import finish, parser
-from benchmarks.training_throughput import NEVER, Silent
-from sim.config import ArenaConfig, TaskConfig
+from benchmarks.training_rates import NEVER, Silent
+from sim.config import ArenaConfig, ObservationConfig, TaskConfig
 from workers.config import TrainingConfig
 from workers.live.viewing import Unwatched
 from workers.policy import torch_policy
@@ -60,7 +60,8 @@ def main() -> None:
     config = TrainingConfig.model_validate(
         {
             "task": TaskConfig(
-                arena=ArenaConfig.model_validate({"name": arguments.arena}), observation=arguments.observation
+                arena=ArenaConfig.model_validate({"name": arguments.arena}),
+                observation=ObservationConfig.preset(arguments.observation),
             ),
             "algorithm": arguments.algorithm,
             "steps": arguments.steps,

@@ -25,7 +25,7 @@ from benchmarks.report import finish, parser
 from sim.arenas import Arena, Mover
 from sim.config import FormulaTerm, ProximityTerm, RewardConfig, TaskConfig, TimeTerm, preset_terms
 from sim.kernels.commands import write_commands
-from sim.kernels.step import step_robots
+from sim.kernels.step import step_usual_robots
 from sim.plain import PlainWorld
 from sim.world import World
 
@@ -94,7 +94,7 @@ def kernel_only(robots: int) -> Callable[[], None]:
         nonlocal count
         write_commands(actions[count % ACTIONS], world.robots, space.state, space.command, parameters)
         space.state[:robots] += TASK.control_period * space.command[:robots]
-        step_robots(space.state, placed, world.robots, world.geometry, parameters)
+        step_usual_robots(space.state, placed, world.robots, world.geometry, parameters)
         count += 1
 
     return step

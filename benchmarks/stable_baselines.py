@@ -16,8 +16,17 @@ from torch import Tensor, nn
 
 from sim.arrays import PolicyFunction
 from sim.envs.vector import NavigationVectorEnv
-from workers.config import DdpgConfig, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
-from workers.networks.modules import ResBlock
+from workers.config import (
+    AddedAlgorithmConfig,
+    DdpgConfig,
+    MlpNetwork,
+    PpoConfig,
+    ResBlockNetwork,
+    SacConfig,
+    Td3Config,
+    TrainingConfig,
+)
+from workers.networks.modules import build_network
 
 Floats = NDArray[np.float32]
 
@@ -85,8 +94,8 @@ class ResBlockTrunk(BaseFeaturesExtractor):
     def __init__(self, observation_space: Box) -> None:
         size = observation_space.shape[0]
         super().__init__(observation_space, 4 * size)
-        self._network = ResBlock(size, 1)
-        self._network.head = nn.Identity()  # type: ignore[assignment]
+        self._network = build_network(ResBlockNetwork(), size, 1)
+        self._network.head = nn.Identity()
 
     def forward(self, observations: Tensor) -> Tensor:
         """(n, size) to (n, 4 size)."""
@@ -97,6 +106,8 @@ class ResBlockTrunk(BaseFeaturesExtractor):
 def build(config: TrainingConfig, seed: int) -> BaseAlgorithm:
     """The same training for Stable-Baselines3: same environment, networks, batches, rates and number of gradient steps."""
     algorithm = config.algorithm
+    if isinstance(algorithm, AddedAlgorithmConfig):
+        raise SystemExit(f"{algorithm.name} is not compared with Stable-Baselines3")
     layers = list(algorithm.network.hidden_sizes) if isinstance(algorithm.network, MlpNetwork) else []
     policy: dict[str, Any] = {"activation_fn": nn.ReLU}
     if not isinstance(algorithm.network, MlpNetwork):

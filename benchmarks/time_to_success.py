@@ -26,7 +26,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from benchmarks.attempts import first_attempts
 from benchmarks.report import finish, parser
 from benchmarks.stable_baselines import build, policy_of
-from benchmarks.training_throughput import NEVER, Silent
+from benchmarks.training_rates import NEVER, Silent
 from sim.arrays import PolicyFunction
 from sim.config import ArenaConfig, TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig

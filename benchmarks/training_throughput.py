@@ -13,7 +13,6 @@ import json
 import statistics
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
@@ -21,10 +20,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from benchmarks.report import finish, parser
 from benchmarks.stable_baselines import build
+from benchmarks.training_rates import NEVER, Silent, ours
 from workers.config import DdpgConfig, EvaluationConfig, MlpNetwork, PpoConfig, ResBlockNetwork, TrainingConfig
-from workers.frames import Frame
 from workers.live.viewing import Unwatched
-from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.training.trainer import REPORT_INTERVAL, Training
 
 CASES: dict[str, PpoConfig | DdpgConfig] = {
@@ -42,37 +40,6 @@ TARGETS = {
 
 # Enough updates for a steady figure, few enough that both meet the same state of the machine.
 SEGMENT_STEPS = {"ppo": 40_960, "ddpg": 6_400}
-NEVER = 10**9
-
-
-class Silent:
-    """A reporter that nobody listens to."""
-
-    watch: WatchRequest | None = None
-    stop_requested = False
-
-    def metrics(self, step: int, values: Mapping[str, float]) -> None:
-        """Heard by nobody."""
-
-    def event(self, step: int, level: EventLevel, message: str) -> None:
-        """Heard by nobody."""
-
-    def checkpoint(self, step: int, archive: Path, evaluation: EvaluationResult | None) -> None:
-        """Heard by nobody."""
-
-    def frames(self, frames: Sequence[Frame]) -> None:
-        """Heard by nobody."""
-
-
-def ours(training: Training, steps: int) -> float:
-    """Steps per CPU-second over a number of steps of the training loop, reports included."""
-    started, first = time.process_time(), training.step
-    while training.step - first < steps:
-        training.collect()
-        training.update()
-        if training.metrics.seconds >= REPORT_INTERVAL:
-            training.report(None)
-    return (training.step - first) / (time.process_time() - started)
 
 
 def theirs(model: BaseAlgorithm, steps: int) -> float:

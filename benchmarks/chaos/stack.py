@@ -57,7 +57,7 @@ class Node:
 
     def start(self) -> None:
         """Start the worker; it may take seconds to be ready."""
-        command = ("-m", "workers", "worker", "--concurrency=1", f"--name={self.name}")
+        command = ("-m", "workers", "worker", "--concurrency=1", "--jobs=0", f"--name={self.name}")
         self._process = _start(command, self._log, self._environment)
 
     def members(self) -> list[psutil.Process]:
