@@ -13,9 +13,11 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 
 ROOT = Path(__file__).parents[2]
+# A browser that draws 3D in software, beside trainings, on two busy cores: what is slow there isn't wrong.
+PATIENCE = 60_000
 # Software rendering of WebGL, and none of the background connections of a desktop browser.
 CHROMIUM_FLAGS = [
     "--no-sandbox",
@@ -68,6 +70,7 @@ def browser() -> Iterator[Browser]:
         if os.environ.get("REQUIRE_CHROMIUM"):
             pytest.fail("no Chromium on the path, and REQUIRE_CHROMIUM is set")
         pytest.skip("no Chromium on the path")
+    expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=executable, args=CHROMIUM_FLAGS)
         yield chromium
@@ -79,6 +82,7 @@ def context(browser: Browser, stack: str) -> Iterator[BrowserContext]:
     """A logged-in browser profile of its own, 1280 x 900."""
     origin = "{0.scheme}://{0.netloc}".format(urlsplit(stack))
     context = browser.new_context(base_url=origin, viewport={"width": 1280, "height": 900}, accept_downloads=True)
+    context.set_default_timeout(PATIENCE)
     page = context.new_page()
     page.goto(stack)
     page.close()
