@@ -9,7 +9,7 @@ MaplessError          (also the base of WorkerError in workers/errors.py and of 
     │       └── NoFreeSpaceError     a robot has no room in it
     ├── DisplayError     there is no window to show pictures in
     ├── FormulaError     a formula of the reward is not a finite number
-    ├── ObservationError an observation does not tell what a controller needs
+    ├── ObservationError an observation does not tell what it should
     ├── PlacementError   a requested pose or target is not in the arena's free space
     └── SuiteError       a suite is unknown, or its content is not what its hash says
 """
@@ -52,7 +52,7 @@ class DisplayError(SimError):
 
 
 class ObservationError(SimError):
-    """An observation does not have the part that a controller drives by."""
+    """An observation does not have the part that a controller drives by, or an extension's part is not made of numbers."""
 
 
 class PlacementError(SimError):

@@ -14,6 +14,7 @@ import numpy as np
 from sim.actions import ActionComponent, action_layout
 from sim.config import (
     ActionsPart,
+    AddedObservationPart,
     BearingPart,
     DeviationPart,
     DirectionPart,
@@ -26,30 +27,13 @@ from sim.config import (
     part_key,
 )
 from sim.config.observation import MAX_FRAMES, MAX_PARTS, part_size
+from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS, ROOM_FOR_FRAMES, ROOM_FOR_PARTS
 
 assert MAX_PARTS <= ROOM_FOR_PARTS
 assert MAX_FRAMES <= ROOM_FOR_FRAMES
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
-
-
-@dataclass(frozen=True)
-class ObservationNumber:
-    """One number of an observation.
-
-    Attributes:
-        name: what it is.
-        formula: how it is computed; lengths in metres, angles in radians.
-        low, high: the range that it stays in.
-        unit: what 1 stands for; '' where it grows less than what it tells.
-    """
-
-    name: str
-    formula: str
-    low: float
-    high: float
-    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -187,6 +171,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return (ObservationNumber("yaw", "heading / pi", -1.0, 1.0, "pi rad"),)
         case DeviationPart():
             return (ObservationNumber("heading deviation", f"|bearing| / pi, {_BEARING}", 0.0, 1.0, "pi rad"),)
+        case AddedObservationPart():
+            return tuple(part.numbers())
 
 
 def _unit(component: ActionComponent) -> str:
@@ -212,6 +198,8 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
         starts[rows[block.key], block.age] = block.start
     places, options = np.full(len(PART_KINDS), -1, np.int32), np.zeros(len(PART_KINDS), np.int32)
     for row, part in enumerate(observation.parts):
+        if isinstance(part, AddedObservationPart):
+            continue
         kind = PART_KINDS.index(part.name)
         places[kind], options[kind] = starts[row, 0], _option(part)
     sizes = _robot_sizes(task)

@@ -13,9 +13,11 @@ import pymunk
 from numpy.typing import NDArray
 
 from sim.actions import action_layout, twists
+from sim.added_parts import AddedParts
 from sim.arenas import Arena
 from sim.config import (
     ActionsPart,
+    AddedObservationPart,
     BearingPart,
     DeviationPart,
     DirectionPart,
@@ -28,6 +30,7 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
 )
+from sim.extending.observing import Sight
 from sim.extending.parts import RewardTerm as AddedTerm
 from sim.footprint import rectangle_clearance
 from sim.lidar import drawn_ray_angles, ray_origins
@@ -109,6 +112,7 @@ class PlainWorld:
         self.distance = math.dist(pose[:2], target)
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
         self._seen: list[list[NDArray[np.float64]]] = []
+        self._added_parts = AddedParts(task)
         if task.observation.frames > 1:
             self.observe(self.scan())
 
@@ -178,6 +182,19 @@ class PlainWorld:
                 return np.array([heading % math.tau / math.tau if part.scaling == "turn" else heading / math.pi])
             case DeviationPart():
                 return np.array([abs(bearing) / math.pi])
+            case AddedObservationPart():
+                return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
+
+    def _sight(self, ranges: NDArray[np.float64]) -> Sight:
+        """What extensions see of it."""
+        here, velocities = self.body.position, np.array([self.velocities], np.float32)
+        return Sight(
+            ranges=ranges[None].astype(np.float32),
+            poses=np.array([[here.x, here.y, wrapped(self.body.angle)]], np.float32),
+            targets=np.array([self.target], np.float32),
+            speeds=velocities,
+            actions=velocities,
+        )
 
     def reward_terms(self, before: float, ranges: NDArray[np.float64], outcome: Outcome) -> tuple[float, ...]:
         """The reward's terms for a step that began `before` metres from the target (paper, Eq. 4 and 5)."""

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.actions import action_layout, fastest_way
+from sim.added_parts import AddedParts
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import FreeSpace, free_space
 from sim.config import AckermannDrive, OmnidirectionalDrive, RandomisationConfig, TaskConfig
 from sim.disturbances import longest_delay, quantity_spans
 from sim.errors import PlacementError
 from sim.extending.expression import QUANTITIES
+from sim.extending.observing import Sight
 from sim.footprint import rectangle_clearance
 from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
@@ -217,7 +219,8 @@ class World:
         )
         numbers = observation_size(task)
         self._formulas = formulas = Formulas(task, robots)
-        sees_actions = any(part.name == "actions" for part in task.observation.parts)
+        self._added_parts = AddedParts(task)
+        sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -242,7 +245,9 @@ class World:
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
-        self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=restart == "same step")
+        # What extensions see of a step that ends an episode has to be seen before the next one begins.
+        starts_anew = restart == "same step" and not self._added_parts
+        self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         is_usual = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
         self._step_robots = step_usual_robots if is_usual else step_any_robots
         self._parameters["replica_stride"] = len(self.arenas)
@@ -297,6 +302,7 @@ class World:
         everybody = np.ones(n, dtype=np.bool_)
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
+        self._see_added_parts(everybody, begins=True)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -368,6 +374,7 @@ class World:
         Raises:
             ValueError: an action is not finite.
             FormulaError: a formula of the reward is not.
+            ObservationError: a number that an extension makes of an observation is not.
         """
         space = self._space
         ended = self.robots.terminations | self.robots.truncations if self._restart == "next step" else None
@@ -384,6 +391,8 @@ class World:
         if count:
             space.put(self._placed[:count])
         self._formulas.add(self.robots)
+        if self._added_parts:
+            self._end_with_added_parts()
         if ended is not None and ended.any():
             self._begin(ended)
 
@@ -393,6 +402,46 @@ class World:
         drawn = np.full((len(self), 3), np.nan, dtype=np.float32)
         reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
         self._space.put(np.flatnonzero(which).astype(np.int32))
+        self._see_added_parts(which, begins=True)
+
+    def _end_with_added_parts(self) -> None:
+        """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
+        robots = self.robots
+        self._see_added_parts(robots.records["parked"] == 0, begins=False)
+        ended = robots.terminations | robots.truncations
+        if not ended.any():
+            return
+        robots.final_observations[ended] = robots.observations[ended]
+        if self._restart == "same step":
+            results = [robots.rewards, robots.terms, robots.terminations, robots.truncations, robots.outcomes]
+            results += [robots.records[name] for name in ("steps", "attempt_reward", "path_length", "min_clearance")]
+            kept = [result[ended] for result in results]
+            self._begin(ended)
+            for result, values in zip(results, kept, strict=True):
+                result[ended] = values
+
+    def _see_added_parts(self, which: NDArray[np.bool_], *, begins: bool) -> None:
+        """Write what extensions see for some robots (N,); where an episode begins, it stands for earlier moments too."""
+        rows = np.flatnonzero(which)
+        if not self._added_parts or not len(rows):
+            return
+        robots = self.robots
+        poses = robots.poses[rows]
+        if robots.drift.shape[0]:
+            believed = poses + robots.drift[rows]
+            believed[:, 2] = np.arctan2(np.sin(believed[:, 2]), np.cos(believed[:, 2]))
+            poses = believed.astype(np.float32)
+        sight = Sight(
+            ranges=robots.ranges[rows],
+            poses=poses,
+            targets=robots.targets[rows],
+            speeds=self.followed()[rows],
+            actions=robots.commands[rows],
+        )
+        for name, values in self._added_parts.seen(sight).items():
+            places = self._added_parts.places[name]
+            for place in places if begins else places[:1]:
+                robots.observations[rows, place] = values
 
     @property
     def fields_of_view(self) -> NDArray[np.float64]:

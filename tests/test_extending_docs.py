@@ -12,13 +12,16 @@ import pytest
 import torch
 
 from sim.actions import DEFAULT_ACTIONS
+from sim.arenas import build_arenas
 from sim.arenas.families import generate_arena
 from sim.baselines.named import controller_of
-from sim.config import AddedArenaPool, TaskConfig
+from sim.config import AddedArenaPool, AddedObservationPart, ObservationConfig, TaskConfig
 from sim.extending.control import drive, load_suite
 from sim.extending.discovery import complete, discover
 from sim.extending.expression import QUANTITIES
+from sim.observations import observation_layout
 from sim.rewards import constants, evaluate, parameters_of, program_of
+from sim.world import World
 from workers.algorithms.added import build_added
 from workers.config import AddedAlgorithmConfig
 from workers.extending.learning import Learner
@@ -75,6 +78,18 @@ def test_add_an_arena_family(module: Module) -> None:
     arena = generate_arena(pool(radius=0.2), 0.5, 1)
     assert arena.circles.shape == (9, 3)
     np.testing.assert_array_equal(arena.circles[:, 2], 0.2)
+
+
+def test_add_an_observation(module: Module) -> None:
+    """Where the LiDAR sees 3.5 m and nothing is near, a target 4 m away is half a metre farther: a quarter of 2 m."""
+    slack: Any = complete(declared(module, "add-an-observation.md", "slack"), AddedObservationPart)
+    observation = ObservationConfig.model_construct(parts=(slack(most=2.0),))
+    task = TaskConfig().model_copy(update={"observation": observation})
+    (number,) = observation_layout(task).numbers
+    assert (number.name, number.formula) == ("slack", "(longest ray - target distance) / 2 m")
+    world = World(task, build_arenas(task.arena), 1)
+    world.reset(poses=np.zeros((1, 3)), targets=np.array([[4.0, 0.0]]))
+    np.testing.assert_allclose(world.robots.observations, [[-0.25]])
 
 
 def test_add_a_baseline(module: Module) -> None:

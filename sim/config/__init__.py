@@ -38,6 +38,7 @@ from sim.config.base import ADVANCED, HIDDEN, Frozen
 from sim.config.movers import MAX_MOVERS, MoverKind, MoversConfig
 from sim.config.observation import (
     ActionsPart,
+    AddedObservationPart,
     BearingPart,
     DeviationPart,
     DirectionPart,
@@ -100,6 +101,7 @@ __all__ = [
     "AckermannDrive",
     "ActionsPart",
     "AddedArenaPool",
+    "AddedObservationPart",
     "AlignmentTerm",
     "AnyArenaConfig",
     "AnyDrive",

@@ -5,11 +5,14 @@ moment of all parts, in the list's order, then what they were a step before, and
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from sim.config.base import ADVANCED, Frozen
+from sim.extending.discovery import added, complete, with_added
+from sim.extending.parts import ObservationPart as AddedPart
+from sim.extending.parts import check_numbers
 
 MAX_PARTS = 16
 """Parts of one observation, at most."""
@@ -124,10 +127,28 @@ class DeviationPart(Frozen):
     frames: int = _frames()
 
 
-ObservationPart = Annotated[
-    RangesPart | SpeedsPart | ActionsPart | DistancePart | DirectionPart | BearingPart | HeadingPart | DeviationPart,
-    Field(discriminator="name"),
-]
+class AddedObservationPart(AddedPart):
+    """A part that an extension has added."""
+
+    frames: int = _frames()
+
+    @model_validator(mode="after")
+    def _numbers_are_numbers(self) -> Self:
+        check_numbers(self)
+        return self
+
+
+BuiltInPart = (
+    RangesPart | SpeedsPart | ActionsPart | DistancePart | DirectionPart | BearingPart | HeadingPart | DeviationPart
+)
+
+if TYPE_CHECKING:
+    ObservationPart = BuiltInPart | AddedObservationPart
+else:
+    ObservationPart = Annotated[
+        with_added(BuiltInPart, (complete(part, AddedObservationPart) for part in added(AddedPart))),
+        Field(discriminator="name"),
+    ]
 
 ObservationName = Literal["improved", "paper"]
 """The observations that came first: inverse ranges and a signed bearing, and ranges and angles as published."""
@@ -234,6 +255,8 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return actions
         case BearingPart(encoding="sine_cosine"):
             return 2
+        case AddedObservationPart():
+            return len(part.numbers())
         case _:
             return 1
 

@@ -1,6 +1,7 @@
 """What an extension declares its parts with: the public, versioned half of Mapless that needs nothing but pydantic.
 
-An extension is a Python package that adds parts to Mapless: reward terms, arena families, baselines, algorithms. Each
+An extension is a Python package that adds parts to Mapless: reward terms, observation parts, arena families, baselines,
+algorithms, networks. Each
 part is a configuration, so that it stands in the form, the API's schema, the manifest and the comparison like those that
 are built in. What a part does lies in another module, named by its `implementation`, which only those import who run it.
 
@@ -12,15 +13,24 @@ are built in. What a part does lies in another module, named by its `implementat
 ...     formula = "speed < slow"
 >>> extension = Extension(name="my_lab", version="1.0", api=1, parts=(StillTerm,))
 
-What it may use: this module, `sim.extending.arenas` (NumPy), `sim.extending.control` (the simulator) and
-`workers.extending`, `workers.extending.learning` (torch). Everything else may change from one release to the next;
-what these hold changes with `API_VERSION` only.
+What it may use: this module, `sim.extending.arenas`, `sim.extending.observing` (NumPy), `sim.extending.control` (the
+simulator) and `workers.extending`, `workers.extending.learning` (torch). Everything else may change from one release to
+the next; what these hold changes with `API_VERSION` only.
 """
 
 from pydantic import Field
 
 from sim.extending.base import ADVANCED, HIDDEN, Frozen, needs
-from sim.extending.parts import API_VERSION, ArenaFamily, Baseline, Extension, Part, RewardTerm
+from sim.extending.parts import (
+    API_VERSION,
+    ArenaFamily,
+    Baseline,
+    Extension,
+    ObservationNumber,
+    ObservationPart,
+    Part,
+    RewardTerm,
+)
 
 __all__ = [
     "ADVANCED",
@@ -31,6 +41,8 @@ __all__ = [
     "Extension",
     "Field",
     "Frozen",
+    "ObservationNumber",
+    "ObservationPart",
     "Part",
     "RewardTerm",
     "needs",

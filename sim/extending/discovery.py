@@ -240,9 +240,9 @@ def _check_part(part: object, extension: str) -> None:
             f"its {part.kind} {name!r} should be named '{extension}.{(after or before).lower()}': names without the "
             "extension's in front are Mapless's own"
         )
-    part.check()
     try:
         part.model_validate({})
         part.model_json_schema()
     except Exception as error:  # pydantic's, and those of the part's validators
         raise ValueError(f"{part.__name__} can't be shown in a form ({error}): every field needs a default") from error
+    part.check()

@@ -1,6 +1,8 @@
 """What an extension is made of: its declaration, and the kinds of parts that the simulator knows (pydantic only)."""
 
+import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
 
@@ -93,6 +95,63 @@ class RewardTerm(Part):
         if any(field.annotation not in (float, int, bool) for name, field in cls.model_fields.items() if name != "name"):
             raise ValueError(f"{cls.__name__}: what a formula reads are numbers")
         parse(cls.formula, cls.parameter_names())
+
+
+@dataclass(frozen=True)
+class ObservationNumber:
+    """One number of an observation.
+
+    Attributes:
+        name: what it is.
+        formula: how it is computed; lengths in metres, angles in radians.
+        low, high: the range that it stays in.
+        unit: what 1 stands for; '' where it grows less than what it tells.
+    """
+
+    name: str
+    formula: str
+    low: float
+    high: float
+    unit: str = ""
+
+
+class ObservationPart(Part):
+    """A part of what a policy sees.
+
+    At how many moments it is seen, `frames`, is added to its fields, as every part has it.
+
+    Attributes:
+        implementation: a function (part, task) to a function that turns a `sim.extending.observing.Sight` of n robots into
+            (n, numbers); what it gives is cut at the numbers' ranges.
+    """
+
+    kind: ClassVar[str] = "observation part"
+
+    def numbers(self) -> Sequence[ObservationNumber]:
+        """What its numbers are at one moment, in order; how many they are may depend on its fields."""
+        raise NotImplementedError
+
+    @classmethod
+    def check(cls) -> None:
+        """See `Part.check`."""
+        super().check()
+        if cls.numbers is ObservationPart.numbers:
+            raise ValueError(f"{cls.__name__} needs a method numbers(self) that says what its numbers are")
+        check_numbers(cls(name=cls.part_name()))
+
+
+def check_numbers(part: ObservationPart) -> None:
+    """Look at what an observation part says of its numbers.
+
+    Raises:
+        ValueError: there are none, or their ranges are none.
+    """
+    numbers = tuple(part.numbers())
+    if not numbers:
+        raise ValueError(f"{part.name} has no numbers")
+    for number in numbers:
+        if not (math.isfinite(number.low) and math.isfinite(number.high) and number.low < number.high):
+            raise ValueError(f"{part.name}: {number.name!r} goes from {number.low:g} to {number.high:g}, which is no range")
 
 
 class ArenaFamily(Part):

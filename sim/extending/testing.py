@@ -7,8 +7,9 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from sim.arenas import Arena, build_arenas
+from sim.arrays import Floats
 from sim.baselines.named import AnyBaseline, controller_of
-from sim.config import AnyArenaConfig, RewardConfig, TaskConfig
+from sim.config import AnyArenaConfig, ObservationConfig, RewardConfig, TaskConfig
 from sim.extending.control import Controller
 from sim.extending.discovery import installed
 from sim.world import World
@@ -33,6 +34,15 @@ def rewards_of(term: Mapping[str, Any], *, linear: float, angular: float) -> flo
     for _ in range(3):
         world.step(np.array([[linear, angular]], np.float32))
     return float(world.robots.terms[0, 0])
+
+
+def seen_by(part: Mapping[str, Any], *, pose: tuple[float, float, float], target: tuple[float, float]) -> Floats:
+    """The numbers of an observation part for a robot that begins in the simple arena."""
+    task = TaskConfig(observation=ObservationConfig.model_validate({"parts": [dict(part)]}))
+    world = World(task, build_arenas(task.arena), 1)
+    world.reset(poses=np.array([pose]), targets=np.array([target]))
+    numbers: Floats = world.robots.observations[0].copy()
+    return numbers
 
 
 def make_arenas(family: Mapping[str, Any], count: int) -> tuple[Arena, ...]:

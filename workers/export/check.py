@@ -71,7 +71,8 @@ def check_export(
     scene = _scene(rng, shipped)
     by_scene = run_graph(by_scan, {name: scene[name] for name in scan_inputs(shipped.specification)} | memory)
     seen = observe(
-        shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION], scene[SPEEDS]
+        shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION], scene[SPEEDS],
+        added={part.kind: scene[part.kind] for part in shipped.specification.parts if part.added},
     )  # fmt: skip
     seen = np.concatenate((seen, scene[PREVIOUS]), axis=1)
     policy_difference = max(
@@ -109,6 +110,8 @@ def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats
         SPEEDS: rng.uniform(specification.action_lows, 1.0, (_ROWS, len(specification.action_limits))),
         PREVIOUS: rng.uniform(0.0, 1.0, (_ROWS, len(specification.carried))),
     }
+    # Only now, so that what is drawn before them is what it is without them.
+    scene |= {part.kind: rng.uniform(-1.0, 1.0, (_ROWS, part.size)) for part in specification.parts if part.added}
     cast = {name: values.astype(np.float32) for name, values in scene.items()}
     cast[RANGES] = np.minimum(cast[RANGES], np.float32(specification.range))
     return cast

@@ -4,7 +4,7 @@ import math
 
 from workers.export.check import CheckReport
 from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
-from workers.export.ros2.mapless_navigator.policy import Specification
+from workers.export.ros2.mapless_navigator.policy import Part, Specification
 from workers.manifest import Manifest
 
 _NUMPY_EXAMPLE = """\
@@ -18,7 +18,7 @@ from mapless_navigator.policy import Policy
 policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
 frames = Frames(policy.specification)  # of one robot, from start to target
-observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[ZEROS]]))
+observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[ZEROS]]ADDED))
 NAMES = policy.velocities(observation)[0]
 print(f"FORMAT")
 """
@@ -52,6 +52,7 @@ def readme(manifest: Manifest, specification: Specification, report: CheckReport
             _head(manifest),
             _files(report),
             _contract(manifest, specification),
+            _added(manifest, specification),
             _ros(specification),
             f"## Python, without ROS\n\nWith NumPy alone:\n\n```python\n{_filled(_NUMPY_EXAMPLE, specification)}```\n",
             f"With onnxruntime:\n\n```python\n{_onnx_example(specification)}```\n",
@@ -66,6 +67,10 @@ def _onnx_example(specification: Specification) -> str:
         TARGET: "np.array([[2.0, 1.0]], np.float32),",
         SPEEDS: "np.zeros((1, COUNT), np.float32),  # as measured, over their limits, or the `action` of the step before",
         LAST_ACTION: "np.zeros((1, COUNT), np.float32),  # the `action` of the step before",
+        **{
+            part.kind: f"np.zeros((1, {part.size}), np.float32),  # as its extension makes it"
+            for part in _added_parts(specification)
+        },
         PREVIOUS: f"np.zeros((1, {len(specification.carried)}), np.float32),  # see below",
     }
     inputs = "\n".join(f'    "{name}": {lines[name]}' for name in scan_inputs(specification))
@@ -82,8 +87,10 @@ def _filled(example: str, specification: Specification) -> str:
         "omnidirectional": ("linear", "lateral", "angular"),
         "ackermann": ("linear", "steering"),
     }[specification.drive]
+    added = {part.kind: [[0.0] * part.size] for part in _added_parts(specification)}
     return (
         example.replace("NAMES", ", ".join(names))
+        .replace("ADDED", f", added={added}" if added else "")
         .replace("FORMAT", ", ".join(f"{{{name}:.3f}} {units[name]}" for name in names))
         .replace("ZEROS", ", ".join(["0.0"] * len(names)))
         .replace("COUNT", str(len(names)))
@@ -137,6 +144,26 @@ def _contract(manifest: Manifest, specification: Specification) -> str:
 | number | name | meaning | range |
 |---|---|---|---|
 {rows}
+"""
+
+
+def _added_parts(specification: Specification) -> tuple[Part, ...]:
+    return tuple(part for part in specification.parts if part.added)
+
+
+def _added(manifest: Manifest, specification: Specification) -> str:
+    """What is not in the bundle: the code of extensions that makes parts of the observation."""
+    if not (parts := _added_parts(specification)):
+        return ""
+    kinds = ", ".join(f"`{part.kind}`" for part in parts)
+    extensions = ", ".join(
+        f"{one.name} {one.version}" + (f" (`{one.source}`)" if one.source else "") for one in manifest.training.extensions
+    )
+    return f"""\
+**Code of an extension makes {kinds}**, and it is not in this bundle: the table says what each
+number is, the training had {extensions}. `policy_from_scan.onnx` takes these numbers as inputs of their own, `observe` as
+`added`, and the ROS 2 node ends with this reason until `Navigator` in `node.py` is given a function `make_added` that makes
+them.
 """
 
 

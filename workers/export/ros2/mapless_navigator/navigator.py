@@ -4,12 +4,13 @@ Times are seconds of one clock of the caller's choice; lengths metres, angles ra
 """
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from .observation import Frames, Reals, Scan, observe, resample, wrap
+from .observation import Frames, Reals, Scan, observe, refuse_unknown, resample, wrap
 from .policy import Floats, Policy, Specification
 
 
@@ -93,16 +94,27 @@ def outline(specification: Specification, angles: Reals) -> Reals:
     return edge
 
 
+MakeAdded = Callable[[Reals, Reals, Reals, Reals, Reals], Mapping[str, Reals]]
+"""Scan (1, scan), pose (1, 3), goal (1, 2), last action (1, A) and speeds (1, A), as `observe` takes them, to the numbers
+(1, size) of the parts that an extension's code makes, by their kinds."""
+
+
 class Navigator:
     """Keeps the newest scan, pose and goal; `command` is called once per control period.
 
     Args:
         policy: the exported policy.
         safety: when to stop.
+        make_added: makes what an extension's code made in training, where the policy sees such parts.
+
+    Raises:
+        PolicyFileError: the policy sees such a part, and there is nothing that makes it.
     """
 
-    def __init__(self, policy: Policy, safety: Safety) -> None:
-        self._policy, self._safety = policy, safety
+    def __init__(self, policy: Policy, safety: Safety, make_added: MakeAdded | None = None) -> None:
+        if make_added is None:
+            refuse_unknown(policy.specification)
+        self._policy, self._safety, self._make_added = policy, safety, make_added
         self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
         self._yaws = (safety.sensor_yaw, safety.second_sensor_yaw)[: len(self._scans)]
         self._pose: tuple[float, tuple[float, float, float]] | None = None
@@ -175,7 +187,14 @@ class Navigator:
         )
         if np.isnan(ranges).any():
             return State.BLIND, None
-        moment = observe(specification, ranges[None], pose[None], goal[None], self._last_action[None], self._speeds()[None])
+        known = (
+            ranges[None],
+            pose[None],
+            goal[None],
+            self._last_action[None].astype(float),
+            self._speeds()[None].astype(float),
+        )
+        moment = observe(specification, *known, added=self._make_added(*known) if self._make_added else None)
         return State.DRIVING, self._frames.push(moment)
 
     def _speeds(self) -> Floats:

@@ -14,17 +14,19 @@
 | `heading`              | heading / pi                                                               |
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
+| `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
 x axis is heading 0.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .policy import Floats, Part, Specification
+from .policy import Floats, Part, PolicyFileError, Specification
 
 Reals = NDArray[np.float64]
 
@@ -55,6 +57,8 @@ def observe(
     targets: ArrayLike,
     last_actions: ArrayLike,
     speeds: ArrayLike | None = None,
+    *,
+    added: Mapping[str, ArrayLike] | None = None,
 ) -> Floats:
     """What n robots see at one moment: the whole observation where nothing earlier is seen, else see `Frames`.
 
@@ -65,10 +69,15 @@ def observe(
         targets: (n, 2) x, y in metres, in the same frame.
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
+        added: the numbers (n, size) of each part that an extension makes, by its kind; `manifest.json` explains them.
 
     Returns:
         (n, numbers of the newest moment).
+
+    Raises:
+        PolicyFileError: the policy sees a part of an extension, and its numbers are not given.
     """
+    refuse_unknown(specification, () if added is None else tuple(added))
     pose, target = np.asarray(poses, np.float64), np.asarray(targets, np.float64)
     offset = target - pose[:, :2]
     distance = np.hypot(offset[:, 0], offset[:, 1])
@@ -87,12 +96,32 @@ def observe(
         "heading_turn": heading % _TURN / _TURN,
         "deviation": np.abs(bearing) / np.pi,
     }
+    told |= {kind: np.asarray(numbers, np.float64) for kind, numbers in (added or {}).items()}
     scan = np.asarray(ranges, np.float64)
     columns = [
         _seen(specification, part, scan) if part.kind in ("ranges", "inverse_ranges") else told[part.kind]
         for part in specification.parts
     ]
     return np.concatenate([column.reshape(len(pose), -1) for column in columns], axis=1).astype(np.float32)
+
+
+def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) -> None:
+    """Refuse a policy that sees what this program can't make.
+
+    Args:
+        specification: the policy's.
+        known: kinds of extensions' parts that the caller makes.
+
+    Raises:
+        PolicyFileError: there is such a part; says which.
+    """
+    for part in specification.parts:
+        if part.added and part.kind not in known:
+            raise PolicyFileError(
+                f"this policy sees {part.kind!r}, {part.size} number{'s'[: part.size != 1]} that code of the extension "
+                f"{part.kind.partition('.')[0]!r} makes, which is not in this program (manifest.json "
+                "explains extension and numbers): give them to observe(added=...), or to Navigator(make_added=...)"
+            )
 
 
 def _seen(specification: Specification, part: Part, scan: Reals) -> Reals:

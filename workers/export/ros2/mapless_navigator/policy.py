@@ -39,7 +39,7 @@ KINDS = (
     "heading_turn",
     "deviation",
 )
-"""What a part of an observation may be; `observation.py` has a table of them."""
+"""What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
 _LEAKY_SLOPE = np.float32(0.01)
 
@@ -53,12 +53,17 @@ class Part:
     """One part of an observation.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `KINDS`, or the name of an extension's part, "extension.part".
         size: numbers at one moment.
     """
 
     kind: str
     size: int
+
+    @property
+    def added(self) -> bool:
+        """Whether an extension's code makes it, which this program does not have."""
+        return "." in self.kind
 
 
 @dataclass(frozen=True)
@@ -169,7 +174,7 @@ class Specification:
             raise PolicyFileError(f"{path} is not a policy's specification ({error!r}): export the policy again") from error
         if (
             (specification.format, specification.version) != ("mapless-deployment", 4)
-            or not {part.kind for part in specification.parts}.issubset(KINDS)
+            or not {part.kind for part in specification.parts if not part.added}.issubset(KINDS)
             or specification.drive not in ("differential", "omnidirectional", "ackermann")
         ):
             raise PolicyFileError(f"{path} is of another version than this program: use the program of the same bundle")

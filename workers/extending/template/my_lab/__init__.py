@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from sim.extending import ArenaFamily, Baseline, Extension, Field, RewardTerm
+from sim.extending import ArenaFamily, Baseline, Extension, Field, ObservationNumber, ObservationPart, RewardTerm
 from workers.extending import Algorithm, Network
 
 
@@ -14,6 +14,22 @@ class GentleTerm(RewardTerm):
     limit: float = Field(0.5, ge=0.0, le=10.0, title="Limit", description="Turning rate that costs nothing, rad/s.")
 
     formula = "max(0, abs(turning_rate) - limit)"
+
+
+class OpeningPart(ObservationPart):
+    """Where there is most room, and how much."""
+
+    name: Literal["my_lab.opening"] = Field("my_lab.opening", title="Opening")
+    rays: int = Field(3, ge=1, le=30, title="Rays", description="Neighbours that have to be free together.")
+
+    implementation = "my_lab.sight:opening"
+
+    def numbers(self):
+        """What the policy sees, in order."""
+        return (
+            ObservationNumber("opening bearing", "of the freest rays / pi, left positive", -1.0, 1.0, "pi rad"),
+            ObservationNumber("opening room", "their shortest / the LiDAR's range", 0.0, 1.0, "the LiDAR's range"),
+        )
 
 
 class PillarsFamily(ArenaFamily):
@@ -59,6 +75,6 @@ extension = Extension(
     name="my_lab",
     version="0.1.0",
     api=1,
-    parts=(GentleTerm, PillarsFamily, TimidBaseline, GatedNetwork, ReinforceConfig),
+    parts=(GentleTerm, OpeningPart, PillarsFamily, TimidBaseline, GatedNetwork, ReinforceConfig),
     source="pip install my_lab==0.1.0",
 )
