@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 from pydantic import ValidationError
 
+import mapless_client.command
 from server.arenas.cli import app as arena_app
 from server.people.cli import app as people_app
 from workers.extension_cli import app as extension_app
@@ -26,6 +27,8 @@ app = typer.Typer(
 app.add_typer(arena_app, name="arena")
 app.add_typer(people_app, name="people")
 app.add_typer(extension_app, name="extension")
+# Those of the client, which speak to a server that runs anywhere.
+app.registered_commands.extend(mapless_client.command.app.registered_commands)
 
 # Everything after the command's name belongs to the workers' own command line, --help included.
 _PASSED_ON: dict[str, Any] = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}

@@ -108,13 +108,15 @@ class FileStore:
         except FileNotFoundError as error:
             raise NotFoundError(f"The archive of checkpoint {identifier} is gone from the store.") from error
 
-    def read(self, identifier: str) -> Iterator[bytes]:
-        """The archive's bytes, block by block.
+    def read(self, identifier: str, start: int = 0) -> Iterator[bytes]:
+        """The archive's bytes from `start` on, block by block.
 
         Raises:
             NotFoundError: at once, if the store has no such archive.
         """
-        return _blocks(self.open(identifier))
+        file = self.open(identifier)
+        file.seek(start)
+        return _blocks(file)
 
     def delete(self, identifier: str) -> None:
         """Remove an archive, and what an upload that was cut off left of it; one that is not there is none to remove."""

@@ -1,12 +1,13 @@
 """Routes of checkpoints."""
 
+import re
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Header, Query
 from fastapi.responses import StreamingResponse
 
 from server.checkpoints.schemas import CheckpointPage, Episodes
-from server.checkpoints.service import CheckpointService
+from server.checkpoints.service import CheckpointService, Rest
 from server.paging import WindowDep
 from server.problems import NOT_FOUND, Responses
 from server.security.permissions import view
@@ -41,16 +42,36 @@ def list_checkpoints(
     responses=NOT_FOUND | _ZIP,
     dependencies=[view("checkpoint_id")],
 )
-async def download_checkpoint(checkpoint_id: str, service: CheckpointServiceDep, services: ServicesDep) -> StreamingResponse:
-    """The archive: weights as safetensors, manifest as JSON, and the state to resume."""
+async def download_checkpoint(
+    checkpoint_id: str,
+    service: CheckpointServiceDep,
+    services: ServicesDep,
+    wanted: Annotated[str | None, Header(alias="Range", max_length=100)] = None,
+    only_if: Annotated[str | None, Header(alias="If-Range", max_length=100)] = None,
+) -> StreamingResponse:
+    """The archive: weights as safetensors, manifest as JSON, and the state to resume.
+
+    `ETag` is its SHA-256. With that as `If-Range` and `Range: bytes=N-` a download that broke off goes on.
+    """
     lane = services.lanes.downloads
-    download = await lane.run(service.take_home, checkpoint_id)
+    download = await lane.run(service.take_home, checkpoint_id, _rest(wanted, only_if))
+    archive, start = download.archive, download.start
     headers = {
-        "Content-Disposition": f'attachment; filename="{download.archive.file_name}"',
-        "Content-Length": str(download.archive.size),
-        "ETag": f'"{download.archive.sha256}"',
+        "Content-Disposition": f'attachment; filename="{archive.file_name}"',
+        "Content-Length": str(archive.size - start),
+        "ETag": f'"{archive.sha256}"',
+        "Accept-Ranges": "bytes",
     }
-    return StreamingResponse(lane.each(download.blocks), media_type="application/zip", headers=headers)
+    if start:
+        headers["Content-Range"] = f"bytes {start}-{archive.size - 1}/{archive.size}"
+    blocks = lane.each(download.blocks)
+    return StreamingResponse(blocks, 206 if start else 200, media_type="application/zip", headers=headers)
+
+
+def _rest(wanted: str | None, only_if: str | None) -> Rest | None:
+    """From which byte on; all of it where anything else is asked for, as RFC 9110 (14.2) allows."""
+    match = re.fullmatch(r"bytes=(\d{1,15})-", wanted or "")
+    return Rest(int(match[1]), only_if.strip('"')) if match and only_if else None
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])

@@ -27,10 +27,19 @@ class Described:
 
 @dataclass(frozen=True)
 class Download:
-    """An archive on its way out."""
+    """An archive on its way out, from byte `start` on."""
 
     archive: Described
+    start: int
     blocks: Iterator[bytes]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What a client wants that has the first `start` bytes of an archive with the SHA-256 `of`."""
+
+    start: int
+    of: str
 
 
 class CheckpointService:
@@ -91,13 +100,19 @@ class CheckpointService:
             file_name = f"mapless-{_slug(run.experiment.name)}-seed{run.seed}-step{checkpoint.step}.zip"
         return Described(file_name, checkpoint.size, checkpoint.sha256)
 
-    def take_home(self, checkpoint_id: str) -> Download:
-        """`download`, for a person: who took what home is kept.
+    def take_home(self, checkpoint_id: str, rest: Rest | None = None) -> Download:
+        """An archive for a person: who took what home is kept.
+
+        Args:
+            checkpoint_id: which.
+            rest: all that is wanted, if the client has the beginning.
 
         Raises:
             NotFoundError: there is no such checkpoint, or its file is gone.
         """
-        return Download(self.taken_home(checkpoint_id), self._services.files.read(checkpoint_id))
+        archive = self.taken_home(checkpoint_id)
+        start = rest.start if rest is not None and rest.of == archive.sha256 and rest.start < archive.size else 0
+        return Download(archive, start, self._services.files.read(checkpoint_id, start))
 
     def taken_home(self, checkpoint_id: str) -> Described:
         """`described`, for a person who takes what is made of it home.

@@ -282,6 +282,8 @@ export interface paths {
         /**
          * Download Bundle
          * @description All that it takes to drive a robot: ONNX, manifest, NumPy runner, ROS 2 package; compared with torch.
+         *
+         *     `ETag` is its SHA-256.
          */
         get: operations["download_bundle_api_checkpoints__checkpoint_id__bundle_get"];
         put?: never;
@@ -302,6 +304,8 @@ export interface paths {
         /**
          * Download Checkpoint
          * @description The archive: weights as safetensors, manifest as JSON, and the state to resume.
+         *
+         *     `ETag` is its SHA-256. With that as `If-Range` and `Range: bytes=N-` a download that broke off goes on.
          */
         get: operations["download_checkpoint_api_checkpoints__checkpoint_id__download_get"];
         put?: never;
@@ -9502,7 +9506,10 @@ export interface operations {
     download_checkpoint_api_checkpoints__checkpoint_id__download_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                "If-Range"?: string | null;
+                Range?: string | null;
+            };
             path: {
                 checkpoint_id: string;
             };

@@ -1,0 +1,5 @@
+"""`python -m mapless_client`."""
+
+from mapless_client.command import main
+
+main()

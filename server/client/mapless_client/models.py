@@ -1,0 +1,213 @@
+"""What the server answers, as far as a program needs it. What a newer server says besides is left out.
+
+Times are seconds since the epoch, rates 0 to 1; intervals are those of 95 %.
+"""
+
+from typing import Any, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict
+
+RunState: TypeAlias = Literal["queued", "running", "stopping", "stopped", "completed", "failed"]
+ENDED: frozenset[RunState] = frozenset({"stopped", "completed", "failed"})
+Json: TypeAlias = dict[str, Any]
+
+
+class Model(BaseModel):
+    """Base of all answers."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class Estimate(Model):
+    """A measured number with its interval, over `unit`: all seeds that one could train, or one policy's episodes."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    seeds: int
+    episodes: int
+    per_seed: list[float]
+
+
+class SeedMean(Model):
+    """A mean over runs; its interval is None for one run."""
+
+    value: float
+    low: float | None
+    high: float | None
+    runs: int
+
+
+class ListedExperiment(Model):
+    """A training in the list. `runs` is how many it has, `progress` over all of them."""
+
+    id: str
+    project_id: str
+    name: str
+    created_at: float
+    arena: str
+    robot: str
+    algorithm: str
+    network: str
+    state: RunState | Literal["mixed"]
+    runs: int
+    progress: float
+    seconds_left: float | None
+    success: Estimate | None
+    tags: list[str]
+    starred: bool
+    archived: bool
+    settings: dict[str, float | str]
+    metrics: dict[str, SeedMean]
+
+
+class Run(Model):
+    """One seed's training. `step` counts environment steps; `error` says why it failed."""
+
+    id: str
+    experiment_id: str
+    seed: int
+    state: RunState
+    attempt: int
+    step: int
+    total_steps: int
+    steps_per_second: float | None
+    seconds_left: float | None
+    success_rate: float | None
+    eval_success_rate: float | None
+    worker: str | None
+    error: str | None
+    created_at: float
+    started_at: float | None
+    finished_at: float | None
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more happens to it by itself."""
+        return self.state in ENDED
+
+
+class Experiment(Model):
+    """One configuration x several seeds; `training` is the configuration as the launch form's JSON."""
+
+    id: str
+    project_id: str
+    name: str
+    created_at: float
+    training: Json
+    state: RunState | Literal["mixed"]
+    runs: list[Run]
+    success: Estimate | None
+
+    @property
+    def ended(self) -> bool:
+        """Whether all of its runs have."""
+        return all(run.ended for run in self.runs)
+
+
+class RunEvent(Model):
+    """A line of a run's event log."""
+
+    id: int
+    at: float
+    step: int
+    level: str
+    message: str
+
+
+class Evaluation(Model):
+    """A checkpoint on a suite. Only those of one `suite_hash` may be compared."""
+
+    suite: str
+    suite_hash: str
+    episodes: int
+    arrivals: int
+    success: Estimate
+    steps_mean: float | None
+    reward_mean: float
+
+
+class Checkpoint(Model):
+    """A policy at a step of a run; `size` in bytes, `best` of its run."""
+
+    id: str
+    step: int
+    size: int
+    sha256: str
+    created_at: float
+    damaged: bool
+    best: bool
+    evaluation: Evaluation | None
+
+
+class Evidence(Model):
+    """A number behind a diagnosis: of a curve, None where it is not finite; and what a healthy run has."""
+
+    metric: str
+    value: float | None
+    expected: str
+
+
+class Diagnosis(Model):
+    """Something that is wrong with a run, and what to try, the most promising first."""
+
+    id: str
+    severity: Literal["warning", "error"]
+    title: str
+    explanation: str
+    evidence: list[Evidence]
+    advice: list[str]
+    step: int
+
+
+class Diagnoses(Model):
+    """What a run's curves say about it; `diagnoses` is empty for a healthy one."""
+
+    run_id: str
+    step: int
+    diagnoses: list[Diagnosis]
+
+
+class ComparedExperiment(Model):
+    """A training's final figures, over the last evaluated checkpoint of each of its runs."""
+
+    id: str
+    name: str
+    seeds: int
+    episodes: int
+    suite: str | None
+    suite_hash: str | None
+    success: Estimate | None
+    steps_per_target: Estimate | None
+    reward: Estimate | None
+
+
+class Difference(Model):
+    """A setting in which trainings differ: one value each, in their order."""
+
+    path: str
+    values: list[Any]
+
+
+class ComparisonVerdict(Model):
+    """What may be said of a training beside the first one; `difference` is other less base."""
+
+    measure: str
+    base: str
+    other: str
+    word: str
+    difference: float | None
+    low: float | None
+    high: float | None
+    margin: float
+    reason: str
+
+
+class Comparison(Model):
+    """Trainings side by side, in the order asked for."""
+
+    experiments: list[ComparedExperiment]
+    verdicts: list[ComparisonVerdict]
+    differences: list[Difference]
+    warnings: list[str]
