@@ -25,6 +25,7 @@ from server.exports import endpoints as exports
 from server.files import FileStore
 from server.jobs import endpoints as jobs
 from server.jobs.results import ResultStore
+from server.leaderboards import endpoints as leaderboards
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.monitoring import endpoints as monitoring
@@ -82,6 +83,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     worker_jobs.router,
     jobs.router,
     evaluations.router,
+    leaderboards.router,
     monitoring.router,
 )
 

@@ -12,13 +12,13 @@ worker                                            server
   | POST  /jobs/{id}/end         JobEnd          ---> |
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field, TypeAdapter, model_validator
 
-from sim.config import AnyArenaConfig, Frozen, TaskConfig
+from sim.config import AnyArenaConfig, ArenaFile, Frozen, TaskConfig
 from workers.protocol import Text, WorkerName
-from workers.reporting import WatchRequest
+from workers.reporting import EvaluationResult, Figure, WatchRequest
 
 JobKind = Literal["view", "replay", "export", "evaluate"]
 """What may be asked for; those that somebody waits for come first."""
@@ -31,6 +31,12 @@ FRAME_LENGTH_BYTES = 4
 """Of the number before each frame, little-endian."""
 MAX_FRAMES_BYTES = 4 * 2**20
 """Of the frames in one request."""
+
+
+MAX_WAY_POINTS = 64
+"""Of the line that shows where a robot drove."""
+Point = tuple[Figure, Figure]
+"""x and y, metres."""
 
 
 class CheckpointPolicy(Frozen):
@@ -48,11 +54,22 @@ class ShippedPolicyName(Frozen):
 
 
 class BaselineName(Frozen):
-    """A controller that needs no training, with the robot of `task`."""
+    """A controller that needs no training, by the name that it has in tables (`sim.baselines.named.TABLED`).
+
+    It drives the robot of `task`; without one the robot that the suite's rules ask for, or the default one.
+    """
 
     source: Literal["baseline"] = "baseline"
-    name: Literal["random", "go-to-goal", "dynamic window"]
-    task: TaskConfig = TaskConfig()
+    name: Literal[
+        "random",
+        "go-to-goal",
+        "dynamic window",
+        "VFH+",
+        "MPPI",
+        "mapping, A* and dynamic window",
+        "ORCA, told where people are",
+    ]
+    task: TaskConfig | None = None
 
 
 ArchivedPolicy = Annotated[CheckpointPolicy | ShippedPolicyName, Field(discriminator="source")]
@@ -79,6 +96,8 @@ class OwnSuite(Frozen):
     by: Literal["own"] = "own"
 
 
+OWN_SUITE = OwnSuite()
+
 SuiteChoice = Annotated[NamedSuite | ArenaSuite | OwnSuite, Field(discriminator="by")]
 
 
@@ -93,8 +112,8 @@ class ReplayJob(Frozen):
     """Drive an evaluation again, and record what every robot did (`workers.replays.recording`)."""
 
     kind: Literal["replay"] = "replay"
-    policy: ArchivedPolicy
-    suite: str | None = None
+    policy: AnyPolicy
+    suite: SuiteChoice = OWN_SUITE
 
 
 class ExportJob(Frozen):
@@ -105,15 +124,48 @@ class ExportJob(Frozen):
 
 
 class EvaluateJob(Frozen):
-    """A policy on a suite; the file is an `EvaluationResult` as JSON."""
+    """A policy on a suite; the file is a `Measurement` as JSON."""
 
     kind: Literal["evaluate"] = "evaluate"
     policy: AnyPolicy
-    suite: SuiteChoice = OwnSuite()
+    suite: SuiteChoice = OWN_SUITE
 
 
 JobSpec = Annotated[ViewJob | ReplayJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
 JOB_SPEC: TypeAdapter[ViewJob | ReplayJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
+
+
+class Measurement(Frozen):
+    """What comes out of an evaluation that was asked for.
+
+    Attributes:
+        result: how every episode ended.
+        task: robot, LiDAR and limits that were driven with; the arenas are the suite's.
+        arenas: the suite's, to draw.
+        arena_indices: (S,) the arena of each episode.
+        targets: (S,) x and y of each, metres.
+        ways: (S,) where each robot drove: up to `MAX_WAY_POINTS` points x, y from its start to its end, metres.
+        jerks: (S,) mean size of the jerk along each robot's heading, m/s3; 0 for episodes of fewer than three steps.
+    """
+
+    result: EvaluationResult
+    task: TaskConfig
+    arenas: tuple[ArenaFile, ...] = Field(min_length=1)
+    arena_indices: tuple[int, ...]
+    targets: tuple[Point, ...]
+    ways: tuple[tuple[Point, ...], ...]
+    jerks: tuple[Figure, ...]
+
+    @model_validator(mode="after")
+    def _one_each(self) -> Self:
+        lengths = {len(self.result.episodes), *map(len, (self.arena_indices, self.targets, self.ways, self.jerks))}
+        if len(lengths) > 1:
+            raise ValueError("every episode has one arena, one target, one way and one jerk")
+        if not all(0 <= index < len(self.arenas) for index in self.arena_indices):
+            raise ValueError("an episode's arena is not among the arenas")
+        if any(len(way) > MAX_WAY_POINTS for way in self.ways):
+            raise ValueError(f"a way has at most {MAX_WAY_POINTS} points")
+        return self
 
 
 class JobClaimRequest(Frozen):

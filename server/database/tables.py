@@ -444,8 +444,8 @@ class PolicyEvaluation(Base):
     title: Mapped[str] = mapped_column(String(200))
     policy: Mapped[dict[str, Any]] = mapped_column(JSON)
     choice: Mapped[dict[str, Any]] = mapped_column(JSON)
-    # Of the policy's task, metres.
-    arrival_distance: Mapped[float] = mapped_column(Float)
+    # Of its policy, where it is a run's; no foreign key: what was measured stays.
+    checkpoint_id: Mapped[str | None] = mapped_column(String(16), index=True)
     created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
     # Why there will be no figures.
     error: Mapped[str | None] = mapped_column(Text)
@@ -453,5 +453,8 @@ class PolicyEvaluation(Base):
     suite: Mapped[str | None] = mapped_column(String(64))
     suite_hash: Mapped[str | None] = mapped_column(String(64), index=True)
     figures: Mapped[dict[str, Any] | None] = mapped_column(JSON)
-    # Zlib-compressed JSON, as of `Evaluation`.
+    # What was driven with: robot, LiDAR and limits.
+    task: Mapped[dict[str, Any] | None] = mapped_column(JSON, deferred=True)
+    # Zlib-compressed JSON, as of `Evaluation`; and of where the robots drove (`workers.job_protocol.Measurement`).
     episodes: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    ways: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)

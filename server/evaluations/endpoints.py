@@ -1,42 +1,74 @@
 """Routes of evaluations that people ask for."""
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Query
 
 from server.evaluations import service
-from server.evaluations.schemas import AskedEpisodes, AskedEvaluation, AskedEvaluationPage, EvaluationRequest
+from server.evaluations.repository import Wanted
+from server.evaluations.schemas import (
+    AskedEpisodes,
+    AskedEvaluation,
+    AskedEvaluationPage,
+    EvaluationRequest,
+    EvaluationWays,
+)
 from server.paging import WindowDep
 from server.problems import BUSY, CONFLICT, NOT_FOUND
-from server.security.permissions import ADMINISTRATE
+from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
+from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 
 router = APIRouter(prefix="/api/evaluations", tags=["evaluations"])
 
 
-@router.post("", status_code=202, responses=NOT_FOUND | BUSY, dependencies=[ADMINISTRATE])
-def ask_for_evaluation(request: EvaluationRequest, services: ServicesDep) -> AskedEvaluation:
-    """Measure a policy on a suite; a worker does it, and the answer says where it stands."""
-    return service.ask(services, request)
+@router.post("", status_code=202, responses=NOT_FOUND | BUSY, dependencies=[LAUNCH])
+def ask_for_evaluations(request: EvaluationRequest, services: ServicesDep, principal: PrincipalDep) -> list[AskedEvaluation]:
+    """Measure policies on suites, each on every one; workers do it, and the answers say where they stand."""
+    return service.ask(services, request, principal)
 
 
-@router.get("", dependencies=[ADMINISTRATE])
-def list_evaluations(window: WindowDep, services: ServicesDep) -> AskedEvaluationPage:
+@router.get("", dependencies=[SIGNED_IN])
+def list_evaluations(
+    window: WindowDep,
+    services: ServicesDep,
+    principal: PrincipalDep,
+    suite_hash: Annotated[str | None, Query(max_length=64)] = None,
+    run: Annotated[str | None, Query(max_length=64, description="Of that run's policies only.")] = None,
+) -> AskedEvaluationPage:
     """Some of the evaluations that were asked for, the newest first."""
-    return service.some(services, window)
+    return service.some(services, window, Wanted(principal.visible, suite_hash, run))
 
 
-@router.get("/{evaluation_id}", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
+@router.get("/{evaluation_id}", responses=NOT_FOUND, dependencies=[view("evaluation_id")])
 def get_evaluation(evaluation_id: str, services: ServicesDep) -> AskedEvaluation:
     """One of them, with its progress and the time that is left."""
     return service.one(services, evaluation_id)
 
 
-@router.get("/{evaluation_id}/episodes", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
+@router.get("/{evaluation_id}/episodes", responses=NOT_FOUND, dependencies=[view("evaluation_id")])
 def list_evaluation_episodes(evaluation_id: str, services: ServicesDep) -> AskedEpisodes:
     """Every episode behind its figures, in the suite's order."""
     return service.episodes(services, evaluation_id)
 
 
-@router.delete("/{evaluation_id}", status_code=204, responses=NOT_FOUND | CONFLICT, dependencies=[ADMINISTRATE])
+@router.get("/{evaluation_id}/ways", responses=NOT_FOUND, dependencies=[view("evaluation_id")])
+def list_evaluation_ways(
+    evaluation_id: str,
+    services: ServicesDep,
+    arena: Annotated[int | None, Query(ge=0, le=100_000, description="Null for that with the lowest success.")] = None,
+) -> EvaluationWays:
+    """Where its robots drove in one of the suite's arenas."""
+    return service.ways(services, evaluation_id, arena)
+
+
+@router.post("/{evaluation_id}/cancel", responses=NOT_FOUND, dependencies=[edit("evaluation_id")])
+def cancel_evaluation(evaluation_id: str, services: ServicesDep) -> AskedEvaluation:
+    """Call it off; one that has ended stays as it is."""
+    return service.cancel(services, evaluation_id)
+
+
+@router.delete("/{evaluation_id}", status_code=204, responses=NOT_FOUND | CONFLICT, dependencies=[edit("evaluation_id")])
 def delete_evaluation(evaluation_id: str, services: ServicesDep) -> None:
     """Forget one that has ended."""
     service.delete(services, evaluation_id)

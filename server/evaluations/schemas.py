@@ -1,18 +1,40 @@
 """Evaluations that people ask for, in JSON."""
 
-from pydantic import Field
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
 
 from server.database.tables import JobState
 from server.schemas import Estimate, Page, Schema
-from workers.job_protocol import AnyPolicy, OwnSuite, SuiteChoice
-from workers.reporting import EpisodeResult
+from sim.config import ArenaFile
+from workers.job_protocol import OWN_SUITE, AnyPolicy, SuiteChoice
+from workers.reporting import EpisodeResult, Outcome
+
+MAX_AT_ONCE = 100
+"""Evaluations that one request may ask for."""
+
+
+class TrainingPolicies(Schema):
+    """The best checkpoint of each run of a training."""
+
+    source: Literal["training"]
+    id: str = Field(min_length=1, max_length=64)
 
 
 class EvaluationRequest(Schema):
-    """Which policy is to be measured on which suite."""
+    """Which policies are to be measured, each on every one of the suites."""
 
-    policy: AnyPolicy
-    suite: SuiteChoice = OwnSuite()
+    policies: list[AnyPolicy | TrainingPolicies] = Field(min_length=1, max_length=MAX_AT_ONCE)
+    suites: list[SuiteChoice] = Field([OWN_SUITE], min_length=1, max_length=MAX_AT_ONCE)
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if (wanted := len(self.policies) * len(self.suites)) > MAX_AT_ONCE:
+            raise ValueError(
+                f"{len(self.policies)} policies on {len(self.suites)} suites are {wanted} evaluations: "
+                f"ask for at most {MAX_AT_ONCE} at once"
+            )
+        return self
 
 
 class EvaluationFigures(Schema):
@@ -22,9 +44,14 @@ class EvaluationFigures(Schema):
     success: Estimate
     collision: float
     timeout: float
-    spl: float = Field(description="Success weighted by path length.")
+    spl: float = Field(description="Success weighted by path length (Anderson et al. 2018).")
+    worst_tenth_spl: float = Field(description="The same over the tenth of the episodes that did worst.")
     steps: float | None = Field(description="Control steps of the episodes that arrived; null where none did.")
+    seconds: float | None = Field(description="Of simulated time, of the episodes that arrived; null where none did.")
+    path_length: float | None = Field(description="Metres, of the episodes that arrived; null where none did.")
     min_clearance: float = Field(description="Mean of the episodes' smallest distance to anything else, metres.")
+    jerk: float = Field(description="Mean size of the jerk along the heading, m/s3.")
+    reward: float = Field(description="By the policy's own reward, mean of the episodes' sums.")
 
 
 class AskedEvaluation(Schema):
@@ -34,6 +61,7 @@ class AskedEvaluation(Schema):
     title: str = Field(description="Of the policy.")
     policy: AnyPolicy
     choice: SuiteChoice
+    run_id: str | None = Field(description="Of its policy, where that is a run's and is still there.")
     created_at: float
     job_id: str
     state: JobState
@@ -55,3 +83,30 @@ class AskedEpisodes(Schema):
     suite: str | None
     suite_hash: str | None
     episodes: tuple[EpisodeResult, ...]
+
+
+class Way(Schema):
+    """Where a robot drove in one of the episodes."""
+
+    episode: int = Field(description="Its place in the suite, from 0.")
+    outcome: Outcome
+    target: tuple[float, float] = Field(description="x and y, metres.")
+    points: tuple[tuple[float, float], ...] = Field(description="x and y from its start to its end, metres.")
+
+
+class PlaceSuccess(Schema):
+    """How many of the episodes in one of the suite's arenas arrived."""
+
+    arena: int = Field(description="Its place among the suite's arenas, from 0.")
+    name: str
+    episodes: int
+    arrivals: int
+
+
+class EvaluationWays(Schema):
+    """Where the robots drove in one of the suite's arenas."""
+
+    places: list[PlaceSuccess] = Field(description="All arenas of the suite, the worst first.")
+    arena: int = Field(description="The one that is drawn here.")
+    geometry: ArenaFile
+    ways: list[Way]

@@ -1,75 +1,95 @@
-"""What a person may do with evaluations: ask for one, look at it, delete it."""
+"""What a person may do with evaluations: ask for some, look at them, call them off, delete them."""
 
 import hashlib
 
 from pydantic import TypeAdapter
+from sqlalchemy.orm import Session
 
 from server.database import tables
-from server.errors import ConflictError, NotFoundError, UnusableArenaError
-from server.estimates import success_estimate
-from server.evaluations.repository import PolicyEvaluationRepository, episodes_of
+from server.errors import ConflictError, InvalidRequestError, NotFoundError, UnusableArenaError
+from server.evaluations.repository import PolicyEvaluationRepository, Wanted, episodes_of
 from server.evaluations.schemas import (
+    MAX_AT_ONCE,
     AskedEpisodes,
     AskedEvaluation,
     AskedEvaluationPage,
     EvaluationFigures,
     EvaluationRequest,
+    EvaluationWays,
 )
-from server.evaluations.subjects import measured
+from server.evaluations.subjects import Measured, measured, wanted_policies
+from server.evaluations.ways import ways_in
 from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.repository import OPEN, JobRepository
-from server.jobs.service import queue
+from server.jobs.service import JobService, queue
 from server.jobs.views import seconds_left
 from server.paging import Window
 from server.replays.simulator import simulator
+from server.replays.subject import Subject
+from server.security.principal import Principal
 from server.services import Services
-from sim.config import ImportedArenaConfig
-from workers.job_protocol import AnyPolicy, ArenaSuite, EvaluateJob, SuiteChoice
-from workers.shipped.figures import Figures
+from sim.config import ImportedArenaConfig, TaskConfig
+from workers.job_protocol import AnyPolicy, ArenaSuite, CheckpointPolicy, EvaluateJob, SuiteChoice
+from workers.reporting import EvaluationResult
 
 _POLICY: TypeAdapter[AnyPolicy] = TypeAdapter(AnyPolicy)
 _CHOICE: TypeAdapter[SuiteChoice] = TypeAdapter(SuiteChoice)
 
 
-def ask(services: Services, request: EvaluationRequest) -> AskedEvaluation:
-    """Put an evaluation into the queue; one that is measured, or under way, already is that one.
+def ask(services: Services, request: EvaluationRequest, principal: Principal) -> list[AskedEvaluation]:
+    """Put evaluations into the queue, all or none; one that is measured, or under way, already is that one.
 
     Raises:
-        NotFoundError: there is no such policy.
+        NotFoundError: there is no such policy, or it may not be seen.
         UnusableArenaError: the imported arena is not here.
+        InvalidRequestError: these are too many at once.
         BusyError: as many jobs wait as may.
     """
-    choice = _with_stored_arena(services, request.suite)
-    spec = EvaluateJob(policy=request.policy, suite=choice)
+    choices = [_with_stored_arena(services, suite) for suite in request.suites]
+    asked: list[AskedEvaluation] = []
     with services.database.write() as session:
-        subject = measured(session, request.policy)
-        key = f"evaluate-{_digest(spec, subject.sha256)}"
-        repository = PolicyEvaluationRepository(session)
-        evaluation = repository.alike(key)
-        if evaluation is None:
-            evaluation = tables.PolicyEvaluation(
-                id=new_id(),
-                job_id=queue(session, Asked(spec, key, subject.title, subject.sha256)),
-                key=key,
-                title=subject.title[:200],
-                policy=request.policy.model_dump(mode="json"),
-                choice=choice.model_dump(mode="json"),
-                arrival_distance=subject.task.arrival_distance,
+        policies = wanted_policies(session, request.policies, principal)
+        if len(policies) * len(choices) > MAX_AT_ONCE:
+            raise InvalidRequestError(
+                f"These are {len(policies) * len(choices)} evaluations, one for each run of a training: "
+                f"ask for at most {MAX_AT_ONCE} at once."
             )
-            session.add(evaluation)
-            session.flush()
-        job = session.get(tables.Job, evaluation.job_id)
+        for policy, subject in policies:
+            for choice in choices:
+                evaluation = _queued(session, subject, EvaluateJob(policy=policy, suite=choice))
+                job = session.get(tables.Job, evaluation.job_id)
+                asked.append(_view(services, evaluation, job, PolicyEvaluationRepository(session).run_of(evaluation)))
     services.board.ring()
-    return _view(services, evaluation, job)
+    return asked
 
 
-def some(services: Services, window: Window) -> AskedEvaluationPage:
+def _queued(session: Session, subject: Measured, spec: EvaluateJob) -> tables.PolicyEvaluation:
+    key = f"evaluate-{_digest(spec, subject.sha256)}"
+    evaluation = PolicyEvaluationRepository(session).alike(key)
+    if evaluation is None:
+        evaluation = tables.PolicyEvaluation(
+            id=new_id(),
+            job_id=queue(session, Asked(spec, key, subject.title, subject.sha256)),
+            key=key,
+            title=subject.title[:200],
+            policy=spec.policy.model_dump(mode="json"),
+            choice=spec.suite.model_dump(mode="json"),
+            checkpoint_id=spec.policy.id if isinstance(spec.policy, CheckpointPolicy) else None,
+        )
+        session.add(evaluation)
+        session.flush()
+    return evaluation
+
+
+def some(services: Services, window: Window, wanted: Wanted) -> AskedEvaluationPage:
     """Some of them, the newest first."""
     with services.database.read() as session:
-        rows, total = PolicyEvaluationRepository(session).page(window)
-        jobs = JobRepository(session).several([row.job_id for row in rows])
-    return AskedEvaluationPage(items=[_view(services, row, jobs.get(row.job_id)) for row in rows], total=total)
+        rows, total = PolicyEvaluationRepository(session).page(window, wanted)
+        jobs = JobRepository(session).several([row.job_id for row, _ in rows])
+    return AskedEvaluationPage(
+        items=[_view(services, row, jobs.get(row.job_id), run_id) for row, run_id in rows], total=total
+    )
 
 
 def one(services: Services, evaluation_id: str) -> AskedEvaluation:
@@ -79,9 +99,10 @@ def one(services: Services, evaluation_id: str) -> AskedEvaluation:
         NotFoundError: there is no such evaluation.
     """
     with services.database.read() as session:
-        evaluation = PolicyEvaluationRepository(session).get(evaluation_id)
-        job = session.get(tables.Job, evaluation.job_id)
-    return _view(services, evaluation, job)
+        repository = PolicyEvaluationRepository(session)
+        evaluation = repository.get(evaluation_id)
+        job, run_id = session.get(tables.Job, evaluation.job_id), repository.run_of(evaluation)
+    return _view(services, evaluation, job, run_id)
 
 
 def episodes(services: Services, evaluation_id: str) -> AskedEpisodes:
@@ -90,10 +111,57 @@ def episodes(services: Services, evaluation_id: str) -> AskedEpisodes:
     Raises:
         NotFoundError: there is no such evaluation.
     """
+    evaluation = _whole(services, evaluation_id)
+    return AskedEpisodes(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=episodes_of(evaluation))
+
+
+def ways(services: Services, evaluation_id: str, arena: int | None) -> EvaluationWays:
+    """Where its robots drove in one of the suite's arenas; the one with the lowest success where none is named.
+
+    Raises:
+        NotFoundError: there is no such evaluation, or no such arena, or it is not measured.
+    """
+    evaluation = _whole(services, evaluation_id)
+    if evaluation.ways is None:
+        raise NotFoundError("Where the robots drove is not known: it is not measured yet, or takes too much room to keep.")
+    return ways_in(evaluation.ways, episodes_of(evaluation), arena)
+
+
+def replayed(services: Services, evaluation_id: str) -> Subject:
+    """Whose episodes are to be driven again.
+
+    Raises:
+        NotFoundError: there is no such evaluation, or it is not measured.
+    """
+    evaluation = _whole(services, evaluation_id)
+    if evaluation.suite is None or evaluation.suite_hash is None or evaluation.task is None:
+        raise NotFoundError("This evaluation is not measured yet: it has no episodes.")
+    policy = _POLICY.validate_python(evaluation.policy)
     with services.database.read() as session:
-        evaluation = PolicyEvaluationRepository(session).get(evaluation_id, with_episodes=True)
-        found = episodes_of(evaluation)
-    return AskedEpisodes(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=found)
+        subject = measured(session, policy)
+    return Subject(
+        title=evaluation.title,
+        file_name=f"mapless-evaluation-{evaluation.id}.zip",
+        task=TaskConfig.model_validate(evaluation.task),
+        sha256=subject.sha256,
+        suite=_CHOICE.validate_python(evaluation.choice),
+        recorded=EvaluationResult(
+            suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=episodes_of(evaluation)
+        ),
+        policy=policy,
+    )
+
+
+def cancel(services: Services, evaluation_id: str) -> AskedEvaluation:
+    """Nobody wants it any more; one that has ended stays as it is.
+
+    Raises:
+        NotFoundError: there is no such evaluation.
+    """
+    asked = one(services, evaluation_id)
+    if asked.state in OPEN:
+        JobService(services).cancel(asked.job_id)
+    return one(services, evaluation_id)
 
 
 def delete(services: Services, evaluation_id: str) -> None:
@@ -107,11 +175,18 @@ def delete(services: Services, evaluation_id: str) -> None:
         evaluation = PolicyEvaluationRepository(session).get(evaluation_id)
         job = session.get(tables.Job, evaluation.job_id)
         if job is not None and job.state in OPEN:
-            raise ConflictError("This evaluation is under way: cancel its job first.")
+            raise ConflictError("This evaluation is under way: cancel it first.")
         session.delete(evaluation)
 
 
-def _view(services: Services, evaluation: tables.PolicyEvaluation, job: tables.Job | None) -> AskedEvaluation:
+def _whole(services: Services, evaluation_id: str) -> tables.PolicyEvaluation:
+    with services.database.read() as session:
+        return PolicyEvaluationRepository(session).get(evaluation_id, whole=True)
+
+
+def _view(
+    services: Services, evaluation: tables.PolicyEvaluation, job: tables.Job | None, run_id: str | None
+) -> AskedEvaluation:
     ended: tables.JobState = "done" if evaluation.suite is not None else "failed"
     is_open = job is not None and job.state in OPEN
     return AskedEvaluation(
@@ -119,6 +194,7 @@ def _view(services: Services, evaluation: tables.PolicyEvaluation, job: tables.J
         title=evaluation.title,
         policy=_POLICY.validate_python(evaluation.policy),
         choice=_CHOICE.validate_python(evaluation.choice),
+        run_id=run_id,
         created_at=evaluation.created_at,
         job_id=evaluation.job_id,
         state=ended if job is None else job.state,
@@ -127,23 +203,7 @@ def _view(services: Services, evaluation: tables.PolicyEvaluation, job: tables.J
         error=evaluation.error,
         suite=evaluation.suite,
         suite_hash=evaluation.suite_hash,
-        figures=_figures(evaluation),
-    )
-
-
-def _figures(evaluation: tables.PolicyEvaluation) -> EvaluationFigures | None:
-    if evaluation.figures is None:
-        return None
-    found = Figures.model_validate(evaluation.figures)
-    trained = evaluation.policy["source"] != "baseline"
-    return EvaluationFigures(
-        episodes=found.episodes,
-        success=success_estimate([found.arrivals], [found.episodes], trained=trained),
-        collision=found.collision,
-        timeout=found.timeout,
-        spl=found.spl,
-        steps=found.steps,
-        min_clearance=found.min_clearance,
+        figures=None if evaluation.figures is None else EvaluationFigures.model_validate(evaluation.figures),
     )
 
 

@@ -1,14 +1,17 @@
-"""What is measured: a policy's name for people, its archive's hash, and its task."""
+"""What is measured: a policy's name for people, its archive's hash, and whose it is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
 from server.checkpoints.repository import CheckpointRepository
-from server.experiments.stored import training_of
+from server.errors import NotFoundError
+from server.evaluations.schemas import TrainingPolicies
+from server.experiments.repository import ExperimentRepository
 from server.policies.service import find, shipped_hash
 from server.runs.repository import RunRepository
-from sim.config import TaskConfig
+from server.security.principal import Principal
 from workers.job_protocol import AnyPolicy, BaselineName, CheckpointPolicy
 
 
@@ -19,12 +22,42 @@ class Measured:
     Attributes:
         title: for people.
         sha256: of its archive; None for a baseline.
-        task: robot, LiDAR and limits.
+        project_id: whose it is; None for what is everybody's.
     """
 
     title: str
     sha256: str | None
-    task: TaskConfig
+    project_id: str | None = None
+
+
+def wanted_policies(
+    session: Session, policies: Sequence[AnyPolicy | TrainingPolicies], principal: Principal
+) -> list[tuple[AnyPolicy, Measured]]:
+    """What somebody wants to have measured: a training stands for the best checkpoint of each of its runs.
+
+    Raises:
+        NotFoundError: there is no such policy, or it may not be seen, or none of the training's runs has a checkpoint.
+    """
+    found: list[tuple[AnyPolicy, Measured]] = []
+    for policy in policies:
+        if isinstance(policy, TrainingPolicies):
+            best = _best_of(session, policy.id)
+            found += [(each, measured(session, each)) for each in best]
+        else:
+            found.append((policy, measured(session, policy)))
+    for policy, subject in found:
+        if subject.project_id is not None and principal.role_in(subject.project_id) is None:
+            raise NotFoundError.of("checkpoint", policy.id if isinstance(policy, CheckpointPolicy) else "")
+    return found
+
+
+def _best_of(session: Session, experiment_id: str) -> list[CheckpointPolicy]:
+    experiment = ExperimentRepository(session).get(experiment_id)
+    checkpoints = CheckpointRepository(session)
+    best = [found[0] for run in experiment.runs if (found := checkpoints.best(run.id)) is not None]
+    if not best:
+        raise NotFoundError(f"No run of “{experiment.name}” has an evaluated checkpoint yet.")
+    return [CheckpointPolicy(id=checkpoint.id) for checkpoint in best]
 
 
 def measured(session: Session, policy: AnyPolicy) -> Measured:
@@ -34,11 +67,11 @@ def measured(session: Session, policy: AnyPolicy) -> Measured:
         NotFoundError: there is no such policy.
     """
     if isinstance(policy, BaselineName):
-        return Measured(policy.name, None, policy.task)
+        return Measured(policy.name, None)
     if isinstance(policy, CheckpointPolicy):
         checkpoint = CheckpointRepository(session).get(policy.id)
         run = RunRepository(session).get(checkpoint.run_id)
         title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
-        return Measured(title, checkpoint.sha256, training_of(run.experiment).task)
+        return Measured(title, checkpoint.sha256, run.experiment.project_id)
     shipped = find(policy.name)
-    return Measured(shipped.card.title, shipped_hash(policy.name), shipped.card.training.task)
+    return Measured(shipped.card.title, shipped_hash(policy.name))

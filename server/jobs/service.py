@@ -35,8 +35,9 @@ from workers.job_protocol import (
     JobEnd,
     JobKind,
     JobSpec,
+    Measurement,
+    ReplayJob,
 )
-from workers.reporting import EvaluationResult
 
 logger = logging.getLogger(__name__)
 
@@ -212,7 +213,7 @@ class JobService:
                     _lose(session, job, end.error or "Its process died.", self.board.workers())
         self._told(job)
 
-    def evaluated(self, job_id: str, attempt: int, result: EvaluationResult) -> None:
+    def evaluated(self, job_id: str, attempt: int, measurement: Measurement) -> None:
         """Keep what came out of an evaluation.
 
         Raises:
@@ -220,7 +221,7 @@ class JobService:
         """
         with self._services.database.write() as session:
             job = _unfenced(session.get(tables.Job, job_id), job_id, attempt)
-            PolicyEvaluationRepository(session).measured(job.id, result)
+            PolicyEvaluationRepository(session).measured(job.id, measurement)
 
     # -- the sweeper ------------------------------------------------------------------------------------------------------
 
@@ -321,7 +322,7 @@ def _with_geometry(spec: JobSpec, arenas: ArenaStore) -> JobSpec:
     Raises:
         NotFoundError: the arena's file is gone.
     """
-    if not isinstance(spec, EvaluateJob) or not isinstance(spec.suite, ArenaSuite):
+    if not isinstance(spec, EvaluateJob | ReplayJob) or not isinstance(spec.suite, ArenaSuite):
         return spec
     arena = spec.suite.arena
     if not isinstance(arena, ImportedArenaConfig) or arena.arena is not None:

@@ -86,6 +86,18 @@ class ProjectRepository:
         row = tables.Experiment
         return self._grouped(select(row.campaign, row.project_id).where(row.campaign.in_(campaign_ids)).distinct())
 
+    def of_evaluations(self, evaluation_ids: Collection[str]) -> dict[str, set[str]]:
+        """The project of each of the evaluations that there are; none where its policy is everybody's.
+
+        That of a checkpoint that was deleted is in a project that nobody is in.
+        """
+        row = tables.PolicyEvaluation
+        query = select(row.id, row.checkpoint_id, tables.Experiment.project_id).where(row.id.in_(evaluation_ids))
+        query = query.outerjoin(tables.Checkpoint, tables.Checkpoint.id == row.checkpoint_id)
+        query = query.outerjoin(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
+        query = query.outerjoin(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+        return {each[0]: set() if each[1] is None else {each[2] or ""} for each in self._session.execute(query)}
+
     def _grouped(self, query: Select[Any, Any]) -> dict[str, set[str]]:
         found: dict[str, set[str]] = {}
         for identifier, project_id in self._session.execute(query):

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
+from server.evaluations.service import replayed
 from server.live.page import HEADERS
 from server.problems import NOT_FOUND, REPLAY_FAILED
 from server.replays import service
@@ -23,6 +24,10 @@ _DOWNLOAD = "download"
 
 def _checkpoint(checkpoint_id: str, services: ServicesDep) -> Subject:
     return checkpoint_subject(services, checkpoint_id)
+
+
+def _evaluation(evaluation_id: str, services: ServicesDep) -> Subject:
+    return replayed(services, evaluation_id)
 
 
 class Player:
@@ -46,6 +51,7 @@ class Player:
 
 
 PlayerDep = Annotated[Player, Depends()]
+EvaluationDep = Annotated[Subject, Depends(_evaluation)]
 CheckpointDep = Annotated[Subject, Depends(_checkpoint)]
 PolicyDep = Annotated[Subject, Depends(policy_subject)]
 
@@ -73,12 +79,34 @@ async def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int,
 
 
 @router.get(
+    "/api/evaluations/{evaluation_id}/replays/{episode}",
+    responses=NOT_FOUND | REPLAY_FAILED,
+    dependencies=[view("evaluation_id")],
+)
+async def replay_evaluation(evaluation_id: str, subject: EvaluationDep, episode: int, services: ServicesDep) -> Replay:
+    """Drive an episode of an evaluation again: a few seconds for the first one, then at once."""
+    page = f"/replays/evaluations/{evaluation_id}/{episode}/"
+    service.check_episode(subject, episode)
+    return service.prepared(subject, await recording_of(services, subject), episode, page)
+
+
+@router.get(
     "/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False, dependencies=[view("checkpoint_id")]
 )
 async def play_checkpoint(
     request: Request, subject: CheckpointDep, episode: int, theme: Theme, player: PlayerDep
 ) -> Response:
     """The player of an episode of a checkpoint's evaluation."""
+    return await player(request, subject, episode, theme)
+
+
+@router.get(
+    "/replays/evaluations/{evaluation_id}/{episode}/{theme}/", include_in_schema=False, dependencies=[view("evaluation_id")]
+)
+async def play_evaluation(
+    request: Request, subject: EvaluationDep, episode: int, theme: Theme, player: PlayerDep
+) -> Response:
+    """The player of an episode of an evaluation."""
     return await player(request, subject, episode, theme)
 
 

@@ -46,7 +46,7 @@ async def recording_of(services: Services, subject: Subject) -> Recording:
 
 def recording_key(subject: Subject) -> str:
     """Says what decides how the episodes go: policy, suite, and what drives."""
-    return f"{subject.sha256[:32]}-{subject.recorded.suite_hash[:16]}-{simulator()}"
+    return f"{subject.identity[:32]}-{subject.recorded.suite_hash[:16]}-{simulator()}"
 
 
 def _load(path: Path) -> Recording | None:

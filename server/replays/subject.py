@@ -1,9 +1,10 @@
 """Whose episodes are replayed, and what was recorded of them."""
 
+import hashlib
 from dataclasses import dataclass
 
 from sim.config import TaskConfig
-from workers.job_protocol import ArchivedPolicy
+from workers.job_protocol import AnyPolicy, SuiteChoice
 from workers.reporting import EvaluationResult
 
 
@@ -15,8 +16,8 @@ class Subject:
         title: of the policy, for people.
         file_name: of its archive, for a browser.
         task: robot, LiDAR and limits; the arenas are the suite's.
-        sha256: of its archive.
-        suite: by name, where it is not that of its own task.
+        sha256: of its archive; None for a baseline.
+        suite: which one, as a worker finds it.
         recorded: how its episodes ended when they counted.
         policy: where a worker gets it from.
     """
@@ -24,7 +25,12 @@ class Subject:
     title: str
     file_name: str
     task: TaskConfig
-    sha256: str
-    suite: str | None
+    sha256: str | None
+    suite: SuiteChoice
     recorded: EvaluationResult
-    policy: ArchivedPolicy
+    policy: AnyPolicy
+
+    @property
+    def identity(self) -> str:
+        """Hexadecimal digits of what drives: an archive's bytes, or a baseline's name and robot."""
+        return self.sha256 or hashlib.sha256(self.policy.model_dump_json().encode()).hexdigest()

@@ -9,7 +9,7 @@ from server.replays.subject import Subject
 from server.runs.repository import RunRepository
 from server.services import Services
 from workers.errors import UnknownPolicyError
-from workers.job_protocol import CheckpointPolicy, ShippedPolicyName
+from workers.job_protocol import OWN_SUITE, CheckpointPolicy, NamedSuite, ShippedPolicyName
 
 
 def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
@@ -27,7 +27,7 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
         training = training_of(run.experiment)
     archive = CheckpointService(services).described(checkpoint_id)
     return Subject(
-        title, archive.file_name, training.task, archive.sha256, None, recorded, CheckpointPolicy(id=checkpoint_id)
+        title, archive.file_name, training.task, archive.sha256, OWN_SUITE, recorded, CheckpointPolicy(id=checkpoint_id)
     )
 
 
@@ -47,7 +47,7 @@ def policy_subject(name: str, suite: str) -> Subject:
         file_name=f"mapless-{name}.zip",
         task=policy.card.training.task,
         sha256=shipped_hash(name),
-        suite=suite,
+        suite=NamedSuite(name=suite),
         recorded=recorded,
         policy=ShippedPolicyName(name=name),
     )

@@ -122,6 +122,7 @@ _OF: dict[str, tuple[str, _Find]] = {
     "checkpoint_id": ("checkpoint", ProjectRepository.of_checkpoints),
     "campaign_id": ("campaign", ProjectRepository.of_campaigns),
     "campaign": ("campaign", ProjectRepository.of_campaigns),
+    "evaluation_id": ("evaluation", ProjectRepository.of_evaluations),
 }
 
 
@@ -156,9 +157,11 @@ class InProject(Permission):
         with services.database.read() as session:
             found = self._find(ProjectRepository(session), identifiers)
         for identifier in identifiers:
-            projects = found.get(identifier, set())
-            if not projects or any(principal.role_in(project) is None for project in projects):
+            projects = found.get(identifier)
+            if projects is None or any(principal.role_in(project) is None for project in projects):
                 raise NotFoundError.of(self._kind, identifier)
+            if not projects and not principal.has_anywhere(self._role):
+                raise ForbiddenError(f"This takes the role {self._role} in some project.")
             for project in projects:
                 principal.require(self._role, project)
 

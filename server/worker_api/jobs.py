@@ -17,9 +17,8 @@ from server.jobs.service import JobService
 from server.security.permissions import WORK
 from server.services import Services, ServicesDep
 from server.worker_api.errors import MalformedUploadError
-from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport
+from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport, Measurement
 from workers.protocol import MAX_INTEGER
-from workers.reporting import EvaluationResult
 
 router = APIRouter(prefix="/api/worker/jobs", tags=["worker"], include_in_schema=False)
 
@@ -138,10 +137,10 @@ async def end_job(job_id: str, attempt: AttemptQuery, body: JobEnd, service: Job
 
 def _keep_evaluation(services: Services, job_id: str, attempt: int, data: bytes) -> None:
     try:
-        result = EvaluationResult.model_validate_json(data)
+        measurement = Measurement.model_validate_json(data)
     except ValidationError as error:
         raise MalformedUploadError(f"This is no evaluation: {error.errors()[0]['msg']}") from error
-    JobService(services).evaluated(job_id, attempt, result)
+    JobService(services).evaluated(job_id, attempt, measurement)
 
 
 async def _until_gone(request: Request) -> None:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from sim.arenas.build import pooled_arena
 from sim.arenas.families import SUITE_SEEDS
 from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, ArenaPool, ImportedArenaConfig, TaskConfig
 from sim.errors import PlacementError, SuiteError
+from sim.frozen import suite_names, suite_text
 from sim.suites.places import PLACES, GeneratedPlace, ScenePlace, build_places, content_hash
 from sim.suites.rules import SuiteRules
 from sim.suites.scenarios import draw_scenarios, own_scenarios, scene_scenarios
@@ -60,12 +60,6 @@ class Suite:
         return len(self.starts)
 
 
-def suite_names() -> tuple[str, ...]:
-    """All suites, by name."""
-    files = (resources.files("sim.suites") / "data").iterdir()
-    return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
-
-
 @cache
 def load_suite(name: str) -> Suite:
     """A suite by name.
@@ -75,7 +69,7 @@ def load_suite(name: str) -> Suite:
     """
     if name not in suite_names():
         raise SuiteError(f"there is no suite {name!r}; there are {', '.join(suite_names())}")
-    content = json.loads((resources.files("sim.suites") / "data" / f"{name}.json").read_text("utf-8"))
+    content = json.loads(suite_text(name))
     arenas = build_places(PLACES.validate_python(content["arenas"]))
     rules = SuiteRules.model_validate(content.get("rules", {}))
     if content_hash(arenas, content["scenarios"], rules) != content["hash"]:

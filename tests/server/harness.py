@@ -11,10 +11,13 @@ from fastapi.testclient import TestClient
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.database.tables import RunState
+from server.evaluations.repository import PolicyEvaluationRepository
 from server.ids import new_id
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.services import Services
 from server.system.repository import WorkerRepository
+from sim.config import ArenaFile, TaskConfig
+from workers.job_protocol import Measurement
 from workers.reporting import EpisodeResult, EvaluationResult
 
 TOKEN = "a-login-token-for-tests"
@@ -47,6 +50,21 @@ class Reports:
         )
         rows = (arrived,) * arrivals + (collided,) * (episodes - arrivals)
         return EvaluationResult(suite="simple-200", suite_hash=suite_hash, episodes=rows)
+
+    def measured(self, evaluation: dict[str, Any]) -> None:
+        """What a worker would bring of an evaluation that was asked for: eight of ten arrive, on straight ways."""
+        result = Reports.evaluation(8)
+        measurement = Measurement(
+            result=result,
+            task=TaskConfig(),
+            arenas=(ArenaFile(name="room", width=6.0, height=6.0),),
+            arena_indices=(0,) * len(result.episodes),
+            targets=((1.0, 1.0),) * len(result.episodes),
+            ways=(((0.0, 0.0), (1.0, 1.0)),) * len(result.episodes),
+            jerks=(0.5,) * len(result.episodes),
+        )
+        with self.services.database.write() as session:
+            PolicyEvaluationRepository(session).measured(evaluation["job_id"], measurement)
 
     def checkpoint(self, run: dict[str, Any], step: int, evaluation: EvaluationResult | None) -> str:
         """Upload an archive and register it; its id."""

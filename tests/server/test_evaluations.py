@@ -1,12 +1,20 @@
 """Any policy on any suite: asked for over the API, done by a worker, kept with every episode."""
 
+import math
 import time
+from itertools import pairwise
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
+from pydantic import ValidationError
 
+from server.evaluations.figures import figures_of
 from server.services import Services
-from sim.config import ArenaFile
+from sim.config import ArenaFile, TaskConfig
+from tests.server.harness import Reports
+from tests.server.people import Lab
+from workers.job_protocol import MAX_WAY_POINTS, Measurement
 from workers.shipped.library import shipped_policy
 
 POLICY = shipped_policy("simple")
@@ -14,9 +22,11 @@ RECORDED = POLICY.evaluation("simple-200")
 
 
 def ask(client: TestClient, policy: dict[str, Any], **more: Any) -> dict[str, Any]:
-    response = client.post("/api/evaluations", json={"policy": policy, **more})
+    suites = {"suites": [more["suite"]]} if "suite" in more else {}
+    response = client.post("/api/evaluations", json={"policies": [policy], **suites})
     assert response.status_code == 202, response.text
-    asked: dict[str, Any] = response.json()
+    asked: dict[str, Any]
+    (asked,) = response.json()
     return asked
 
 
@@ -59,7 +69,9 @@ def test_a_baseline_in_an_imported_arena(client: TestClient, services: Services,
     # Nothing stands in its way.
     assert done["figures"]["success"]["value"] > 0.9
     gone = {"by": "arena", "arena": {"name": "imported", "sha256": "0" * 64}}
-    refused = client.post("/api/evaluations", json={"policy": {"source": "baseline", "name": "random"}, "suite": gone})
+    refused = client.post(
+        "/api/evaluations", json={"policies": [{"source": "baseline", "name": "random"}], "suites": [gone]}
+    )
     assert refused.status_code == 422
 
 
@@ -67,7 +79,7 @@ def test_what_cannot_be_done_says_why(client: TestClient, job_worker: None) -> N
     failed = ended(client, ask(client, {"source": "shipped", "name": "simple"}, suite={"by": "name", "name": "nowhere-9"}))
     assert failed["state"] == "failed"
     assert "there is no suite 'nowhere-9'" in failed["error"]
-    assert client.post("/api/evaluations", json={"policy": {"source": "shipped", "name": "nobody"}}).status_code == 404
+    assert client.post("/api/evaluations", json={"policies": [{"source": "shipped", "name": "nobody"}]}).status_code == 404
     # It may be asked for once more.
     again = ask(client, {"source": "shipped", "name": "simple"}, suite={"by": "name", "name": "nowhere-9"})
     assert again["id"] != failed["id"]
@@ -78,7 +90,134 @@ def test_one_that_waits_can_be_taken_back_and_not_deleted(client: TestClient) ->
     assert (asked["state"], asked["progress"], asked["figures"]) == ("queued", 0.0, None)
     assert client.delete(f"/api/evaluations/{asked['id']}").status_code == 409
     assert client.get("/api/jobs").json()["workers"] == 0
-    assert client.post(f"/api/jobs/{asked['job_id']}/cancel").json()["state"] == "cancelled"
-    assert client.get(f"/api/evaluations/{asked['id']}").json()["state"] == "cancelled"
+    assert client.post(f"/api/evaluations/{asked['id']}/cancel").json()["state"] == "cancelled"
+    assert client.get(f"/api/jobs/{asked['job_id']}").json()["state"] == "cancelled"
     assert client.delete(f"/api/evaluations/{asked['id']}").status_code == 204
     assert client.get("/api/jobs/0123456789abcdef").status_code == 404
+
+
+def test_many_policies_are_measured_on_many_suites_at_once(client: TestClient) -> None:
+    policies = [{"source": "baseline", "name": "random"}, {"source": "shipped", "name": "simple"}]
+    suites = [{"by": "name", "name": "simple-200"}, {"by": "arena", "arena": {"name": "maze", "difficulty": 0.5}}]
+    asked = client.post("/api/evaluations", json={"policies": policies, "suites": suites}).json()
+    assert [(each["title"], each["choice"]["by"]) for each in asked] == [
+        ("random", "name"),
+        ("random", "arena"),
+        (POLICY.card.title, "name"),
+        (POLICY.card.title, "arena"),
+    ]
+    # The newest first, a page at a time.
+    page = client.get("/api/evaluations", params={"limit": 3}).json()
+    assert (len(page["items"]), page["total"]) == (3, 4)
+    # All or none: one policy that is not there, and nothing is asked for.
+    policies.append({"source": "shipped", "name": "nobody"})
+    assert client.post("/api/evaluations", json={"policies": policies, "suites": suites}).status_code == 404
+    assert client.get("/api/evaluations").json()["total"] == 4
+    too_many = {"policies": [policies[0]] * 51, "suites": suites}
+    refused = client.post("/api/evaluations", json=too_many)
+    assert refused.status_code == 422
+    assert "at most 100 at once" in refused.text
+
+
+def test_a_training_stands_for_the_best_checkpoint_of_each_run(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("Two seeds", seeds=(0, 1))
+    training = {"policies": [{"source": "training", "id": experiment["id"]}]}
+    assert "no run" in client.post("/api/evaluations", json=training).json()["detail"].lower()
+    best = [
+        [reports.checkpoint(run, step, Reports.evaluation(arrivals)) for step, arrivals in ((1, 5), (2, 9), (3, 7))][1]
+        for run in experiment["runs"]
+    ]
+    asked = client.post("/api/evaluations", json=training).json()
+    assert [each["policy"]["id"] for each in asked] == best
+    assert [each["run_id"] for each in asked] == [run["id"] for run in experiment["runs"]]
+    # Of one run, as its page asks.
+    first = experiment["runs"][0]["id"]
+    assert [each["id"] for each in client.get(f"/api/evaluations?run={first}").json()["items"]] == [asked[0]["id"]]
+
+
+def test_where_robots_drove_can_be_drawn_and_any_episode_replayed(
+    client: TestClient, services: Services, job_worker: None
+) -> None:
+    wall = ArenaFile.model_validate(
+        {"name": "wall", "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
+    )
+    suite = {"by": "arena", "arena": {"name": "imported", "sha256": services.arenas.add(wall)}}
+    done = ended(client, ask(client, {"source": "baseline", "name": "go-to-goal"}, suite=suite))
+    found = client.get(f"/api/evaluations/{done['id']}/ways").json()
+    assert found["geometry"]["boxes"][0]["length"] == 3.0
+    episodes = client.get(f"/api/evaluations/{done['id']}/episodes").json()["episodes"]
+    assert [way["outcome"] for way in found["ways"]] == [episode["outcome"] for episode in episodes]
+    for way, episode in zip(found["ways"], episodes, strict=True):
+        ends, points = way["points"][-1], way["points"]
+        distance = math.dist(ends, way["target"])
+        # Go-to-goal is blind: it arrives, or ends at the wall.
+        if way["outcome"] == "arrival":
+            assert distance <= 0.2 + 0.02
+        else:
+            assert abs(ends[0]) < 1.5 + 0.3
+            assert abs(ends[1]) < 0.1 + 0.3
+        # The line is the way that was driven, but for what lies between its points.
+        assert len(points) <= MAX_WAY_POINTS
+        length = sum(math.dist(one, other) for one, other in pairwise(points))
+        assert length == pytest.approx(episode["path_length"], rel=0.1, abs=0.1)
+    assert {place["episodes"] for place in found["places"]} == {200}
+    assert client.get(f"/api/evaluations/{done['id']}/ways", params={"arena": 1}).status_code == 404
+    collided = next(index for index, episode in enumerate(episodes) if episode["outcome"] == "collision")
+    replay = client.get(f"/api/evaluations/{done['id']}/replays/{collided}").json()
+    assert (replay["outcome"], replay["steps"], replay["faithful"]) == ("collision", episodes[collided]["steps"], True)
+    assert client.get(f"{replay['page']}light/").status_code == 200
+
+
+def test_figures_by_hand() -> None:
+    def episode(outcome: str, steps: int, path: float) -> dict[str, Any]:
+        return {
+            "outcome": outcome,
+            "steps": steps,
+            "reward": 2.0,
+            "path_length": path,
+            "shortest_path": 2.2,
+            "min_clearance": 0.3,
+        }
+
+    # Nine episodes arrive, on ways that are 2 m long without the arrival circle; one drives twice as far, one collides.
+    episodes = [episode("arrival", 50, 2.0)] * 8 + [episode("arrival", 100, 4.0), episode("collision", 10, 0.5)]
+    measurement = Measurement.model_validate(
+        {
+            "result": {"suite": "s", "suite_hash": "h", "episodes": episodes},
+            "task": TaskConfig().model_dump(mode="json"),
+            "arenas": [{"name": "room", "width": 6.0, "height": 6.0}],
+            "arena_indices": [0] * 10,
+            "targets": [[1.0, 1.0]] * 10,
+            "ways": [[[0.0, 0.0], [1.0, 1.0]]] * 10,
+            "jerks": [0.5] * 5 + [1.5] * 5,
+        }
+    )
+    found = figures_of(measurement, trained=True)
+    assert found.success.value == 0.9
+    assert found.spl == pytest.approx((8 * 1.0 + 0.5) / 10)
+    assert found.worst_tenth_spl == 0.0
+    assert found.steps == pytest.approx(500 / 9)
+    assert found.seconds == pytest.approx(500 / 9 * TaskConfig().control_period)
+    assert found.path_length == pytest.approx(20.0 / 9)
+    assert (found.jerk, found.reward, found.collision) == (1.0, 2.0, 0.1)
+    with pytest.raises(ValidationError, match="one arena, one target"):
+        Measurement.model_validate(measurement.model_dump() | {"jerks": (1.0,)})
+
+
+def test_each_sees_what_was_measured_of_what_they_may_see(client: TestClient, services: Services, reports: Reports) -> None:
+    lab = Lab(services)
+    here = lab.project("Here")
+    member, stranger = lab.person("member", {here: "editor"}), lab.person("stranger", {lab.project("There"): "admin"})
+    experiment = reports.experiment()
+    client.patch(f"/api/experiments/{experiment['id']}", json={"project_id": here})
+    checkpoint = reports.checkpoint(experiment["runs"][0], 1, Reports.evaluation(8))
+    of_run, of_all = {"source": "checkpoint", "id": checkpoint}, {"source": "baseline", "name": "random"}
+    both = client.post("/api/evaluations", json={"policies": [of_run, of_all]}).json()
+    del client.headers["Authorization"]
+    for person, sees in ((member, 2), (stranger, 1)):
+        headers = lab.browser(person)
+        assert client.get("/api/evaluations", headers=headers).json()["total"] == sees
+        assert client.get(f"/api/evaluations/{both[0]['id']}", headers=headers).status_code == (200 if sees == 2 else 404)
+        assert client.get(f"/api/evaluations/{both[1]['id']}", headers=headers).status_code == 200
+        asked = client.post("/api/evaluations", json={"policies": [of_run]}, headers=headers)
+        assert asked.status_code == (202 if sees == 2 else 404)

@@ -53,6 +53,9 @@ TABLE = {
         GET /api/arenas/fixed
         GET /api/arenas/generated
         GET /api/arenas/imported/{sha256}
+        GET /api/evaluations
+        GET /api/leaderboards
+        GET /api/leaderboards/{suite_hash}
         GET /api/policies
         GET /api/policies/{name}
         GET /api/policies/{name}/suites/{suite}/episodes
@@ -68,6 +71,7 @@ TABLE = {
         PUT /api/workbench/views
         DELETE /api/workbench/views/{view_id}
         POST /api/experiments
+        POST /api/evaluations
         POST /api/reproduction
         POST /api/arenas/imported
     """,
@@ -91,6 +95,11 @@ TABLE = {
         GET /api/checkpoints/{checkpoint_id}/bundle
         GET /api/checkpoints/{checkpoint_id}/replays/{episode}
         GET /replays/checkpoints/{checkpoint_id}/{episode}/{theme}/
+        GET /api/evaluations/{evaluation_id}
+        GET /api/evaluations/{evaluation_id}/episodes
+        GET /api/evaluations/{evaluation_id}/ways
+        GET /api/evaluations/{evaluation_id}/replays/{episode}
+        GET /replays/evaluations/{evaluation_id}/{episode}/{theme}/
         GET /api/compare
         GET /api/compare/curves
         GET /api/reproduction
@@ -109,6 +118,8 @@ TABLE = {
         POST /api/experiments/{experiment_id}/seeds
         POST /api/runs/{run_id}/stop
         POST /api/runs/{run_id}/resume
+        POST /api/evaluations/{evaluation_id}/cancel
+        DELETE /api/evaluations/{evaluation_id}
         DELETE /api/reproduction/{campaign_id}
         POST /api/reproduction/{campaign_id}/stop
         POST /api/reproduction/{campaign_id}/resume
@@ -126,11 +137,6 @@ TABLE = {
         GET /api/jobs
         GET /api/jobs/{job_id}
         POST /api/jobs/{job_id}/cancel
-        POST /api/evaluations
-        GET /api/evaluations
-        GET /api/evaluations/{evaluation_id}
-        GET /api/evaluations/{evaluation_id}/episodes
-        DELETE /api/evaluations/{evaluation_id}
         GET /api/people
         PATCH /api/people/{user_id}
         POST /api/people/{user_id}/password-link
@@ -303,6 +309,9 @@ def everybody(
             campaign = client.post(f"/api/reproduction?project={here}", json={"seeds": 1, "effort": 1e-4}, headers=headers)
             client.headers.update(headers)
             checkpoint = Reports(client, services).checkpoint(experiment["runs"][0], 1, Reports.evaluation(8))
+            policies = [{"source": "checkpoint", "id": checkpoint}]
+            (evaluation,) = client.post("/api/evaluations", json={"policies": policies}).json()
+            Reports(client, services).measured(evaluation)
             del client.headers["Authorization"]
             people = {role: lab.person(role, {here: role}) for role in get_args(Role)}
             people["foreigner"] = lab.person("foreigner", {elsewhere: "admin"})
@@ -328,6 +337,7 @@ def everybody(
                 "experiment_id": experiment["id"],
                 "run_id": experiment["runs"][0]["id"],
                 "checkpoint_id": checkpoint,
+                "evaluation_id": evaluation["id"],
                 "campaign_id": campaign.json()["campaign"]["id"],
                 "theme": "light",
                 "step": "1",

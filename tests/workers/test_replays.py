@@ -9,6 +9,7 @@ from sim.scan import scan
 from sim.suites import load_suite
 from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
+from workers.job_protocol import NamedSuite, ShippedPolicyName
 from workers.policy import torch_policy
 from workers.replays import record as recorder
 from workers.replays.record import record
@@ -17,12 +18,13 @@ from workers.shipped.library import shipped_policy
 from workers.training.evaluation import evaluate
 
 POLICY = shipped_policy("complex")
+SHIPPED = ShippedPolicyName(name="complex")
 SUITE = load_suite("complex-200")
 
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    return record(POLICY.archive)
+    return record(POLICY.archive, SHIPPED)
 
 
 def test_it_ends_as_the_evaluation_did(recording: Recording) -> None:
@@ -55,7 +57,7 @@ def test_rays_are_those_of_the_poses(recording: Recording) -> None:
 
 def test_movers_are_where_the_rays_met_them() -> None:
     suite = load_suite("crowd-200")
-    recording = record(POLICY.archive, "crowd-200")
+    recording = record(POLICY.archive, SHIPPED, NamedSuite(name="crowd-200"))
     task = POLICY.card.training.task
     for episode in (3, 150):
         track = recording.track(episode)
@@ -96,4 +98,4 @@ def test_there_is_no_other_episode(recording: Recording, episode: int) -> None:
 def test_what_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "MAX_MOMENT_NUMBERS", 10_000)
     with pytest.raises(EpisodesTooLongError, match="lower the step limit"):
-        record(POLICY.archive)
+        record(POLICY.archive, SHIPPED)

@@ -7,17 +7,15 @@ rows, so that an episode driven alone may end otherwise.
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from sim.arenas.document import to_document
-from sim.suites import run_suite, suite_for, suite_named
 from sim.world import World
-from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
-from workers.policy import torch_policy
+from workers.job_protocol import OWN_SUITE, AnyPolicy, SuiteChoice
 from workers.replays.recording import Recording
 from workers.training.evaluation import to_result
+from workers.training.measuring import drive
 
 MAX_MOMENT_NUMBERS = 2**27
 """Numbers of all moments together: a quarter of a gigabyte in memory, 200 episodes of 20,000 steps with 30 rays."""
@@ -65,32 +63,25 @@ class _Moments:
         return offsets, poses, ranges, np.concatenate(self._fields)[order]
 
 
-def record(archive: Path, suite_name: str | None = None) -> Recording:
-    """Every episode of a checkpoint's policy on a suite.
+def record(archive: Path | None, policy: AnyPolicy, choice: SuiteChoice = OWN_SUITE) -> Recording:
+    """Every episode of a policy on a suite.
 
     Args:
-        archive: the checkpoint.
-        suite_name: of a suite; that of the checkpoint's own task without it.
+        archive: of the policy; None for a baseline.
+        policy: which one.
+        choice: of the suite.
 
     Raises:
         ArchiveError: it is not an archive that this release reads.
         SuiteError: there is no such suite.
         EpisodesTooLongError: it would not fit into memory.
     """
-    manifest, policy = read_policy(archive)
-    task = manifest.training.task
-    suite = suite_for(task) if suite_name is None else suite_named(suite_name, task)
     moments = _Moments()
-    # As the trainer has them, whose result this repeats.
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
-    try:
-        table = run_suite(torch_policy(policy), task, suite, moments)
-    finally:
-        torch.set_flush_denormal(False)
+    driven = drive(archive, policy, choice, lambda *_: moments)
+    suite = driven.suite
     offsets, poses, ranges, fields = moments.by_scenario(len(suite))
     return Recording(
-        evaluation=to_result(table, suite),
+        evaluation=to_result(driven.table, suite),
         arenas=tuple(to_document(arena) for arena in suite.arenas),
         arena_indices=suite.arena_indices,
         targets=suite.targets.astype(np.float32),

@@ -16,13 +16,8 @@ from tempfile import TemporaryDirectory
 
 from pydantic import BaseModel
 
-from sim.arrays import Floats, PolicyFunction
-from sim.baselines.dwa import dynamic_window
-from sim.baselines.memory import mapping_planner
-from sim.baselines.mppi import path_integral
-from sim.baselines.orca import reciprocal_avoidance
-from sim.baselines.simple import go_to_goal, random_policy
-from sim.baselines.vfh import vector_field_histogram
+from sim.arrays import Floats
+from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
 from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller, suite_named, suite_names
 from workers.checkpoints import copy_policy, read_policy
@@ -44,25 +39,10 @@ from workers.shipped.recipes import RECIPES, Recipe, recipe
 from workers.training.evaluation import evaluate, to_result
 from workers.training.trainer import train
 
-_BASELINES: dict[str, Callable[[TaskConfig], Callable[[Situation], Floats]]] = {
-    "random": lambda _: _seeing(random_policy()),
-    "go-to-goal": lambda task: _seeing(go_to_goal(task)),
-    "dynamic window": dynamic_window,
-    "VFH+": vector_field_histogram,
-    "MPPI": path_integral,
-    "mapping, A* and dynamic window": mapping_planner,
-    "ORCA, told where people are": reciprocal_avoidance,
-}
-
-
-def _seeing(policy: PolicyFunction) -> Callable[[Situation], Floats]:
-    """A policy as a controller."""
-    return lambda situation: policy(situation.observations)
-
 
 def controller(name: str, task: TaskConfig) -> Callable[[Situation], Floats]:
     """A baseline for a task; one for each run, since some remember."""
-    return _BASELINES[name](task)
+    return controller_of(TABLED[name], task)
 
 
 def _driven(name: str) -> Callable[[Suite], EpisodeTable]:
@@ -73,7 +53,7 @@ def _driven(name: str) -> Callable[[Suite], EpisodeTable]:
     return drive
 
 
-CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {name: _driven(name) for name in _BASELINES}
+CONTROLLERS: dict[str, Callable[[Suite], EpisodeTable]] = {name: _driven(name) for name in TABLED}
 """The baselines, each with the task that a suite's rules ask for, the default one's where they ask for nothing."""
 
 _COMMAND = "python -m workers.shipped.build"

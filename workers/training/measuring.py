@@ -1,29 +1,85 @@
-"""Measures any policy, learned or not, on any suite, and says how far it is."""
+"""Measures any policy, learned or not, on any suite: how every episode ended, where it went, how smoothly."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sim.actions import action_layout
-from sim.baselines.dwa import dynamic_window
-from sim.baselines.simple import go_to_goal, random_policy
+from sim.arenas.document import to_document
+from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
 from sim.suites import EpisodeTable, Observer, Suite, run_controller, run_suite, suite_for, suite_named
 from sim.world import World
 from workers.checkpoints import read_policy
-from workers.job_protocol import ArenaSuite, BaselineName, EvaluateJob, NamedSuite, SuiteChoice
+from workers.job_protocol import (
+    MAX_WAY_POINTS,
+    AnyPolicy,
+    ArenaSuite,
+    BaselineName,
+    EvaluateJob,
+    Measurement,
+    NamedSuite,
+    SuiteChoice,
+)
 from workers.policy import torch_policy
-from workers.reporting import EvaluationResult
 from workers.training.evaluation import to_result
 
 Progress = Callable[[float], None]
 
 
-def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> EvaluationResult:
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A policy's episodes on a suite.
+
+    Attributes:
+        suite: of which.
+        task: robot, LiDAR and limits that were driven with.
+        table: how every episode ended.
+    """
+
+    suite: Suite
+    task: TaskConfig
+    table: EpisodeTable
+
+
+def drive(
+    archive: Path | None, policy: AnyPolicy, choice: SuiteChoice, observer: Callable[[Suite, TaskConfig], Observer]
+) -> Driven:
     """Drives every scenario of a suite once.
+
+    Args:
+        archive: of the policy; None for a baseline.
+        policy: which one.
+        choice: of the suite.
+        observer: makes the one that looks on.
+
+    Raises:
+        ArchiveError: the archive is not one that this release reads.
+        SuiteError: there is no such suite, or the robot has no room in it.
+    """
+    if isinstance(policy, BaselineName):
+        suite = choose_suite(choice, policy.task or TaskConfig())
+        task = policy.task or suite.rules.task()
+        table = run_controller(controller_of(TABLED[policy.name], task), task, suite, observer(suite, task))
+        return Driven(suite, task, table)
+    assert archive is not None
+    manifest, read = read_policy(archive)
+    task = manifest.training.task
+    suite = choose_suite(choice, task)
+    # As the trainer has them, so that the same policy ends every scenario as it did there.
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
+    try:
+        return Driven(suite, task, run_suite(torch_policy(read), task, suite, observer(suite, task)))
+    finally:
+        torch.set_flush_denormal(False)
+
+
+def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> Measurement:
+    """Drives every scenario of a suite once, and says what came of it.
 
     Args:
         archive: of the policy; None for a baseline.
@@ -34,23 +90,29 @@ def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> Evalu
         ArchiveError: the archive is not one that this release reads.
         SuiteError: there is no such suite, or the robot has no room in it.
     """
-    if isinstance(job.policy, BaselineName):
-        task = job.policy.task
-        suite = choose_suite(job.suite, task)
-        table = _drive_baseline(job.policy, suite, _Progress(len(suite), task, progress))
-        return to_result(table, suite)
-    assert archive is not None
-    manifest, policy = read_policy(archive)
-    task = manifest.training.task
-    suite = choose_suite(job.suite, task)
-    # As the trainer has them, so that the same policy ends every scenario as it did there.
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
-    try:
-        act = torch_policy(policy)
-        return to_result(run_suite(act, task, suite, _Progress(len(suite), task, progress)), suite)
-    finally:
-        torch.set_flush_denormal(False)
+    ways: list[_Ways] = []
+
+    def observer(suite: Suite, task: TaskConfig) -> Observer:
+        ways.append(_Ways(suite, task))
+        told = _Progress(suite, task, progress)
+
+        def look(under_way: NDArray[np.int64], world: World) -> None:
+            ways[0].look(under_way, world)
+            told(under_way)
+
+        return look
+
+    driven = drive(archive, job.policy, job.suite, observer)
+    suite = driven.suite
+    return Measurement(
+        result=to_result(driven.table, suite),
+        task=driven.task,
+        arenas=tuple(to_document(arena) for arena in suite.arenas),
+        arena_indices=tuple(suite.arena_indices.tolist()),
+        targets=tuple((round(float(x), 3), round(float(y), 3)) for x, y in suite.targets),
+        ways=tuple(ways[0].ways()),
+        jerks=tuple(round(float(jerk), 4) for jerk in ways[0].jerks()),
+    )
 
 
 def choose_suite(choice: SuiteChoice, task: TaskConfig) -> Suite:
@@ -67,27 +129,63 @@ def choose_suite(choice: SuiteChoice, task: TaskConfig) -> Suite:
     return suite_for(task)
 
 
-def _drive_baseline(baseline: BaselineName, suite: Suite, observer: Observer) -> EpisodeTable:
-    task = baseline.task
-    match baseline.name:
-        case "random":
-            return run_suite(random_policy(actions=action_layout(task.robot)), task, suite, observer)
-        case "go-to-goal":
-            return run_suite(go_to_goal(task), task, suite, observer)
-        case "dynamic window":
-            return run_controller(dynamic_window(task), task, suite, observer)
+class _Ways:
+    """Keeps where each robot drove, a point every so many steps, and sums up its jerk.
+
+    Every robot keeps `MAX_WAY_POINTS` points at most: where there would be more, every second one goes, and from then on
+    half as many are kept.
+    """
+
+    def __init__(self, suite: Suite, task: TaskConfig) -> None:
+        count = len(suite)
+        self._period = task.control_period
+        self._steps = np.zeros(count, np.int64)
+        self._points = [[(float(x), float(y))] for x, y in suite.starts[:, :2]]
+        self._every = np.ones(count, np.int64)
+        self._ends = suite.starts[:, :2].astype(np.float64)
+        # Speeds of the last two steps, and how many are known.
+        self._speeds = np.zeros((2, count))
+        self._jerk = np.zeros(count)
+
+    def look(self, under_way: NDArray[np.int64], world: World) -> None:
+        """After a step, or before the first one."""
+        self._ends[under_way] = world.robots.poses[under_way, :2]
+        speeds = world.velocities(under_way)[:, 0].astype(np.float64)
+        before, last = self._speeds[:, under_way]
+        known = self._steps[under_way] >= 2
+        self._jerk[under_way] += np.where(known, np.abs(speeds - 2.0 * last + before) / self._period**2, 0.0)
+        self._speeds[:, under_way] = last, speeds
+        for robot in under_way[self._steps[under_way] % self._every[under_way] == 0]:
+            points = self._points[robot]
+            if self._steps[robot]:
+                points.append((float(self._ends[robot, 0]), float(self._ends[robot, 1])))
+            if len(points) >= MAX_WAY_POINTS:
+                del points[1::2]
+                self._every[robot] *= 2
+        self._steps[under_way] += 1
+
+    def ways(self) -> list[tuple[tuple[float, float], ...]]:
+        """(S,) lines, to a centimetre, each with its last point."""
+        lines = []
+        for points, end in zip(self._points, self._ends.tolist(), strict=True):
+            kept = [(round(x, 2), round(y, 2)) for x, y in (*points, end)]
+            lines.append(tuple(point for index, point in enumerate(kept) if index == 0 or point != kept[index - 1]))
+        return lines
+
+    def jerks(self) -> NDArray[np.float64]:
+        """(S,) mean size of the second difference of the speed over the period squared, m/s3."""
+        return self._jerk / np.maximum(1, self._steps - 2)
 
 
 class _Progress:
-    """Looks on, and tells how far it is: the more of scenarios ended and of the longest one's steps."""
+    """Tells how far it is: the more of scenarios ended and of the longest one's steps."""
 
-    def __init__(self, scenarios: int, task: TaskConfig, progress: Progress) -> None:
-        self._scenarios = scenarios
-        self._steps = max(1, task.step_limit)
+    def __init__(self, suite: Suite, task: TaskConfig, progress: Progress) -> None:
+        self._scenarios = len(suite)
+        self._steps = max(1, int(suite.rules.step_limits(task, suite.shortest_paths).max()))
         self._step = 0
         self._progress = progress
 
-    def __call__(self, under_way: NDArray[np.int64], world: World) -> None:
-        """One step of all; see `sim.suites.Observer`."""
+    def __call__(self, under_way: NDArray[np.int64]) -> None:
         self._step += 1
         self._progress(min(1.0, max(1.0 - len(under_way) / self._scenarios, self._step / self._steps)))

@@ -42,15 +42,17 @@ def upgrade() -> None:
         sa.Column("title", sa.String(length=200), nullable=False),
         sa.Column("policy", sa.JSON(), nullable=False),
         sa.Column("choice", sa.JSON(), nullable=False),
-        sa.Column("arrival_distance", sa.Float(), nullable=False),
+        sa.Column("checkpoint_id", sa.String(length=16), nullable=True),
         sa.Column("created_at", sa.Float(), nullable=False),
         sa.Column("error", sa.Text(), nullable=True),
         sa.Column("suite", sa.String(length=64), nullable=True),
         sa.Column("suite_hash", sa.String(length=64), nullable=True),
         sa.Column("figures", sa.JSON(), nullable=True),
+        sa.Column("task", sa.JSON(), nullable=True),
         sa.Column("episodes", sa.LargeBinary(), nullable=True),
+        sa.Column("ways", sa.LargeBinary(), nullable=True),
     )
-    for column in ("job_id", "key", "created_at", "suite_hash"):
+    for column in ("job_id", "key", "checkpoint_id", "created_at", "suite_hash"):
         op.create_index(f"ix_policy_evaluations_{column}", "policy_evaluations", [column])
 
 

@@ -410,10 +410,10 @@ export interface paths {
         get: operations["list_evaluations_api_evaluations_get"];
         put?: never;
         /**
-         * Ask For Evaluation
-         * @description Measure a policy on a suite; a worker does it, and the answer says where it stands.
+         * Ask For Evaluations
+         * @description Measure policies on suites, each on every one; workers do it, and the answers say where they stand.
          */
-        post: operations["ask_for_evaluation_api_evaluations_post"];
+        post: operations["ask_for_evaluations_api_evaluations_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -444,6 +444,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/evaluations/{evaluation_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cancel Evaluation
+         * @description Call it off; one that has ended stays as it is.
+         */
+        post: operations["cancel_evaluation_api_evaluations__evaluation_id__cancel_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/evaluations/{evaluation_id}/episodes": {
         parameters: {
             query?: never;
@@ -456,6 +476,46 @@ export interface paths {
          * @description Every episode behind its figures, in the suite's order.
          */
         get: operations["list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/evaluations/{evaluation_id}/replays/{episode}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Evaluation
+         * @description Drive an episode of an evaluation again: a few seconds for the first one, then at once.
+         */
+        get: operations["replay_evaluation_api_evaluations__evaluation_id__replays__episode__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/evaluations/{evaluation_id}/ways": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Evaluation Ways
+         * @description Where its robots drove in one of the suite's arenas.
+         */
+        get: operations["list_evaluation_ways_api_evaluations__evaluation_id__ways_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -779,6 +839,46 @@ export interface paths {
          * @description Take a job back; one that has ended stays as it is.
          */
         post: operations["cancel_job_api_jobs__job_id__cancel_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/leaderboards": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Leaderboards
+         * @description Every suite on which something was measured.
+         */
+        get: operations["list_leaderboards_api_leaderboards_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/leaderboards/{suite_hash}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Leaderboard
+         * @description Everything that was measured on a suite, the best first, and what can't be told from the best.
+         */
+        get: operations["get_leaderboard_api_leaderboards__suite_hash__get"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -2232,6 +2332,11 @@ export interface components {
              */
             progress: number;
             /**
+             * Run Id
+             * @description Of its policy, where that is a run's and is still there.
+             */
+            run_id: string | null;
+            /**
              * Seconds Left
              * @description Null where that is not known yet, and once it has ended.
              */
@@ -2311,253 +2416,41 @@ export interface components {
         };
         /**
          * BaselineName
-         * @description A controller that needs no training, with the robot of `task`.
+         * @description A controller that needs no training, by the name that it has in tables (`sim.baselines.named.TABLED`).
+         *
+         *     It drives the robot of `task`; without one the robot that the suite's rules ask for, or the default one.
          */
         "BaselineName-Input": {
             /**
              * Name
              * @enum {string}
              */
-            name: "random" | "go-to-goal" | "dynamic window";
+            name: "random" | "go-to-goal" | "dynamic window" | "VFH+" | "MPPI" | "mapping, A* and dynamic window" | "ORCA, told where people are";
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             source: "baseline";
-            /**
-             * @default {
-             *       "arena": {
-             *         "movers": {
-             *           "count": 0,
-             *           "kind": "pedestrian",
-             *           "radius": 0.25,
-             *           "sees_robots": false,
-             *           "speed": 1
-             *         },
-             *         "name": "simple"
-             *       },
-             *       "robot": {
-             *         "drive": {
-             *           "name": "differential",
-             *           "reverse": 0
-             *         },
-             *         "max_angular_acceleration": 0,
-             *         "max_angular_speed": 1,
-             *         "max_linear_acceleration": 0,
-             *         "max_linear_speed": 0.25,
-             *         "name": "burger",
-             *         "radius": 0.105
-             *       },
-             *       "lidar": {
-             *         "dropout": 0,
-             *         "field_of_view": 180,
-             *         "mount": {
-             *           "name": "centre"
-             *         },
-             *         "noise": 0,
-             *         "range": 3.5,
-             *         "rate": 0,
-             *         "rays": 30
-             *       },
-             *       "odometry": {
-             *         "distance_noise": 0,
-             *         "heading_noise": 0
-             *       },
-             *       "observation": {
-             *         "parts": [
-             *           {
-             *             "batches": 10,
-             *             "frames": 1,
-             *             "inverse": true,
-             *             "name": "ranges"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "speeds"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "distance",
-             *             "scaling": "saturating"
-             *           },
-             *           {
-             *             "encoding": "angle",
-             *             "frames": 1,
-             *             "name": "bearing"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "heading",
-             *             "scaling": "signed"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "deviation"
-             *           }
-             *         ]
-             *       },
-             *       "reward": {
-             *         "terms": [
-             *           {
-             *             "name": "arrival",
-             *             "weight": 120
-             *           },
-             *           {
-             *             "name": "collision",
-             *             "weight": -100
-             *           },
-             *           {
-             *             "exponential": false,
-             *             "name": "progress",
-             *             "weight": 500
-             *           }
-             *         ]
-             *       },
-             *       "control_period": 0.2,
-             *       "arrival_distance": 0.2,
-             *       "collision_distance": 0.2,
-             *       "step_limit": 500,
-             *       "command_delay": 0,
-             *       "randomisation": {
-             *         "command_delay": [],
-             *         "distance_noise": [],
-             *         "dropout": [],
-             *         "field_of_view": [],
-             *         "heading_noise": [],
-             *         "max_angular_speed": [],
-             *         "max_linear_speed": [],
-             *         "noise": [],
-             *         "range": [],
-             *         "rate": []
-             *       }
-             *     }
-             */
-            task: components["schemas"]["TaskConfig-Input"];
+            task?: components["schemas"]["TaskConfig-Input"] | null;
         };
         /**
          * BaselineName
-         * @description A controller that needs no training, with the robot of `task`.
+         * @description A controller that needs no training, by the name that it has in tables (`sim.baselines.named.TABLED`).
+         *
+         *     It drives the robot of `task`; without one the robot that the suite's rules ask for, or the default one.
          */
         "BaselineName-Output": {
             /**
              * Name
              * @enum {string}
              */
-            name: "random" | "go-to-goal" | "dynamic window";
+            name: "random" | "go-to-goal" | "dynamic window" | "VFH+" | "MPPI" | "mapping, A* and dynamic window" | "ORCA, told where people are";
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             source: "baseline";
-            /**
-             * @default {
-             *       "arena": {
-             *         "movers": {
-             *           "count": 0,
-             *           "kind": "pedestrian",
-             *           "radius": 0.25,
-             *           "sees_robots": false,
-             *           "speed": 1
-             *         },
-             *         "name": "simple"
-             *       },
-             *       "robot": {
-             *         "drive": {
-             *           "name": "differential",
-             *           "reverse": 0
-             *         },
-             *         "max_angular_acceleration": 0,
-             *         "max_angular_speed": 1,
-             *         "max_linear_acceleration": 0,
-             *         "max_linear_speed": 0.25,
-             *         "name": "burger",
-             *         "radius": 0.105
-             *       },
-             *       "lidar": {
-             *         "dropout": 0,
-             *         "field_of_view": 180,
-             *         "mount": {
-             *           "name": "centre"
-             *         },
-             *         "noise": 0,
-             *         "range": 3.5,
-             *         "rate": 0,
-             *         "rays": 30
-             *       },
-             *       "odometry": {
-             *         "distance_noise": 0,
-             *         "heading_noise": 0
-             *       },
-             *       "observation": {
-             *         "parts": [
-             *           {
-             *             "batches": 10,
-             *             "frames": 1,
-             *             "inverse": true,
-             *             "name": "ranges"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "speeds"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "distance",
-             *             "scaling": "saturating"
-             *           },
-             *           {
-             *             "encoding": "angle",
-             *             "frames": 1,
-             *             "name": "bearing"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "heading",
-             *             "scaling": "signed"
-             *           },
-             *           {
-             *             "frames": 1,
-             *             "name": "deviation"
-             *           }
-             *         ]
-             *       },
-             *       "reward": {
-             *         "terms": [
-             *           {
-             *             "name": "arrival",
-             *             "weight": 120
-             *           },
-             *           {
-             *             "name": "collision",
-             *             "weight": -100
-             *           },
-             *           {
-             *             "exponential": false,
-             *             "name": "progress",
-             *             "weight": 500
-             *           }
-             *         ]
-             *       },
-             *       "control_period": 0.2,
-             *       "arrival_distance": 0.2,
-             *       "collision_distance": 0.2,
-             *       "step_limit": 500,
-             *       "command_delay": 0,
-             *       "randomisation": {
-             *         "command_delay": [],
-             *         "distance_noise": [],
-             *         "dropout": [],
-             *         "field_of_view": [],
-             *         "heading_noise": [],
-             *         "max_angular_speed": [],
-             *         "max_linear_speed": [],
-             *         "noise": [],
-             *         "range": [],
-             *         "rate": []
-             *       }
-             *     }
-             */
-            task: components["schemas"]["TaskConfig-Output"];
+            task: components["schemas"]["TaskConfig-Output"] | null;
         };
         /**
          * BearingPart
@@ -3760,6 +3653,51 @@ export interface components {
             worker: string;
         };
         /**
+         * Entry
+         * @description Something that was measured on the suite.
+         */
+        Entry: {
+            /**
+             * Id
+             * @description Name of a shipped policy or a baseline; id of a training or an evaluation.
+             */
+            id: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "shipped" | "training" | "evaluation" | "baseline";
+            /**
+             * Rank
+             * @description By success, from 1; equal rates share one.
+             */
+            rank: number;
+            /**
+             * Spl
+             * @description Success weighted by path length; null where it is not kept.
+             */
+            spl: number | null;
+            /**
+             * Steps
+             * @description Control steps to the target, over the episodes that arrived.
+             */
+            steps: number | null;
+            success: components["schemas"]["Estimate"];
+            /**
+             * Tied
+             * @description Whether it can't be told from the best.
+             */
+            tied: boolean;
+            /** Title */
+            title: string;
+            /**
+             * Told By
+             * @description What that is known by: the difference over seeds where both have five or more (95 % interval), else Fisher's exact test over the episodes of these very policies (p below 0.05).
+             * @enum {string}
+             */
+            told_by: "best" | "seeds" | "episodes";
+        };
+        /**
          * EpisodeResult
          * @description One scenario of an evaluation: one target attempt.
          *
@@ -3950,13 +3888,33 @@ export interface components {
             /** Episodes */
             episodes: number;
             /**
+             * Jerk
+             * @description Mean size of the jerk along the heading, m/s3.
+             */
+            jerk: number;
+            /**
              * Min Clearance
              * @description Mean of the episodes' smallest distance to anything else, metres.
              */
             min_clearance: number;
             /**
+             * Path Length
+             * @description Metres, of the episodes that arrived; null where none did.
+             */
+            path_length: number | null;
+            /**
+             * Reward
+             * @description By the policy's own reward, mean of the episodes' sums.
+             */
+            reward: number;
+            /**
+             * Seconds
+             * @description Of simulated time, of the episodes that arrived; null where none did.
+             */
+            seconds: number | null;
+            /**
              * Spl
-             * @description Success weighted by path length.
+             * @description Success weighted by path length (Anderson et al. 2018).
              */
             spl: number;
             /**
@@ -3967,21 +3925,47 @@ export interface components {
             success: components["schemas"]["Estimate"];
             /** Timeout */
             timeout: number;
+            /**
+             * Worst Tenth Spl
+             * @description The same over the tenth of the episodes that did worst.
+             */
+            worst_tenth_spl: number;
         };
         /**
          * EvaluationRequest
-         * @description Which policy is to be measured on which suite.
+         * @description Which policies are to be measured, each on every one of the suites.
          */
         EvaluationRequest: {
-            /** Policy */
-            policy: components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["BaselineName-Input"];
+            /** Policies */
+            policies: ((components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["BaselineName-Input"]) | components["schemas"]["TrainingPolicies"])[];
             /**
-             * Suite
-             * @default {
-             *       "by": "own"
-             *     }
+             * Suites
+             * @default [
+             *       {
+             *         "by": "own"
+             *       }
+             *     ]
              */
-            suite: components["schemas"]["NamedSuite-Input"] | components["schemas"]["ArenaSuite-Input"] | components["schemas"]["OwnSuite-Input"];
+            suites: (components["schemas"]["NamedSuite-Input"] | components["schemas"]["ArenaSuite-Input"] | components["schemas"]["OwnSuite-Input"])[];
+        };
+        /**
+         * EvaluationWays
+         * @description Where the robots drove in one of the suite's arenas.
+         */
+        EvaluationWays: {
+            /**
+             * Arena
+             * @description The one that is drawn here.
+             */
+            arena: number;
+            geometry: components["schemas"]["ArenaFile-Output"];
+            /**
+             * Places
+             * @description All arenas of the suite, the worst first.
+             */
+            places: components["schemas"]["PlaceSuccess"][];
+            /** Ways */
+            ways: components["schemas"]["Way"][];
         };
         /**
          * Evidence
@@ -4851,6 +4835,34 @@ export interface components {
             items: components["schemas"]["KnownKey"][];
         };
         /**
+         * Leaderboard
+         * @description Everything that was measured on a suite, the best first.
+         */
+        Leaderboard: {
+            /**
+             * Comparisons
+             * @description How many entries were compared with the best: of so many, some differ by chance.
+             */
+            comparisons: number;
+            /** Entries */
+            entries: components["schemas"]["Entry"][];
+            /** Suite */
+            suite: string;
+            /**
+             * Suite Hash
+             * @description Only results of the same hash may be compared.
+             */
+            suite_hash: string;
+        };
+        /**
+         * Leaderboards
+         * @description Every suite on which something was measured, by name.
+         */
+        Leaderboards: {
+            /** Suites */
+            suites: components["schemas"]["ListedSuite"][];
+        };
+        /**
          * LeftOut
          * @description An experiment to which an action was not done.
          */
@@ -5064,6 +5076,23 @@ export interface components {
              * @description How many there are on all pages.
              */
             total: number;
+        };
+        /**
+         * ListedSuite
+         * @description A suite on which something was measured.
+         */
+        ListedSuite: {
+            /** Entries */
+            entries: number;
+            /**
+             * Frozen
+             * @description Whether anything can be measured on it by its name.
+             */
+            frozen: boolean;
+            /** Suite */
+            suite: string;
+            /** Suite Hash */
+            suite_hash: string;
         };
         /**
          * LiveSettings
@@ -5931,6 +5960,23 @@ export interface components {
              * @enum {string}
              */
             role: "viewer" | "editor" | "admin";
+        };
+        /**
+         * PlaceSuccess
+         * @description How many of the episodes in one of the suite's arenas arrived.
+         */
+        PlaceSuccess: {
+            /**
+             * Arena
+             * @description Its place among the suite's arenas, from 0.
+             */
+            arena: number;
+            /** Arrivals */
+            arrivals: number;
+            /** Episodes */
+            episodes: number;
+            /** Name */
+            name: string;
         };
         /**
          * PolicyEpisodes
@@ -8413,6 +8459,19 @@ export interface components {
             };
         };
         /**
+         * TrainingPolicies
+         * @description The best checkpoint of each run of a training.
+         */
+        TrainingPolicies: {
+            /** Id */
+            id: string;
+            /**
+             * Source
+             * @constant
+             */
+            source: "training";
+        };
+        /**
          * UsedExtension
          * @description An extension that a configuration needs.
          *
@@ -8682,6 +8741,38 @@ export interface components {
              * @default 1
              */
             speed: number;
+        };
+        /**
+         * Way
+         * @description Where a robot drove in one of the episodes.
+         */
+        Way: {
+            /**
+             * Episode
+             * @description Its place in the suite, from 0.
+             */
+            episode: number;
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "arrival" | "collision" | "timeout";
+            /**
+             * Points
+             * @description x and y from its start to its end, metres.
+             */
+            points: [
+                number,
+                number
+            ][];
+            /**
+             * Target
+             * @description x and y, metres.
+             */
+            target: [
+                number,
+                number
+            ];
         };
         /**
          * Waypoint
@@ -9785,6 +9876,9 @@ export interface operations {
                 limit?: number;
                 /** @description Items to leave out before them. */
                 offset?: number;
+                /** @description Of that run's policies only. */
+                run?: string | null;
+                suite_hash?: string | null;
             };
             header?: never;
             path?: never;
@@ -9821,7 +9915,7 @@ export interface operations {
             };
         };
     };
-    ask_for_evaluation_api_evaluations_post: {
+    ask_for_evaluations_api_evaluations_post: {
         parameters: {
             query?: never;
             header?: never;
@@ -9840,7 +9934,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["AskedEvaluation"];
+                    "application/json": components["schemas"]["AskedEvaluation"][];
                 };
             };
             /** @description No valid login */
@@ -9986,6 +10080,55 @@ export interface operations {
             };
         };
     };
+    cancel_evaluation_api_evaluations__evaluation_id__cancel_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AskedEvaluation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get: {
         parameters: {
             query?: never;
@@ -10004,6 +10147,126 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AskedEpisodes"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    replay_evaluation_api_evaluations__evaluation_id__replays__episode__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                episode: number;
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Replay"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_evaluation_ways_api_evaluations__evaluation_id__ways_get: {
+        parameters: {
+            query?: {
+                /** @description Null for that with the lowest success. */
+                arena?: number | null;
+            };
+            header?: never;
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EvaluationWays"];
                 };
             };
             /** @description No valid login */
@@ -11014,6 +11277,84 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_leaderboards_api_leaderboards_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Leaderboards"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_leaderboard_api_leaderboards__suite_hash__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                suite_hash: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Leaderboard"];
                 };
             };
             /** @description No valid login */

@@ -16,7 +16,7 @@ from pathlib import Path
 from sim.errors import SimError
 from workers.errors import WorkerError
 from workers.frames import Frame
-from workers.job_protocol import JOB_SPEC, BaselineName, EvaluateJob, ExportJob, ReplayJob, ViewJob
+from workers.job_protocol import JOB_SPEC, BaselineName, EvaluateJob, ExportJob, Measurement, ReplayJob, ViewJob
 from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
@@ -78,7 +78,7 @@ def _do(text: str, directory: Path, connection: "Connection[Said, WatchRequest |
         case ReplayJob():
             from workers.replays.record import record
 
-            record(archive, spec.suite).save(result)
+            record(_archive_of(spec, archive), spec.policy, spec.suite).save(result)
         case ExportJob():
             from workers.export.bundle import bundle, export_checkpoint
 
@@ -87,7 +87,7 @@ def _do(text: str, directory: Path, connection: "Connection[Said, WatchRequest |
             result.write_text(_evaluate(spec, archive, connection).model_dump_json(), encoding="utf-8")
 
 
-def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, WatchRequest | None]") -> EvaluationResult:
+def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, WatchRequest | None]") -> Measurement:
     from workers.training.measuring import measure
 
     told = time.monotonic()
@@ -98,7 +98,11 @@ def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, Wa
             told = time.monotonic()
             connection.send(Progressed(share))
 
-    return measure(None if isinstance(spec.policy, BaselineName) else archive, spec, progress)
+    return measure(_archive_of(spec, archive), spec, progress)
+
+
+def _archive_of(spec: EvaluateJob | ReplayJob, archive: Path) -> Path | None:
+    return None if isinstance(spec.policy, BaselineName) else archive
 
 
 class _Screen:

@@ -1,0 +1,1 @@
+"""Leaderboards: everything that was measured on a suite, side by side."""

@@ -1,0 +1,107 @@
+"""What was measured on suites, in SQL."""
+
+from collections import defaultdict
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, Float, cast, func, or_, select
+from sqlalchemy.orm import Session
+
+from server.database import tables
+
+MOST_ENTRIES = 200
+"""Trainings, and evaluations, of a leaderboard; the best of each."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A training by its runs' last evaluations, all on the same suite."""
+
+    id: str
+    name: str
+    arrivals: list[int]
+    episodes: list[int]
+
+
+class LeaderboardRepository:
+    """Reads within the caller's transaction.
+
+    Args:
+        session: of the database.
+        visible: projects that may be seen; None for all.
+    """
+
+    def __init__(self, session: Session, visible: Collection[str] | None) -> None:
+        self._session = session
+        self._visible = visible
+
+    def suites(self) -> dict[str, tuple[str, int]]:
+        """By hash, the name of each suite on which something was measured, and how many entries it has."""
+        run, asked, usual = tables.Run, tables.PolicyEvaluation, tables.Evaluation
+        name = select(usual.suite).where(usual.suite_hash == run.final_suite).limit(1).scalar_subquery()
+        trained = (
+            select(run.final_suite, name, func.count(run.experiment_id.distinct()))
+            .join(tables.Experiment)
+            .where(run.final_suite.is_not(None), *self._seen())
+            .group_by(run.final_suite)
+        )
+        found: dict[str, tuple[str, int]] = {}
+        for suite_hash, suite, count in self._session.execute(trained):
+            assert suite_hash is not None
+            found[suite_hash] = (suite or suite_hash[:12], count)
+        measured = (
+            select(asked.suite_hash, func.min(asked.suite), func.count())
+            .where(asked.suite_hash.is_not(None), self._asked_seen())
+            .group_by(asked.suite_hash)
+        )
+        for suite_hash, suite, count in self._session.execute(measured):
+            assert suite_hash is not None
+            assert suite is not None
+            found[suite_hash] = (suite, found.get(suite_hash, ("", 0))[1] + count)
+        return found
+
+    def trainings(self, suite_hash: str) -> list[Trained]:
+        """The best trainings whose runs were measured on a suite, by the mean of their seeds' last success rates."""
+        run, experiment = tables.Run, tables.Experiment
+        on_it = (run.final_suite == suite_hash, run.final_episodes > 0)
+        rate = func.avg(cast(run.final_arrivals, Float) / run.final_episodes)
+        best = (
+            select(experiment.id, experiment.name)
+            .join(run)
+            .where(*on_it, *self._seen())
+            .group_by(experiment.id, experiment.name)
+            .order_by(rate.desc(), experiment.id)
+            .limit(MOST_ENTRIES)
+        )
+        names = {row[0]: row[1] for row in self._session.execute(best)}
+        runs = select(run.experiment_id, run.final_arrivals, run.final_episodes).where(run.experiment_id.in_(names), *on_it)
+        seeds: dict[str, list[tuple[int, int]]] = defaultdict(list)
+        for experiment_id, arrivals, episodes in self._session.execute(runs.order_by(run.seed)):
+            seeds[experiment_id].append((arrivals or 0, episodes or 0))
+        return [
+            Trained(key, name, [each[0] for each in seeds[key]], [each[1] for each in seeds[key]])
+            for key, name in names.items()
+        ]
+
+    def evaluations(self, suite_hash: str) -> list[tables.PolicyEvaluation]:
+        """Evaluations on a suite that people have asked for, the newest first."""
+        row = tables.PolicyEvaluation
+        query = select(row).where(row.suite_hash == suite_hash, self._asked_seen())
+        return list(self._session.scalars(query.order_by(row.created_at.desc()).limit(MOST_ENTRIES)))
+
+    def _seen(self) -> list[ColumnElement[bool]]:
+        experiment = tables.Experiment
+        found: list[ColumnElement[bool]] = [experiment.deleted_at.is_(None)]
+        if self._visible is not None:
+            found.append(experiment.project_id.in_(self._visible))
+        return found
+
+    def _asked_seen(self) -> ColumnElement[bool]:
+        row = tables.PolicyEvaluation
+        mine = (
+            select(tables.Checkpoint.id)
+            .join(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
+            .join(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+            .where(tables.Checkpoint.id == row.checkpoint_id, *self._seen())
+        )
+        return or_(row.checkpoint_id.is_(None), mine.exists())
