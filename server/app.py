@@ -26,6 +26,7 @@ from server.files import FileStore
 from server.jobs import endpoints as jobs
 from server.jobs.results import ResultStore
 from server.leaderboards import endpoints as leaderboards
+from server.lineage import endpoints as lineage
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
 from server.monitoring import endpoints as monitoring
@@ -66,6 +67,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     audit.router,
     projects.router,
     experiments.router,
+    lineage.router,
     workbench.router,
     gallery.router,
     runs.router,

@@ -4,7 +4,7 @@ import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from pydantic import ValidationError
@@ -21,6 +21,7 @@ from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.reproduction.command import reproduce
 from workers.runtime.worker import worker
 from workers.shipped.command import app as policies
+from workers.start import StartFrom
 from workers.statistics.seeds import failed_seeds, success_rate
 
 app = typer.Typer(help="Train, evaluate and export policies on this machine.", no_args_is_help=True)
@@ -41,7 +42,9 @@ class ConsoleReporter:
 
     def metrics(self, step: int, values: Mapping[str, float]) -> None:
         """See `Reporter.metrics`."""
-        fields: dict[str, str] = {"speed": f"{values['time/steps_per_second']:,.0f} steps/s"}
+        fields: dict[str, str] = {}
+        if "time/steps_per_second" in values:
+            fields["speed"] = f"{values['time/steps_per_second']:,.0f} steps/s"
         if "train/success_rate" in values:
             fields["success"] = f"{values['train/success_rate']:.1%} training success"
         self._progress.update(self._task, completed=step, **fields)  # type: ignore[arg-type]
@@ -121,6 +124,9 @@ def train(
     seed: Annotated[int, typer.Option(help="Of weights, exploration and environment.")] = 0,
     out: Annotated[Path, typer.Option(help="Directory for the checkpoints.")] = Path("checkpoints"),
     resume: Annotated[Path | None, typer.Option(help="A checkpoint to continue from, with its own configuration.")] = None,
+    start_from: Annotated[
+        str | None, typer.Option(help="A checkpoint, or the name of a shipped policy, whose weights to begin with.")
+    ] = None,
 ) -> None:
     """Train a policy, with a progress bar; Ctrl-C writes a checkpoint first."""
     changes = _changes(arena, observation, reward, algorithm, network, steps)
@@ -129,6 +135,7 @@ def train(
         from workers.checkpoints import read_manifest
         from workers.training.trainer import train as run
 
+        beginning: Path | None = None
         if resume is not None:
             manifest = read_manifest(resume)
             training, seed = _changed(manifest.training, changes), manifest.seed
@@ -137,11 +144,13 @@ def train(
                 preset(preset_name).training if config is None else TrainingConfig.model_validate_json(config.read_text())
             )
             training = _changed(start, changes)
+            if start_from is not None:
+                training, beginning = _starting_from(training, start_from)
         columns = "[progress.percentage]{task.percentage:>3.0f}%", "{task.fields[speed]}", "{task.fields[success]}"
         with Progress(BarColumn(), *map(TextColumn, columns), TimeRemainingColumn(), console=_console) as progress:
             reporter = ConsoleReporter(progress, training.steps)
             signal.signal(signal.SIGINT, reporter.request_stop)
-            outcome = run(training.as_installed(), seed, reporter, out, resume)
+            outcome = run(training.as_installed(), seed, reporter, out, resume, beginning)
     except ValidationError as error:
         lines = (f"  {'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
         _fail("\n".join(("not a valid training:", *lines)))
@@ -212,6 +221,29 @@ def _evaluate_baseline(name: str, suite: str) -> None:
     task, places = TaskConfig(), load_suite(suite)
     table = run_controller(controller_of(BASELINES.validate_python({"name": name}), task), task, places)
     _console.print(describe(to_result(table, places)), highlight=False, markup=False, soft_wrap=True)
+
+
+def _starting_from(training: TrainingConfig, policy: str) -> tuple[TrainingConfig, Path]:
+    """A training that begins with a policy, an archive or the name of a shipped one; and the archive.
+
+    Raises:
+        UnknownPolicyError: it is neither.
+    """
+    from workers.checkpoints import read_manifest, sha256_of
+    from workers.shipped.library import shipped_policy
+
+    archive = Path(policy)
+    if archive.is_file():
+        manifest = read_manifest(archive)
+        title = f"{archive.name} (seed {manifest.seed}, step {manifest.step:,})"
+    else:
+        shipped = shipped_policy(policy)
+        archive, title = shipped.archive, shipped.card.title
+    with archive.open("rb") as file:
+        sha256 = sha256_of(file)
+    source: Literal["file", "shipped"] = "file" if archive == Path(policy) else "shipped"
+    start = StartFrom(source=source, name=Path(policy).name, sha256=sha256, title=title)
+    return training.model_copy(update={"start_from": start}), archive
 
 
 def _changes(

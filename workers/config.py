@@ -14,6 +14,7 @@ from workers.networks.config import Network as Network
 from workers.networks.config import NetworkConfig as NetworkConfig
 from workers.networks.config import RecurrentNetworkConfig as RecurrentNetworkConfig
 from workers.networks.config import ResBlockNetwork as ResBlockNetwork
+from workers.start import StartFrom
 
 
 class PpoConfig(Frozen):
@@ -276,6 +277,12 @@ class TrainingConfig(Frozen):
     evaluation: EvaluationConfig = Field(default_factory=EvaluationConfig, title="Evaluation")
     device: Literal["auto", "cpu", "cuda"] = Field(
         "cpu", title="Device", description="Small networks train fastest on a CPU core.", json_schema_extra=ADVANCED
+    )
+    start_from: StartFrom | None = Field(
+        None,
+        title="Start from",
+        description="A policy whose weights it begins with; fresh ones without it.",
+        json_schema_extra=HIDDEN,
     )
     extensions: tuple[UsedExtension, ...] = Field(
         (),

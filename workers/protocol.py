@@ -152,6 +152,8 @@ class Claim(Frozen):
         training: with the device that it is trained on, never "auto".
         last_seq: the number of the last item that the server has; the next one has the next number.
         checkpoint: what to go on from; None for a fresh start.
+        start: SHA-256 of the archive whose policy to begin with, at `GET /api/worker/runs/{id}/start`; None where it begins
+            with fresh weights, or goes on from a checkpoint.
         lease_seconds: a worker not heard of for this long loses the run.
     """
 
@@ -160,6 +162,7 @@ class Claim(Frozen):
     training: TrainingConfig
     last_seq: int
     checkpoint: CheckpointReference | None
+    start: str | None = None
     lease_seconds: float
 
 

@@ -3,14 +3,15 @@
 An archive's id is written down before its first byte, and crossed out in the transaction that registers its checkpoint; so
 the database knows what it has brought into the store, and nothing else is ever removed. Several installations may share a
 store. What was never registered is doomed an hour after it began, in a transaction of its own: from then on it can't be
-registered any more, whatever the clock says, and its file may go.
+registered any more, whatever the clock says, and its file may go. What a training began with stays for as long as that
+training does, whatever became of the checkpoint.
 """
 
 import time
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import Select, delete, select, update
 from sqlalchemy.orm import Session
 
 from server.background import kept_up
@@ -41,20 +42,31 @@ class LooseArchives:
         self._session.delete(row)
         return True
 
-    def doom(self, archive_ids: Collection[str]) -> None:
-        """Their checkpoints are gone: so shall they be."""
+    def let_go(self, archive_ids: Collection[str]) -> set[str]:
+        """Their checkpoints are gone: so shall they be, but for those that a training begins with; the ids of the others."""
         now = time.time()
-        self._session.add_all(tables.LooseArchive(id=archive_id, since=now, doomed=True) for archive_id in archive_ids)
+        begun = set(self._session.scalars(_begun_with().where(tables.ExperimentKey.text.in_(archive_ids))))
+        self._session.add_all(
+            tables.LooseArchive(id=archive_id, since=now, doomed=archive_id not in begun) for archive_id in archive_ids
+        )
+        return {archive_id for archive_id in archive_ids if archive_id not in begun}
 
     def doom_older(self, moment: float) -> list[str]:
         """Doom what began before `moment`; the ids of some that are doomed, by now or earlier."""
         loose = tables.LooseArchive
-        self._session.execute(update(loose).where(loose.since < moment).values(doomed=True))
+        old = update(loose).where(loose.since < moment, loose.id.not_in(_begun_with()))
+        self._session.execute(old.values(doomed=True))
         return list(self._session.scalars(select(loose.id).where(loose.doomed).order_by(loose.since).limit(_AT_ONCE)))
 
     def forget(self, archive_ids: Collection[str]) -> None:
         """They are gone from the store."""
         self._session.execute(delete(tables.LooseArchive).where(tables.LooseArchive.id.in_(archive_ids)))
+
+
+def _begun_with() -> Select[str | None]:
+    """The ids of archives that an experiment, in the trash or not, begins with: its runs may be started anew at any time."""
+    key = tables.ExperimentKey
+    return select(key.text).where(key.key == tables.START_KEY, key.text.is_not(None))
 
 
 def remove_archives(services: Services, archive_ids: Collection[str]) -> None:

@@ -37,6 +37,11 @@ def success_over_runs(evaluations: Sequence[Evaluated]) -> Estimate | None:
     )
 
 
+def policy_title(run: tables.Run, checkpoint: tables.Checkpoint) -> str:
+    """What a checkpoint's policy is called where it stands alone."""
+    return f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
+
+
 def evaluation_view(evaluation: tables.Evaluation) -> Evaluation:
     """A checkpoint's evaluation in JSON."""
     return Evaluation(

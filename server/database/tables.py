@@ -74,6 +74,10 @@ class Experiment(Base):
     )
 
 
+START_KEY = "start_from.name"
+"""The key of what an experiment began with: a checkpoint's id, or a shipped policy's name."""
+
+
 class ExperimentKey(Base):
     """One value of an experiment's settings under its dotted name ("algorithm.gamma"), to filter, sort and group by.
 

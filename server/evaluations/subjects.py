@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from server.checkpoints.repository import CheckpointRepository
+from server.checkpoints.views import policy_title
 from server.errors import NotFoundError
 from server.evaluations.schemas import TrainingPolicies
 from server.experiments.repository import ExperimentRepository
@@ -71,7 +72,6 @@ def measured(session: Session, policy: AnyPolicy) -> Measured:
     if isinstance(policy, CheckpointPolicy):
         checkpoint = CheckpointRepository(session).get(policy.id)
         run = RunRepository(session).get(checkpoint.run_id)
-        title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
-        return Measured(title, checkpoint.sha256, run.experiment.project_id)
+        return Measured(policy_title(run, checkpoint), checkpoint.sha256, run.experiment.project_id)
     shipped = find(policy.name)
     return Measured(shipped.card.title, shipped_hash(policy.name))

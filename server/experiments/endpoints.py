@@ -39,7 +39,7 @@ def get_training_form() -> TrainingForm:
 def create_experiment(request: ExperimentLaunch, service: ExperimentServiceDep, principal: PrincipalDep) -> Experiment:
     """Launch into a project: one run a seed."""
     principal.require("editor", request.project_id)
-    return service.create(request)
+    return service.create(request, principal)
 
 
 @router.get("/api/experiments/{experiment_id}", responses=NOT_FOUND, dependencies=[view("experiment_id")])

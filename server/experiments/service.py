@@ -21,11 +21,13 @@ from server.experiments.schemas import (
 )
 from server.experiments.stored import read_training
 from server.ids import new_id
+from server.lineage.starts import with_start
 from server.projects.repository import ProjectRepository
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, resume_run, stop_run
 from server.runs.views import SHOWN, run_view
+from server.security.principal import Principal
 from server.services import Services
 from workers.archive_size import refuse_too_large
 from workers.errors import MemoryTooLargeError
@@ -39,13 +41,18 @@ class ExperimentService:
         self._services = services
         self._runs = RunService(services)
 
-    def create(self, request: ExperimentLaunch) -> Experiment:
+    def create(self, request: ExperimentLaunch, principal: Principal) -> Experiment:
         """Queue one run a seed, and wake workers for them.
+
+        Args:
+            request: what to train.
+            principal: who launches it, and so may begin with the policies that they may see.
 
         Raises:
             NotFoundError: there is no such project.
             UnusableArenaError: it trains on an imported arena that is not here.
-            RefusedFieldError: its checkpoints would be larger than this installation takes.
+            RefusedFieldError: its checkpoints would be larger than this installation takes, or the policy that it is to
+                begin with is not there, or does not fit.
         """
         try:
             refuse_too_large(request.training, self._services.settings.max_checkpoint_bytes)
@@ -53,7 +60,9 @@ class ExperimentService:
             raise RefusedFieldError(
                 ("body", "training", "algorithm", request.training.algorithm.name, "replay_size"), str(error)
             ) from error
-        training = without_geometry(request.training.as_installed(), self._services.arenas)
+        with self._services.database.read() as session:
+            started = with_start(request.training, session, self._services.files, principal)
+        training = without_geometry(started.as_installed(), self._services.arenas)
         experiment = tables.Experiment(
             id=new_id(), project_id=request.project_id, name=request.name, training=training.model_dump(mode="json")
         )
@@ -177,13 +186,14 @@ class ExperimentService:
             experiment = repository.get(experiment_id, deleted=True)
             run_ids = [run.id for run in experiment.runs]
             checkpoint_ids = CheckpointRepository(session).ids(run_ids)
-            LooseArchives(session).doom(checkpoint_ids)
             _note(session, "experiment.removed", experiment)
             repository.delete(experiment)
+            session.flush()
+            archive_ids = LooseArchives(session).let_go(checkpoint_ids)
         # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
-        remove_archives(self._services, checkpoint_ids)
+        remove_archives(self._services, archive_ids)
         self._publish(experiment, "deleted")
 
     def _throw_away(self, find: Callable[[ExperimentRepository], Sequence[tables.Experiment]]) -> None:

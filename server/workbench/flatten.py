@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
+from server.database.tables import START_KEY
 from server.experiments.stored import read_training
 from workers.config import TrainingConfig
 
@@ -43,6 +44,9 @@ def flat_settings(document: Mapping[str, Any]) -> dict[str, Value]:
     stored = read_training(document)
     task = stored.training.task
     pairs: dict[str, Value] = {REWARD: task.reward.in_short, OBSERVATION: task.observation.in_short}
+    if stored.training.start_from is not None:
+        # Before all that there may be too much of: archives are kept for it.
+        pairs[START_KEY] = stored.training.start_from.name
     if stored.unreadable:
         pairs[UNREADABLE] = ", ".join(stored.unreadable)[:MAX_TEXT]
     pairs |= dict(_pairs("", stored.training.model_dump(mode="json")))

@@ -103,6 +103,15 @@ async def get_checkpoint(
     )
 
 
+@router.get("/runs/{run_id}/start", dependencies=[WORK])
+async def get_start(
+    run_id: str, service: WorkerServiceDep, services: ServicesDep, principal: PrincipalDep
+) -> StreamingResponse:
+    """The archive of the policy that a run begins with, for the worker that has the run."""
+    lane = services.lanes.workers
+    return StreamingResponse(lane.each(await lane.run(service.start, run_id, principal)), media_type="application/zip")
+
+
 @router.websocket("/runs/{run_id}/link", dependencies=[WORK])
 async def link(websocket: WebSocket, run_id: str, attempt: AttemptQuery, services: ServicesDep) -> None:
     """The link of a run: batches and frames come in, orders go out (`workers.protocol`)."""

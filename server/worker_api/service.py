@@ -16,6 +16,7 @@ from server.errors import ConflictError, NotFoundError
 from server.events.changes import Change, ChangeKind
 from server.experiments.stored import StoredTraining, read_training, training_of
 from server.files import StoredFile
+from server.lineage.starts import start_archive
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs import states
 from server.runs.repository import RunRepository
@@ -104,6 +105,7 @@ class WorkerService:
                 checkpoint=CheckpointReference(id=checkpoint.id, step=checkpoint.step, sha256=checkpoint.sha256)
                 if checkpoint
                 else None,
+                start=training.start_from.sha256 if training.start_from and not checkpoint else None,
                 lease_seconds=self._services.settings.lease_seconds,
             )
         self._services.instruments.claims.labels(request.queue).inc()
@@ -265,6 +267,20 @@ class WorkerService:
             if RunRepository(session).get(checkpoint.run_id).claimed_with != principal.credential:
                 raise NotFoundError.of("checkpoint", checkpoint_id)
         return self._services.files.read(checkpoint_id)
+
+    def start(self, run_id: str, principal: Principal = WORKER) -> Iterator[bytes]:
+        """The archive of the policy that a run begins with.
+
+        Raises:
+            NotFoundError: there is no such run, it was claimed with another token, it begins with fresh weights, or the
+                policy is gone.
+        """
+        with self._services.database.read() as session:
+            run = RunRepository(session).get(run_id)
+            start = training_of(run.experiment).start_from
+            if run.state not in states.ACTIVE or run.claimed_with != principal.credential or start is None:
+                raise NotFoundError.of("policy to start from of run", run_id)
+        return start_archive(start, self._services.files)
 
     def _store(self, session: Session, run: tables.Run, items: Sequence[MetricItem | EventItem]) -> None:
         if not items:

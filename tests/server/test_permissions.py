@@ -42,6 +42,7 @@ TABLE = {
         POST /api/sign-out
         GET /api/projects
         GET /api/training/form
+        GET /api/training/starts
         GET /api/experiments
         GET /api/workbench/groups
         GET /api/workbench/ids
@@ -88,6 +89,8 @@ TABLE = {
         GET /api/runs/{run_id}/metrics
         GET /api/runs/{run_id}/diagnoses
         GET /api/runs/{run_id}/checkpoints
+        GET /api/runs/{run_id}/lineage
+        GET /api/experiments/{experiment_id}/lineage
         GET /api/runs/{run_id}/live
         PUT /api/runs/{run_id}/live
         GET /api/checkpoints/{checkpoint_id}/download
@@ -158,6 +161,7 @@ TABLE = {
         POST /api/worker/heartbeat
         POST /api/worker/runs/{run_id}/claim
         PUT /api/worker/runs/{run_id}/checkpoints/{step}
+        GET /api/worker/runs/{run_id}/start
         GET /api/worker/checkpoints/{checkpoint_id}
         SOCKET /api/worker/runs/{run_id}/link
         POST /api/worker/jobs/claim

@@ -103,9 +103,11 @@ class Service:
         until(lambda: any(worker["name"].startswith(f"{name}@") for worker in self.api.get("/api/status").json()["workers"]))
         return process
 
-    def launch(self, steps: int, save_every: int = 2 * ROLLOUT, seeds: tuple[int, ...] = (0,)) -> list[str]:
+    def launch(
+        self, steps: int, save_every: int = 2 * ROLLOUT, seeds: tuple[int, ...] = (0,), **training: object
+    ) -> list[str]:
         """Runs of a small training; returns their ids."""
-        training = {"steps": steps, "evaluation": {"every_steps": save_every}}
+        training = {"steps": steps, "evaluation": {"every_steps": save_every}, **training}
         response = self.api.post("/api/experiments", json={"name": "tiny", "seeds": list(seeds), "training": training})
         assert response.status_code == 201, response.text
         return [run["id"] for run in response.json()["runs"]]

@@ -86,6 +86,29 @@ def test_a_trainer_that_dies_is_replaced_and_the_event_log_says_why(running: Ser
     assert_one_unbroken_curve(running, run_id)
 
 
+def test_a_run_that_began_with_a_policy_goes_on_from_its_own_checkpoints_whatever_became_of_the_parent(
+    running: Service,
+) -> None:
+    (parent,) = running.launch(2 * ROLLOUT, save_every=ROLLOUT)
+    experiment = running.until_state(parent, "completed")["experiment_id"]
+    begun = running.api.get(f"/api/runs/{parent}/checkpoints").json()["items"][0]
+    (run_id,) = running.launch(ENDLESS, start_from={"source": "checkpoint", "name": begun["id"]})
+    until_checkpoint(running, run_id)
+    first = running.api.get(f"/api/runs/{run_id}/checkpoints", params={"step": 0}).json()["items"][0]
+    assert first["evaluation"] == begun["evaluation"]
+    for action in ("delete", "remove"):
+        body = {"action": action, "experiments": [experiment]}
+        assert running.api.post("/api/workbench/actions", json=body).json()["done"] == [experiment]
+    (trainer,) = trainers(running.workers["w"].pid)
+    trainer.kill()
+    until_resumed(running, run_id, attempt=2)
+    running.stop(run_id)
+    assert_one_unbroken_curve(running, run_id)
+    lineage = running.api.get(f"/api/runs/{run_id}/lineage").json()["parent"]
+    assert (lineage["state"], lineage["start_from"]["name"]) == ("gone", begun["id"])
+    assert sum("Starts from tiny, seed 0" in message for message in running.events(run_id)) == 1
+
+
 def test_a_zombie_is_fenced_out(service: Service) -> None:
     service.start_server()
     worker = service.start_worker("first")

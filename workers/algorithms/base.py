@@ -58,6 +58,17 @@ class Algorithm(Protocol):
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """A copy of the deterministic policy's weights, under the names that the archive documents."""
 
+    def begin_with(self, weights: Arrays, state: Arrays | None) -> tuple[str, ...]:
+        """Takes over the networks of another training before the first `act`; all else begins as configured.
+
+        Args:
+            weights: of a deterministic policy that fits (`workers.misfit`), as `policy_weights` has them.
+            state: the `state` that belongs to it, where an algorithm of the same name made it and its networks fit too.
+
+        Returns:
+            What was taken over besides the policy, in words.
+        """
+
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Everything that `load_state` needs to continue bit for bit."""
 

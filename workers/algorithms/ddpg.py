@@ -70,6 +70,11 @@ class NoisyPolicy(OffPolicyAlgorithm):
         layout = self.action_layout
         return {f"policy/std_{name}": half * self._noise for name, half in zip(layout.names, layout.half_spans, strict=True)}
 
+    @property
+    def policy_network(self) -> nn.Module:
+        """See `OffPolicyAlgorithm.policy_network`."""
+        return self.actor.network
+
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`."""
         return {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.network.state_dict().items()}

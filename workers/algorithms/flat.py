@@ -42,6 +42,11 @@ class FlatParameters:
         """Whether every parameter is a finite number."""
         return bool(torch.isfinite(self.values).all())
 
+    @torch.no_grad()
+    def take_over(self, values: NDArray[np.generic]) -> None:
+        """Overwrites the parameters with `values` (their number,); moments of an optimiser stay as they are."""
+        self.values.copy_(torch.from_numpy(np.array(values, np.float32)))
+
     def clip_gradients(self, max_norm: float) -> None:
         """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
         for gradient in self._module_gradients:

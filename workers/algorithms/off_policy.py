@@ -6,13 +6,17 @@ from collections.abc import Callable
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from sim.actions import ActionLayout
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam, FlatParameters
 from workers.algorithms.storage.replay import ReplayBuffer, Transitions
 from workers.config import OffPolicyConfig
+from workers.networks.modules import take_weights
+
+# The keys of `online` whose parameters another training may hand on.
+_NETWORKS = ("actor", "critic")
 
 
 class OffPolicyAlgorithm(ABC):
@@ -127,6 +131,25 @@ class OffPolicyAlgorithm(ABC):
     def follow(self, target: str, online: str) -> None:
         """Moves a target network a little towards its original: target += tau (online - target)."""
         self._targets[target].values.lerp_(self._online[online].values, self._shared.tau)
+
+    @torch.no_grad()
+    def begin_with(self, weights: Arrays, state: Arrays | None) -> tuple[str, ...]:
+        """See `Algorithm.begin_with`: target networks begin as copies; memory, noise and temperature as configured."""
+        take_weights(self.policy_network, weights)
+        fits = state is not None and all(
+            state[f"{name}/values"].shape == tuple(self._online[name].values.shape) for name in _NETWORKS
+        )
+        if fits and state is not None:
+            for name in _NETWORKS:
+                self._online[name].take_over(state[f"{name}/values"])
+        for name, target in self._targets.items():
+            target.values.copy_(self._online[name.removeprefix("target_")].values)
+        return ("critics",) if fits else ()
+
+    @property
+    @abstractmethod
+    def policy_network(self) -> nn.Module:
+        """The network whose first outputs are the deterministic policy's."""
 
     @property
     def finite(self) -> bool:

@@ -24,7 +24,7 @@ from workers.algorithms.storage.rollout import RolloutStorage, generalized_advan
 from workers.config import PpoConfig, RecurrentNetworkConfig
 from workers.networks.compiled import inference, is_compiled
 from workers.networks.inputs import Inputs, as_inputs
-from workers.networks.modules import Described, GaussianActor, build_network
+from workers.networks.modules import Described, GaussianActor, build_network, take_weights
 from workers.networks.squashing import bound_actions
 
 # A deviation between 1.8 % and 270 % of the action's unit: beyond either, exploration is none or all.
@@ -161,6 +161,18 @@ class Ppo:
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`."""
         return {name: tensor.cpu().numpy().copy() for name, tensor in self.actor.network.state_dict().items()}
+
+    @torch.no_grad()
+    def begin_with(self, weights: Arrays, state: Arrays | None) -> tuple[str, ...]:
+        """See `Algorithm.begin_with`: deviations begin as configured, the scale of returns counts as one rollout."""
+        take_weights(self.actor.network, weights)
+        if state is None or state["optimizer/values"].shape != tuple(self._optimizer.values.shape):
+            return ()
+        log_std = self.actor.log_std.clone()
+        self._optimizer.take_over(state["optimizer/values"])
+        self.actor.log_std.copy_(log_std)
+        self._scaler.take_over(without_prefix("scaler", state), self.storage.steps * self.robots)
+        return "critic", "scale of returns"
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """See `Algorithm.state`; only between an update and the next `act`."""

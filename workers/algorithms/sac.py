@@ -127,6 +127,11 @@ class Sac(OffPolicyAlgorithm):
         """See `OffPolicyAlgorithm.set_progress`: the temperature sees to exploration."""
         return {}
 
+    @property
+    def policy_network(self) -> nn.Module:
+        """See `OffPolicyAlgorithm.policy_network`: outputs after the means make the deviations."""
+        return self.actor
+
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """See `Algorithm.policy_weights`: without the head's rows that make the deviation."""
         weights = {name: tensor.cpu().numpy() for name, tensor in self.actor.state_dict().items()}

@@ -19,7 +19,7 @@ from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import RolloutStorage, generalized_advantages
 from workers.networks.inputs import Inputs
-from workers.networks.modules import GaussianActor
+from workers.networks.modules import GaussianActor, take_weights
 
 __all__ = [
     "GaussianActor",
@@ -96,6 +96,21 @@ class Learner(ABC):
     def policy_weights(self) -> dict[str, NDArray[np.float32]]:
         """A copy of the policy's weights."""
         return {name: tensor.cpu().numpy().copy() for name, tensor in self.policy.state_dict().items()}
+
+    def begin_with(self, weights: Arrays, state: Arrays | None) -> tuple[str, ...]:
+        """Takes over another training's policy and, where `state` has them in the same shapes, modules beside it."""
+        take_weights(self.policy, weights)
+        if state is None:
+            return ()
+        taken = []
+        for prefix, module in self.modules.items():
+            theirs = without_prefix(f"module/{prefix}", state)
+            own = module.state_dict()
+            fits = {name: array.shape for name, array in theirs.items()} == {n: tuple(own[n].shape) for n in own}
+            if fits and all(part is not self.policy for part in module.modules()):
+                module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in theirs.items()})
+                taken.append(prefix)
+        return tuple(taken)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Everything that `load_state` needs to continue bit for bit."""

@@ -1,9 +1,11 @@
 """The networks as modules, and the actors that turn any of them into bounded actions."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -171,6 +173,21 @@ def _refuse_unfit(config: NetworkConfig, network: nn.Module, inputs: int, output
     found = tuple(network(torch.zeros(3, inputs)).shape)
     if found != (3, outputs):
         raise NetworkError(f"the network {config.name!r} makes {found} of (3, {inputs}), not (3, {outputs})")
+
+
+@torch.no_grad()
+def take_weights(network: nn.Module, weights: Mapping[str, NDArray[np.generic]]) -> None:
+    """Overwrites a network's parameters with a policy's arrays, in place.
+
+    A network with more outputs than the policy (SAC's deviations) keeps what its other outputs are made with.
+
+    Args:
+        network: of the same kind and sizes as the policy's.
+        weights: its arrays, by the parameters' names.
+    """
+    for name, parameter in network.named_parameters():
+        array = torch.from_numpy(np.array(weights[name], np.float32))
+        (parameter if parameter.shape == array.shape else parameter[: len(array)]).copy_(array)
 
 
 def head_of(network: nn.Module) -> nn.Linear | None:

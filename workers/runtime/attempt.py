@@ -124,13 +124,14 @@ class Attempt:
 
     def _train(self, trainer: TrainerHandle) -> Final | None:
         try:
-            resume = self._fetch_checkpoint()
+            resume = self._fetch_archive()
         except ServerUnavailableError:
             return Final(outcome="stopped" if self._orders.stop else "released")
         except (CheckpointGoneError, ArchiveIntegrityError) as error:
-            return Final(outcome="damaged", error=str(error))
+            # There is no older one of a policy to start from.
+            return Final(outcome="damaged" if self._claim.checkpoint else "failed", error=str(error))
         except RequestRefusedError as error:
-            return Final(outcome="failed", error=f"The checkpoint to go on from cannot be fetched: {error}")
+            return Final(outcome="failed", error=f"The archive to go on from cannot be fetched: {error}")
         if self._link.fenced():
             return None
         trainer.train(
@@ -138,7 +139,8 @@ class Attempt:
                 training=self._claim.training.model_dump_json(),
                 seed=self._claim.seed,
                 directory=str(self._directory),
-                resume=str(resume) if resume else None,
+                resume=str(resume) if resume and self._claim.checkpoint else None,
+                start=str(resume) if resume and not self._claim.checkpoint else None,
             ),
             self._on_report,
         )
@@ -162,17 +164,21 @@ class Attempt:
             return Final(outcome="lost", error=self._broken[:_EXPLANATION_CHARACTERS])
         return None if self._link.fenced() else final
 
-    def _fetch_checkpoint(self) -> Path | None:
-        checkpoint = self._claim.checkpoint
-        if checkpoint is None:
+    def _fetch_archive(self) -> Path | None:
+        """What the training goes on from, or begins with; None for fresh weights."""
+        checkpoint, start = self._claim.checkpoint, self._claim.start
+        if checkpoint is None and start is None:
             return None
-        path = self._directory / "resume.zip"
+        path = self._directory / ("start.zip" if checkpoint is None else "resume.zip")
         damaged = 0
         while not self._link.fenced():
             try:
-                self._client.download(checkpoint, path)
+                if checkpoint is not None:
+                    self._client.download(checkpoint, path)
+                elif start is not None:
+                    self._client.fetch_start(self._run_id, start, path)
             except (ServerUnavailableError, ArchiveIntegrityError) as error:
-                logger.warning("checkpoint %s waits: %s", checkpoint.id, error)
+                logger.warning("run %s: the archive to begin with waits: %s", self._run_id, error)
                 damaged += isinstance(error, ArchiveIntegrityError)
                 if self._stop_wanted() or damaged == _DAMAGED_DOWNLOADS:
                     raise

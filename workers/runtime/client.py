@@ -94,9 +94,17 @@ class ServerClient:
             ServerUnavailableError: not now; ask again later.
             RequestRefusedError: never.
         """
+        what = f"the checkpoint of step {checkpoint.step:,}"
+        self._fetch(f"/api/worker/checkpoints/{checkpoint.id}", checkpoint.sha256, path, what)
+
+    def fetch_start(self, run_id: str, sha256: str, path: Path) -> None:
+        """Fetch the archive whose policy a run begins with; raises as `download` does."""
+        self._fetch(f"/api/worker/runs/{run_id}/start", sha256, path, "the policy to start from")
+
+    def _fetch(self, url: str, sha256: str, path: Path, what: str) -> None:
         digest = hashlib.sha256()
         try:
-            with self._http.stream("GET", f"/api/worker/checkpoints/{checkpoint.id}") as response, path.open("wb") as file:
+            with self._http.stream("GET", url) as response, path.open("wb") as file:
                 if response.is_error:
                     response.read()
                 check(response)
@@ -106,9 +114,9 @@ class ServerClient:
         except httpx.TransportError as error:
             raise unavailable(error) from error
         except RunRefusedError as error:
-            raise CheckpointGoneError(f"the checkpoint of step {checkpoint.step:,} is gone: {error}") from error
-        if digest.hexdigest() != checkpoint.sha256:
-            raise ArchiveIntegrityError(f"the checkpoint of step {checkpoint.step:,} is not what was stored there")
+            raise CheckpointGoneError(f"{what} is gone: {error}") from error
+        if digest.hexdigest() != sha256:
+            raise ArchiveIntegrityError(f"{what} is not what was stored there")
 
     def upload(
         self, run_id: str, attempt: int, step: int, archive: Path, after_seq: int, evaluation: EvaluationResult | None

@@ -23,12 +23,13 @@ T = TypeVar("T")
 
 
 class Job(msgspec.Struct, frozen=True, tag="job"):
-    """Train this. `training` is a `TrainingConfig` as JSON; `resume` the archive to go on from."""
+    """Train this: a `TrainingConfig` as JSON. `resume` is the archive to go on from, `start` the one to begin with."""
 
     training: str
     seed: int
     directory: str
     resume: str | None
+    start: str | None = None
 
 
 class Control(msgspec.Struct, frozen=True, tag="control"):

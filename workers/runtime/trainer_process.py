@@ -157,11 +157,12 @@ def main(descriptor: int, parent: int) -> None:
                 reporter,
                 Path(job.directory),
                 Path(job.resume) if job.resume else None,
+                Path(job.start) if job.start else None,
                 viewer=LiveViewer(with_maps_of(config.task, job.seed), reporter),
             )
         except (ArchiveFormatError, ArchiveIntegrityError) as error:
-            # Whether it is damaged where it is kept as well is for the server to say.
-            reporter.end("damaged", str(error))
+            # Whether a checkpoint is damaged where it is kept as well is for the server to say.
+            reporter.end("damaged" if job.resume else "failed", str(error))
         except (OSError, LocalError) as error:
             reporter.end("unfit", f"{type(error).__name__}: {error}")
         except (WorkerError, SimError, ValueError) as error:

@@ -21,15 +21,24 @@ from sim.suites import suite_for
 from workers.algorithms import build_algorithm
 from workers.algorithms.base import with_prefix, without_prefix
 from workers.archive_size import refuse_too_large
-from workers.checkpoints import Checkpoint, read_checkpoint, read_manifest, write_checkpoint
+from workers.checkpoints import (
+    Checkpoint,
+    read_checkpoint,
+    read_manifest,
+    read_policy,
+    sha256_of,
+    write_checkpoint,
+)
 from workers.config import TrainingConfig
 from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.live.viewing import TrainingViewer, Unwatched
-from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.manifest import STATE_ARRAYS, EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.misfit import misfit
 from workers.networks.inputs import inputs_of
 from workers.networks.layout import layout
 from workers.policy import Policy, torch_policy
 from workers.reporting import EvaluationResult, Reporter
+from workers.start import StartFrom
 from workers.training.drives import drive
 from workers.training.evaluation import evaluate, evaluation_metrics
 from workers.training.metrics import TrainingMetrics
@@ -50,6 +59,7 @@ def train(
     reporter: Reporter,
     directory: Path,
     resume: Path | None = None,
+    start: Path | None = None,
     *,
     viewer: TrainingViewer | None = None,
     report_interval: float = REPORT_INTERVAL,
@@ -64,6 +74,7 @@ def train(
         reporter: where metrics, events, checkpoints and frames go, and who may ask to stop.
         directory: for checkpoint archives, 'step-<n>.zip'.
         resume: an archive of the same training, to continue bit for bit where it was written.
+        start: the archive of `config.start_from`, needed where that is set and nothing is resumed.
         viewer: what makes frames; None is a training that nobody can watch.
         report_interval: least wall time between two reports of metrics, in seconds.
 
@@ -75,7 +86,7 @@ def train(
         MemoryTooLargeError: its replay memory would not fit into a checkpoint.
         NetworkError: the module of its network is not one that can be trained, saved and resumed.
         NoDeviceError: this machine does not have the device that it asks for.
-        ArchiveError: `resume` is damaged, or belongs to another training.
+        ArchiveError: `resume` is damaged, or belongs to another training; `start` is damaged, or does not fit.
     """
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of dead units decay into numbers that the processor handles slowly
@@ -84,6 +95,8 @@ def train(
         training = Training(with_device(config, resume), seed, reporter, directory, viewer, report_interval)
         if resume is not None:
             training.resume(resume)
+        elif config.start_from is not None:
+            training.begin_with(config.start_from, start)
         return training.run()
     finally:
         viewer.close()
@@ -285,6 +298,34 @@ class Training:
         self.reported = self.saved = counters.step
         self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots, self.actions)
         self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
+
+    def begin_with(self, start: StartFrom, archive: Path | None) -> None:
+        """Begins with the policy of another training, and keeps it as a checkpoint of step 0 of its own.
+
+        The networks are taken over, the policy always, the critic and what it needs where the archive holds the state of an
+        algorithm of the same name. Optimisers, exploration, schedules, memories and random streams begin as configured.
+
+        Raises:
+            ArchiveMismatchError: it is not the archive that was meant, or its policy does not fit.
+            ArchiveError: it is damaged.
+        """
+        title = start.title or start.name
+        if archive is None:
+            raise ArchiveMismatchError(f"this training starts from {title}: bring its archive along")
+        with archive.open("rb") as file:
+            if start.sha256 not in (None, sha256_of(file)):
+                raise ArchiveMismatchError(f"{archive.name} is not the archive of {title} that this training starts from")
+        manifest, policy = read_policy(archive)
+        if (problem := misfit(manifest.training, self.config)) is not None:
+            raise ArchiveMismatchError(f"{title} does not fit this training: {problem}")
+        state = None
+        if STATE_ARRAYS in manifest.files and manifest.training.algorithm.name == self.config.algorithm.name:
+            state = without_prefix("algorithm", read_checkpoint(archive).arrays)
+        taken = " and ".join(("policy", *self.algorithm.begin_with(policy.weights, state)))
+        self.reporter.event(0, "info", f"Starts from {title}: its {taken}.")
+        result = self.evaluate()
+        self.reporter.metrics(0, evaluation_metrics(result, self.config.task.arrival_distance))
+        self.save(result)
 
     def _counters(self) -> TrainingCounters:
         return TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)

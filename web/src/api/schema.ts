@@ -601,6 +601,26 @@ export interface paths {
         patch: operations["change_experiment_api_experiments__experiment_id__patch"];
         trace?: never;
     };
+    "/api/experiments/{experiment_id}/lineage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Experiment Lineage
+         * @description What it began with, and what began with a checkpoint of it.
+         */
+        get: operations["get_experiment_lineage_api_experiments__experiment_id__lineage_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/experiments/{experiment_id}/marks": {
         parameters: {
             query?: never;
@@ -1361,6 +1381,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run_id}/lineage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Run Lineage
+         * @description What it began with, and what began with a checkpoint of this run alone.
+         */
+        get: operations["get_run_lineage_api_runs__run_id__lineage_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run_id}/live": {
         parameters: {
             query?: never;
@@ -1521,6 +1561,26 @@ export interface paths {
          * @description What the launch form is made of: schema, defaults and presets.
          */
         get: operations["get_training_form_api_training_form_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/training/starts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Start Policies
+         * @description Policies that a training may begin with: of one's newest runs the best and the last, and those that ship.
+         */
+        get: operations["list_start_policies_api_training_starts_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -2851,6 +2911,26 @@ export interface components {
              * @enum {string}
              */
             source: "checkpoint";
+        };
+        /**
+         * Child
+         * @description A training that began with a checkpoint of this one.
+         */
+        Child: {
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Seed
+             * @description Of the run that it began with.
+             */
+            seed: number;
+            /**
+             * Step
+             * @description Of the checkpoint.
+             */
+            step: number;
         };
         /**
          * Circle
@@ -4967,6 +5047,19 @@ export interface components {
             rays: number;
         };
         /**
+         * Lineage
+         * @description Where a training comes from, and what came of it.
+         */
+        Lineage: {
+            /**
+             * Children
+             * @description Those that one may see, the newest first.
+             */
+            children: components["schemas"]["Child"][];
+            /** @description Null where it began with fresh weights. */
+            parent: components["schemas"]["Parent"] | null;
+        };
+        /**
          * ListedExperiment
          * @description An experiment as a list shows it: without its whole configuration and its runs.
          */
@@ -5696,6 +5789,29 @@ export interface components {
             rows: string[];
             /** Title */
             title: string;
+        };
+        /**
+         * Parent
+         * @description What a training began with.
+         */
+        Parent: {
+            /**
+             * Run Id
+             * @description Whose checkpoint it is; null unless it is there and no policy that ships.
+             */
+            run_id: string | null;
+            start_from: components["schemas"]["StartFrom-Output"];
+            /**
+             * State
+             * @description Hidden in a project that one may not see; gone where it was deleted since.
+             * @enum {string}
+             */
+            state: "there" | "gone" | "hidden";
+            /**
+             * Step
+             * @description Of that checkpoint.
+             */
+            step: number | null;
         };
         /**
          * PasswordChange
@@ -7812,6 +7928,83 @@ export interface components {
             y: number;
         };
         /**
+         * StartFrom
+         * @description A policy that was trained before.
+         *
+         *     `source` and `name` find it at launch; `sha256` and `title` are then written down beside them, so that a manifest says by
+         *     itself what a training began with.
+         */
+        "StartFrom-Input": {
+            /**
+             * Policy
+             * @description Id of the checkpoint, or name of the policy or the file.
+             */
+            name: string;
+            /**
+             * SHA-256
+             * @description Of its archive.
+             */
+            sha256?: string | null;
+            /**
+             * Kind
+             * @description A checkpoint of a run, a policy that ships, or an archive on the command line.
+             * @enum {string}
+             */
+            source: "checkpoint" | "shipped" | "file";
+            /**
+             * Title
+             * @description For people: the training that made it, seed and step.
+             * @default
+             */
+            title: string;
+        };
+        /**
+         * StartFrom
+         * @description A policy that was trained before.
+         *
+         *     `source` and `name` find it at launch; `sha256` and `title` are then written down beside them, so that a manifest says by
+         *     itself what a training began with.
+         */
+        "StartFrom-Output": {
+            /**
+             * Policy
+             * @description Id of the checkpoint, or name of the policy or the file.
+             */
+            name: string;
+            /**
+             * SHA-256
+             * @description Of its archive.
+             */
+            sha256: string | null;
+            /**
+             * Kind
+             * @description A checkpoint of a run, a policy that ships, or an archive on the command line.
+             * @enum {string}
+             */
+            source: "checkpoint" | "shipped" | "file";
+            /**
+             * Title
+             * @description For people: the training that made it, seed and step.
+             * @default
+             */
+            title: string;
+        };
+        /**
+         * StartPolicy
+         * @description A policy that a training may begin with.
+         */
+        StartPolicy: {
+            /**
+             * Kind
+             * @description Which of its run's checkpoints, or one that ships.
+             * @enum {string}
+             */
+            kind: "best" | "last" | "shipped";
+            start_from: components["schemas"]["StartFrom-Output"];
+            /** @description Of its own evaluation; null where there is none. */
+            success: components["schemas"]["Estimate"] | null;
+        };
+        /**
          * Status
          * @description The service at a glance.
          */
@@ -8403,6 +8596,11 @@ export interface components {
              */
             extensions: components["schemas"]["UsedExtension-Input"][];
             /**
+             * Start from
+             * @description A policy whose weights it begins with; fresh ones without it.
+             */
+            start_from?: components["schemas"]["StartFrom-Input"] | null;
+            /**
              * Steps
              * @description Environment steps of all robots together.
              * @default 300000
@@ -8433,6 +8631,11 @@ export interface components {
              * @default []
              */
             extensions: components["schemas"]["UsedExtension-Output"][];
+            /**
+             * Start from
+             * @description A policy whose weights it begins with; fresh ones without it.
+             */
+            start_from: components["schemas"]["StartFrom-Output"] | null;
             /**
              * Steps
              * @description Environment steps of all robots together.
@@ -10577,6 +10780,55 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_experiment_lineage_api_experiments__experiment_id__lineage_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Lineage"];
                 };
             };
             /** @description No valid login */
@@ -12795,6 +13047,55 @@ export interface operations {
             };
         };
     };
+    get_run_lineage_api_runs__run_id__lineage_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Lineage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_live_api_runs__run_id__live_get: {
         parameters: {
             query?: never;
@@ -13226,6 +13527,47 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_start_policies_api_training_starts_get: {
+        parameters: {
+            query?: {
+                /** @description Part of a training's name, or of a policy's title. */
+                search?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StartPolicy"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -44,6 +44,11 @@ class ReturnScaler:
         self._mean += delta * returns.size / total
         self._count = total
 
+    def take_over(self, state: Mapping[str, NDArray[np.generic]], count: int) -> None:
+        """Begins with the measure of another training, which counts as so many returns: rewards may differ from now on."""
+        moments = np.asarray(state["moments"], np.float64)
+        self._count, self._mean, self._variance = min(float(moments[0]), float(count)), float(moments[1]), float(moments[2])
+
     def state(self) -> dict[str, NDArray[np.generic]]:
         """For `load_state`."""
         return {"returns": self._returns.copy(), "moments": np.array([self._count, self._mean, self._variance])}

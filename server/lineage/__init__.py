@@ -1,0 +1,1 @@
+"""What a training began with, and what began with it: policies that are trained on."""
