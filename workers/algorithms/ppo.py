@@ -5,6 +5,8 @@ vectorised collection (1), Adam's learning rate annealed (4), generalised advant
 (6), advantages normalised (7; here over the rollout), the clipped surrogate (8), gradient clipping (11; here for actor and
 critic each), returns scaled (continuous control, 3), state-independent deviation (2). Not used: value clipping (9), shared
 layers (14), orthogonal initialisation (2).
+
+Read `workers.algorithms.plain_ppo` first: the same on one page.
 """
 
 from collections.abc import Callable, Iterator
@@ -210,17 +212,24 @@ def initial_deviations(config: PpoConfig, actions: ActionLayout) -> tuple[float,
     )
 
 
+def build_actor_critic(
+    config: PpoConfig, inputs: Inputs, seed: int, actions: ActionLayout
+) -> tuple[GaussianActor, nn.Module]:
+    """Freshly initialised networks on the CPU; the same seed gives the same weights."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(stream_seed(seed, WEIGHTS))
+        network = build_network(config.network, inputs, actions.size)
+        actor = GaussianActor(network, initial_deviations(config, actions), actions)
+        return actor, build_network(config.network, inputs, 1)
+
+
 def build_ppo(
     config: PpoConfig, inputs: Inputs | int, seed: int, device: torch.device, actions: ActionLayout = DEFAULT_ACTIONS
 ) -> Ppo:
     """PPO with freshly initialised networks; the same seed gives the same weights on every device."""
     inputs = as_inputs(inputs)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(stream_seed(seed, WEIGHTS))
-        actor = GaussianActor(
-            build_network(config.network, inputs, actions.size), initial_deviations(config, actions), actions
-        ).to(device)
-        critic = build_network(config.network, inputs, 1).to(device)
+    actor, critic = build_actor_critic(config, inputs, seed, actions)
+    actor, critic = actor.to(device), critic.to(device)
     storage = RolloutStorage(config.rollout_steps, config.robots, inputs.size, actions.size, device)
     generator = torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION))
     if isinstance(config.network, RecurrentNetworkConfig):
