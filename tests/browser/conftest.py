@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -49,17 +50,29 @@ def read_url(process: "subprocess.Popen[str]", seconds: float) -> str:
     raise AssertionError(f"mapless up printed no address:\n{seen}")
 
 
-@pytest.fixture(scope="package")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address, with its login token, of a service with two workers that runs until the last of these tests has ended."""
-    data = tmp_path_factory.mktemp("data")
-    command = [sys.executable, "-m", "server", "up", "--port", "0", "--workers", "2", "--data-dir", str(data)]
+@contextmanager
+def running(mapless: list[str], directory: Path, workers: int) -> Iterator[str]:
+    """The address, with its login token, of a service that runs meanwhile.
+
+    Args:
+        mapless: the command.
+        directory: where it keeps its data.
+        workers: how many it has.
+    """
+    command = [*mapless, "up", "--port", "0", "--workers", str(workers), "--data-dir", str(directory)]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         yield read_url(process, 60.0)
     finally:
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0, "Ctrl-C must end the service cleanly within 10 s"
+
+
+@pytest.fixture(scope="package")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address, with its login token, of a service with two workers that runs until the last of these tests has ended."""
+    with running([sys.executable, "-m", "server"], tmp_path_factory.mktemp("data"), workers=2) as address:
+        yield address
 
 
 @pytest.fixture(scope="package")
@@ -77,14 +90,21 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-@pytest.fixture
-def context(browser: Browser, stack: str) -> Iterator[BrowserContext]:
-    """A logged-in browser profile of its own, 1280 x 900."""
-    origin = "{0.scheme}://{0.netloc}".format(urlsplit(stack))
+@contextmanager
+def logged_in(browser: Browser, address: str) -> Iterator[BrowserContext]:
+    """A browser profile of its own, 1280 x 900, in which a service's page has been opened by its address."""
+    origin = "{0.scheme}://{0.netloc}".format(urlsplit(address))
     context = browser.new_context(base_url=origin, viewport={"width": 1280, "height": 900}, accept_downloads=True)
     context.set_default_timeout(PATIENCE)
     page = context.new_page()
-    page.goto(stack)
+    page.goto(address)
     page.close()
     yield context
     context.close()
+
+
+@pytest.fixture
+def context(browser: Browser, stack: str) -> Iterator[BrowserContext]:
+    """A profile that is logged in to `stack`."""
+    with logged_in(browser, stack) as context:
+        yield context
