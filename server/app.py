@@ -37,6 +37,7 @@ from server.people import endpoints as people
 from server.policies import endpoints as policies
 from server.problems import UNAUTHORIZED, install_error_handlers
 from server.projects import endpoints as projects
+from server.queueing import endpoints as queueing
 from server.replays import endpoints as replays
 from server.reproduction import endpoints as reproduction
 from server.runs import endpoints as runs
@@ -66,6 +67,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     people.router,
     audit.router,
     projects.router,
+    queueing.router,
     experiments.router,
     lineage.router,
     workbench.router,

@@ -127,10 +127,12 @@ class ClaimRequest(Frozen):
             got lost, the server grants the same attempt once more. None claims anew each time.
         queue: that it works for, which says on what it trains.
         extensions: that it has.
+        any_run: the run that it names is the one that it was woken for; it takes whichever comes first.
     """
 
     worker: WorkerName
     published_attempt: int = Field(ge=0)
+    any_run: bool = False
     claim_id: str | None = Field(None, pattern="^[0-9a-f]{32}$")
     queue: Queue = "cpu"
     extensions: Extensions = ()
@@ -148,6 +150,7 @@ class Claim(Frozen):
     """The run is the worker's for as long as it keeps the lease.
 
     Attributes:
+        run_id: which run it is; None where it is the one that was asked for.
         attempt: the fencing token of everything that follows.
         training: with the device that it is trained on, never "auto".
         last_seq: the number of the last item that the server has; the next one has the next number.
@@ -157,6 +160,7 @@ class Claim(Frozen):
         lease_seconds: a worker not heard of for this long loses the run.
     """
 
+    run_id: str | None = None
     attempt: int
     seed: int
     training: TrainingConfig
@@ -166,6 +170,39 @@ class Claim(Frozen):
     lease_seconds: float
 
 
+Bytes = Annotated[int, Field(ge=0, le=MAX_INTEGER)]
+"""Of memory."""
+
+
+class Gpu(Frozen):
+    """A graphics card; `busy` is its share of the last moments, 0 to 1."""
+
+    name: str = Field(max_length=80)
+    memory_bytes: Bytes
+    used_bytes: Bytes
+    busy: float = Field(ge=0.0, le=1.0)
+
+
+class Machine(Frozen):
+    """What a worker runs on.
+
+    Attributes:
+        host: its name.
+        cores: logical processors.
+        load: processes that want one, a minute's mean.
+        memory_bytes: that it has; None where it does not tell.
+        memory_used_bytes: that no other program could have now; None likewise.
+        gpu: None where there is none, or the worker does not train on it.
+    """
+
+    host: str = Field(max_length=120)
+    cores: int = Field(ge=1, le=100_000)
+    load: float = Field(ge=0.0, le=1e6)
+    memory_bytes: Bytes | None = None
+    memory_used_bytes: Bytes | None = None
+    gpu: Gpu | None = None
+
+
 class Heartbeat(Frozen):
     """A worker is there, busy or not.
 
@@ -173,6 +210,7 @@ class Heartbeat(Frozen):
         trouble: why it takes up no run now; None while it does.
         first: since it was started; what was asked of an earlier worker of its name is not asked of it.
         extensions: that it has.
+        machine: that it runs on.
     """
 
     worker: WorkerName
@@ -180,6 +218,7 @@ class Heartbeat(Frozen):
     trouble: str | None = Field(None, max_length=10_000)
     first: bool = False
     extensions: Extensions = ()
+    machine: Machine | None = None
 
 
 class HeartbeatAnswer(Frozen):

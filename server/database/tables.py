@@ -142,6 +142,8 @@ class Run(Base):
     error: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[float] = mapped_column(Float, default=time.time)
     queued_at: Mapped[float] = mapped_column(Float, default=time.time)
+    # The highest is claimed first, of equal ones who has waited longest.
+    priority: Mapped[int] = mapped_column(Integer, default=0, server_default="0")
     started_at: Mapped[float | None] = mapped_column(Float)
     finished_at: Mapped[float | None] = mapped_column(Float)
     # Of its last evaluated checkpoint, for lists of many.
@@ -276,6 +278,12 @@ class Worker(Base):
     drained_at: Mapped[float | None] = mapped_column(Float)
     # What it said of the extensions that were found where it runs (`workers.protocol.ExtensionState`).
     extensions: Mapped[list[dict[str, str | None]] | None] = mapped_column(JSON)
+    # What it said of its machine (`workers.protocol.Machine`).
+    machine: Mapped[dict[str, Any] | None] = mapped_column(JSON)
+    # Seconds in which it had a run, by the number of the six hours since the epoch; of a week.
+    activity: Mapped[dict[str, float] | None] = mapped_column(JSON)
+    # The run that it took up last, which may have been deleted.
+    last_run_id: Mapped[str | None] = mapped_column(String(16))
 
 
 class User(Base):

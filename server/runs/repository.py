@@ -1,7 +1,7 @@
 """Runs and what hangs on them, in SQL."""
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, joinedload
@@ -10,6 +10,10 @@ from server.database import tables
 from server.errors import NotFoundError
 from server.runs.states import ACTIVE
 from workers.reporting import EventLevel
+
+_TURN = tables.Run.priority.desc(), tables.Run.queued_at, tables.Run.id
+"""Which run is claimed first."""
+_AT_ONCE = 50
 
 
 class RunRepository:
@@ -70,9 +74,32 @@ class RunRepository:
         self._session.add(tables.RunEvent(run_id=run_id, level=level, message=message, step=step))
 
     def queued(self) -> Sequence[tables.Run]:
-        """The runs that wait for a worker, with their experiments, the longest first."""
+        """The runs that wait for a worker, with their experiments, in the order of their turn."""
         query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
-        return self._session.scalars(query.order_by(tables.Run.queued_at, tables.Run.id)).all()
+        return self._session.scalars(query.order_by(*_TURN)).all()
+
+    def claimed_under(self, claim_id: str) -> str | None:
+        """The id of the run that a worker has under this claim."""
+        query = select(tables.Run.id).where(tables.Run.state.in_(ACTIVE), tables.Run.claim_id == claim_id)
+        return self._session.scalar(query)
+
+    def in_turn(self) -> Iterator[tables.Run]:
+        """As `queued`, read as far as it is asked for."""
+        query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
+        offset = 0
+        while runs := self._session.scalars(query.order_by(*_TURN).offset(offset).limit(_AT_ONCE)).all():
+            yield from runs
+            offset += len(runs)
+
+    def take(self, run_id: str) -> tables.Run | None:
+        """The run, locked, if it waits still; None where it does not, or another transaction is about to give it away."""
+        query = select(tables.Run).where(tables.Run.id == run_id, tables.Run.state == "queued")
+        locked = query.with_for_update(of=tables.Run, skip_locked=True)
+        return self._session.scalar(locked.execution_options(populate_existing=True))
+
+    def highest_priority(self) -> int | None:
+        """Of the runs that wait; None where none does."""
+        return self._session.scalar(select(func.max(tables.Run.priority)).where(tables.Run.state == "queued"))
 
     def active_attempts(self) -> list[tuple[str, int]]:
         """Id and attempt of every run that a worker has."""

@@ -2,13 +2,14 @@
 
 from collections.abc import Collection, Sequence
 
-from sqlalchemy import ColumnElement, select, update
+from sqlalchemy import ColumnElement, delete, select, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
+from server.queueing.activity import with_work
 from server.runs.states import ACTIVE
 from sim.extending.discovery import UsedExtension, missing
-from workers.protocol import HEARTBEAT_SECONDS, Extensions, ExtensionState, Queue
+from workers.protocol import HEARTBEAT_SECONDS, Extensions, ExtensionState, Machine, Queue
 
 SILENCE_SECONDS = 3 * HEARTBEAT_SECONDS
 """A worker that was silent for longer is not counted on."""
@@ -25,10 +26,41 @@ class WorkerRepository:
         query = select(tables.Worker).where(tables.Worker.last_seen >= moment).order_by(tables.Worker.name)
         return self._session.scalars(query).all()
 
-    def seen(self, name: str, queue: Queue, moment: float, trouble: str | None = None, extensions: Extensions = ()) -> None:
-        """Note that a worker of this queue has just been heard of, and why it takes up no run where it does not."""
-        found = [extension.model_dump() for extension in extensions]
-        self._session.merge(tables.Worker(name=name, queue=queue, last_seen=moment, trouble=trouble, extensions=found))
+    def seen(
+        self,
+        name: str,
+        queue: Queue,
+        moment: float,
+        trouble: str | None = None,
+        extensions: Extensions = (),
+        machine: Machine | None = None,
+    ) -> None:
+        """Note that a worker of this queue has just been heard of, on what, and why it takes up no run where it does not.
+
+        The time since it was last heard of counts as worked, if it has a run.
+        """
+        worker = self._session.get(tables.Worker, name)
+        if worker is None:
+            worker = tables.Worker(name=name)
+            self._session.add(worker)
+        elif self._has_run(name):
+            worked = min(max(moment - worker.last_seen, 0.0), SILENCE_SECONDS)
+            worker.activity = with_work(worker.activity or {}, moment, worked)
+        worker.queue, worker.last_seen, worker.trouble = queue, moment, trouble
+        worker.extensions = [extension.model_dump() for extension in extensions]
+        worker.machine = machine.model_dump() if machine is not None else None
+
+    def took_up(self, name: str, run_id: str) -> None:
+        """Note which run a worker took up last."""
+        self._session.execute(update(tables.Worker).where(tables.Worker.name == name).values(last_run_id=run_id))
+
+    def _has_run(self, name: str) -> bool:
+        query = select(tables.Run.id).where(tables.Run.state.in_(ACTIVE), tables.Run.worker == name).limit(1)
+        return self._session.scalar(query) is not None
+
+    def remove(self, names: Collection[str]) -> None:
+        """Forget workers."""
+        self._session.execute(delete(tables.Worker).where(tables.Worker.name.in_(names)))
 
     def drain(self, names: Collection[str], moment: float | None) -> None:
         """Ask workers to finish their runs and take up no more; None takes it back."""

@@ -29,6 +29,7 @@ from server.worker_api.attempts import FencedError
 from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
 from server.worker_api.ingest import Outcome, Report
+from server.worker_api.losses import exhausted, hopeful
 from sim.extending.discovery import missing, wording
 from workers.config import TrainingConfig
 from workers.protocol import (
@@ -62,7 +63,9 @@ class WorkerService:
         """Note that a worker is there; what it should do."""
         with self._services.database.write() as session:
             workers = WorkerRepository(session)
-            workers.seen(heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble, heartbeat.extensions)
+            workers.seen(
+                heartbeat.worker, heartbeat.queue, time.time(), heartbeat.trouble, heartbeat.extensions, heartbeat.machine
+            )
             if heartbeat.first:
                 workers.drain([heartbeat.worker], None)
             return HeartbeatAnswer(drain=workers.is_drained(heartbeat.worker))
@@ -70,13 +73,16 @@ class WorkerService:
     def claim(self, run_id: str, request: ClaimRequest, principal: Principal = WORKER) -> Claim:
         """Give a run to a worker, if it is still to be had; the run remembers with whose token it was claimed.
 
+        Who takes any run gets the first in the queue that it can train: should the message that woke it have been about
+        another one, its turn comes with the next message.
+
         Raises:
             NotFoundError: there is no such run.
             ConflictError: it is not to be had at this attempt, or can't be trained any more.
         """
         problem: str | None = None
         with self._services.database.write() as session:
-            run = RunRepository(session).get(run_id, for_update=True)
+            run, request = _in_turn(session, run_id, request)
             # At once, not from the worker's next heartbeat on; a claim whose answer got lost is asked for once more.
             if WorkerRepository(session).is_drained(request.worker) and run.claim_id != (request.claim_id or ""):
                 raise ConflictError("This worker was asked to take up no more runs.")
@@ -89,6 +95,7 @@ class WorkerService:
             if principal.credential is not None and run.claimed_with != principal.credential:
                 RunRepository(session).add_event(run.id, "info", f"Claimed with the token {principal.name}.", run.step)
             run.claimed_with = principal.credential
+            WorkerRepository(session).took_up(request.worker, run.id)
             if stored.unreadable:
                 problem = stored.why_not
             try:
@@ -98,6 +105,7 @@ class WorkerService:
             if problem is not None:
                 attempts.end(session, run, Final(outcome="failed", error=problem))
             claim = Claim(
+                run_id=run.id,
                 attempt=run.attempt,
                 seed=run.seed,
                 training=training,
@@ -109,7 +117,7 @@ class WorkerService:
                 lease_seconds=self._services.settings.lease_seconds,
             )
         self._services.instruments.claims.labels(request.queue).inc()
-        self._services.leases.renew(run_id, claim.attempt)
+        self._services.leases.renew(run.id, claim.attempt)
         self._publish(run, "run")
         if problem is not None:
             raise ConflictError(problem)
@@ -324,6 +332,32 @@ def _refuse_without_extensions(run: tables.Run, stored: StoredTraining, request:
     there = {one.name: one.version for one in request.extensions}
     if not stored.unreadable and (lacking := missing(stored.training.extensions, there)):
         raise ConflictError(f"Run {run.id} needs {wording(lacking)}, which {request.worker} does not have.")
+
+
+def _in_turn(session: Session, run_id: str, request: ClaimRequest) -> tuple[tables.Run, ClaimRequest]:
+    """The run that a worker is given, if it may have it, and the request as if it had asked for that one.
+
+    Raises:
+        NotFoundError: there is no such run, and no other one for it.
+    """
+    runs = RunRepository(session)
+    if request.any_run:
+        if request.claim_id is not None and (held := runs.claimed_under(request.claim_id)) is not None:
+            return runs.get(held, for_update=True), request
+        for waiting in runs.in_turn():
+            if _can_train(session, waiting, request) and (run := runs.take(waiting.id)) is not None:
+                return run, request.model_copy(update={"published_attempt": run.attempt})
+    return runs.get(run_id, for_update=True), request
+
+
+def _can_train(session: Session, run: tables.Run, request: ClaimRequest) -> bool:
+    stored = read_training(run.experiment.training)
+    there = {one.name: one.version for one in request.extensions}
+    if stored.lacking or request.queue not in queues_of(stored.training, run.device):
+        return False
+    if not stored.unreadable and missing(stored.training.extensions, there):
+        return False
+    return not (exhausted(run, request.worker) and hopeful(run, takers(session, run, stored.training)))
 
 
 def _on_device(run: tables.Run, training: TrainingConfig, request: ClaimRequest) -> TrainingConfig:

@@ -45,6 +45,8 @@ TABLE = {
         GET /api/training/starts
         GET /api/experiments
         GET /api/workbench/groups
+        GET /api/queue
+        GET /api/workers
         GET /api/workbench/ids
         GET /api/workbench/keys
         GET /api/workbench/values
@@ -123,6 +125,8 @@ TABLE = {
         POST /api/runs/{run_id}/resume
         POST /api/evaluations/{evaluation_id}/cancel
         DELETE /api/evaluations/{evaluation_id}
+        PUT /api/runs/{run_id}/priority
+        POST /api/runs/{run_id}/front
         DELETE /api/reproduction/{campaign_id}
         POST /api/reproduction/{campaign_id}/stop
         POST /api/reproduction/{campaign_id}/resume
@@ -137,6 +141,7 @@ TABLE = {
         POST /api/projects
         DELETE /api/arenas/imported/{sha256}
         POST /api/workers/drain
+        POST /api/workers/remove
         GET /api/jobs
         GET /api/jobs/{job_id}
         POST /api/jobs/{job_id}/cancel

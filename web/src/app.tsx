@@ -45,6 +45,10 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/ArenasPage')).ArenasPage }),
           },
           {
+            path: 'queue',
+            lazy: async () => ({ Component: (await import('./pages/QueuePage')).QueuePage }),
+          },
+          {
             path: 'reproduction',
             lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },

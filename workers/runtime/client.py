@@ -24,6 +24,7 @@ from workers.protocol import (
     ClaimRequest,
     Heartbeat,
     HeartbeatAnswer,
+    Machine,
     Queue,
     found_extensions,
 )
@@ -67,18 +68,29 @@ class ServerClient:
         """Close the connections."""
         self._http.close()
 
-    def heartbeat(self, worker: str, queue: Queue, trouble: str | None = None, *, first: bool = False) -> HeartbeatAnswer:
-        """Tell that this worker is there, and why it takes up no run where it does not."""
-        beat = Heartbeat(worker=worker, queue=queue, trouble=trouble, first=first, extensions=found_extensions())
+    def heartbeat(
+        self,
+        worker: str,
+        queue: Queue,
+        trouble: str | None = None,
+        *,
+        first: bool = False,
+        machine: Machine | None = None,
+    ) -> HeartbeatAnswer:
+        """Tell that this worker is there, on what, and why it takes up no run where it does not."""
+        beat = Heartbeat(
+            worker=worker, queue=queue, trouble=trouble, first=first, extensions=found_extensions(), machine=machine
+        )
         response = self._send("POST", "/api/worker/heartbeat", content=beat.model_dump_json())
         return read_answer(HeartbeatAnswer, response)
 
     def claim(self, run_id: str, worker: str, published_attempt: int, claim_id: str, queue: Queue = "cpu") -> Claim:
-        """Take up a run; asked again with the same `claim_id`, it is the same attempt."""
+        """Take up this run, or one that comes before it; asked again with the same `claim_id`, it is the same attempt."""
         request = ClaimRequest(
             worker=worker,
             published_attempt=published_attempt,
             claim_id=claim_id,
+            any_run=True,
             queue=queue,
             extensions=found_extensions(),
         )

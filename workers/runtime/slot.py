@@ -14,6 +14,7 @@ from workers.protocol import HEARTBEAT_SECONDS
 from workers.runtime.client import ServerClient
 from workers.runtime.ending import DRAIN_SIGNAL
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
+from workers.runtime.machine import MachineWatch
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.trainer_handle import TrainerHandle
 
@@ -59,6 +60,7 @@ class Slot:
         self._no_trainer: str | None = None
         self._first = self._answered = True
         self._fitness = Fitness(settings.work_dir, settings.min_free_bytes)
+        self._machine = MachineWatch(gpu=settings.worker_queue == "gpu")
         threading.Thread(target=self._keep, name="keeper", daemon=True).start()
         threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
 
@@ -187,7 +189,9 @@ class Slot:
         trouble = self.trouble
         self._fitness.say(trouble)
         try:
-            answer = self.client.heartbeat(self.name, self.settings.worker_queue, trouble, first=self._first)
+            answer = self.client.heartbeat(
+                self.name, self.settings.worker_queue, trouble, first=self._first, machine=self._machine.look()
+            )
             self._first = False
             if answer.drain and not self._draining:
                 self._draining = True

@@ -71,9 +71,8 @@ worker_process_shutdown.connect(_close_slot)
 
 @shared_task(name=TRAIN_TASK)
 def train(run_id: str, attempt: int) -> None:
-    """Train a run, if it is still to be had at `attempt`; every other message is one too many, and dropped."""
-    with process_is_about(run_id):
-        _train(run_id, attempt)
+    """Train the run that comes first in the queue: this one at `attempt`, or another; a message too many is dropped."""
+    _train(run_id, attempt)
 
 
 def _train(run_id: str, attempt: int) -> None:
@@ -95,9 +94,10 @@ def _train(run_id: str, attempt: int) -> None:
     if claim is None:
         _slot.put_back(trainer)
         return
-    logger.info("run %s: attempt %d begins", run_id, claim.attempt)
     try:
-        fault = _see_through(_slot, run_id, claim, trainer)
+        with process_is_about(claim.run_id or run_id):
+            logger.info("run %s: attempt %d begins", claim.run_id or run_id, claim.attempt)
+            fault = _see_through(_slot, claim.run_id or run_id, claim, trainer)
     finally:
         trainer.close()
         _slot.give_back()

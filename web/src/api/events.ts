@@ -46,7 +46,8 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   if (path === '/api/workbench/keys' || path === '/api/workbench/values') return change.kind === 'experiment'
   // Thirty runs report several times a second: while they go on, their page asks at its own pace.
   if (path === '/api/reproduction') return change.kind !== 'metrics'
-  if (path === '/api/status') return change.kind !== 'metrics'
+  if (path === '/api/status' || path === '/api/queue' || path === '/api/workers')
+    return change.kind !== 'metrics'
   if (path.startsWith('/api/experiments/{experiment_id}')) return ofExperiment
   if (path === '/api/compare') {
     return change.kind !== 'metrics' && ofCompared

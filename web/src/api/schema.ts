@@ -1217,6 +1217,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/queue": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Queue
+         * @description The runs that wait, in the order of their turns, with what for and until when.
+         */
+        get: operations["list_queue_api_queue_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/reproduction": {
         parameters: {
             query?: never;
@@ -1381,6 +1401,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run_id}/front": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Move To Front
+         * @description Let a run that waits have the next turn.
+         */
+        post: operations["move_to_front_api_runs__run_id__front_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run_id}/lineage": {
         parameters: {
             query?: never;
@@ -1438,6 +1478,26 @@ export interface paths {
          */
         get: operations["get_metrics_api_runs__run_id__metrics_get"];
         put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/priority": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Set Priority
+         * @description Say how urgent a run is that waits.
+         */
+        put: operations["set_priority_api_runs__run_id__priority_put"];
         post?: never;
         delete?: never;
         options?: never;
@@ -1797,6 +1857,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/workers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Workers
+         * @description Every worker with its machine, what it trains, how busy it was, and what was last heard of it.
+         */
+        get: operations["list_workers_api_workers_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/workers/drain": {
         parameters: {
             query?: never;
@@ -1811,6 +1891,26 @@ export interface paths {
          * @description Let a worker finish its runs, take up no more, and end.
          */
         post: operations["drain_worker_api_workers_drain_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/workers/remove": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Remove Worker
+         * @description Forget a worker that has gone.
+         */
+        post: operations["remove_worker_api_workers_remove_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -4388,6 +4488,20 @@ export interface components {
             seed: number;
         };
         /**
+         * Gpu
+         * @description A graphics card; `busy` is its share of the last moments, 0 to 1.
+         */
+        Gpu: {
+            /** Busy */
+            busy: number;
+            /** Memory Bytes */
+            memory_bytes: number;
+            /** Name */
+            name: string;
+            /** Used Bytes */
+            used_bytes: number;
+        };
+        /**
          * Group
          * @description The experiments that have the same value under a key.
          */
@@ -5282,6 +5396,31 @@ export interface components {
         Login: {
             /** Token */
             token: string;
+        };
+        /**
+         * Machine
+         * @description What a worker runs on.
+         *
+         *     Attributes:
+         *         host: its name.
+         *         cores: logical processors.
+         *         load: processes that want one, a minute's mean.
+         *         memory_bytes: that it has; None where it does not tell.
+         *         memory_used_bytes: that no other program could have now; None likewise.
+         *         gpu: None where there is none, or the worker does not train on it.
+         */
+        Machine: {
+            /** Cores */
+            cores: number;
+            gpu: components["schemas"]["Gpu"] | null;
+            /** Host */
+            host: string;
+            /** Load */
+            load: number;
+            /** Memory Bytes */
+            memory_bytes: number | null;
+            /** Memory Used Bytes */
+            memory_used_bytes: number | null;
         };
         /**
          * MatchingIds
@@ -6305,6 +6444,14 @@ export interface components {
             training: components["schemas"]["TrainingConfig-Output"];
         };
         /**
+         * Priority
+         * @description Where in the queue a run stands.
+         */
+        Priority: {
+            /** Priority */
+            priority: number;
+        };
+        /**
          * ProgressTerm
          * @description Metres by which the target came nearer: d before - d now.
          */
@@ -6426,6 +6573,29 @@ export interface components {
              * @default -5
              */
             weight: number;
+        };
+        /**
+         * QueuePage
+         * @description A part of the queue, in the order of its turns.
+         */
+        QueuePage: {
+            /**
+             * Hidden
+             * @description Runs that wait in projects that one may not see.
+             */
+            hidden: number;
+            /** Items */
+            items: components["schemas"]["WaitingRun"][];
+            /**
+             * Jobs
+             * @description Views, replays, exports and evaluations that wait for a worker of jobs.
+             */
+            jobs: number;
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
         };
         /**
          * RacecarConfig
@@ -8888,6 +9058,59 @@ export interface components {
             width: number;
         };
         /**
+         * WaitingRun
+         * @description A run in the queue.
+         */
+        WaitingRun: {
+            /** Algorithm */
+            algorithm: string;
+            /** Experiment Id */
+            experiment_id: string;
+            /** Experiment Name */
+            experiment_name: string;
+            /**
+             * Extensions
+             * @description That it needs.
+             */
+            extensions: string[];
+            /** Id */
+            id: string;
+            /**
+             * Position
+             * @description In the whole queue, from 1; those that one may not see count.
+             */
+            position: number;
+            /**
+             * Priority
+             * @description The highest is claimed first, of equal ones who has waited longest.
+             */
+            priority: number;
+            /** Project Id */
+            project_id: string;
+            /** Queued At */
+            queued_at: number;
+            /** Seed */
+            seed: number;
+            /**
+             * Starts In
+             * @description Seconds, by the rates of what runs; null where that is not known.
+             */
+            starts_in: number | null;
+            /**
+             * Step
+             * @description Environment steps done by earlier attempts.
+             */
+            step: number;
+            /** Total Steps */
+            total_steps: number;
+            /**
+             * Waits For
+             * @description `turn`: a worker that could train it is there. Otherwise none is: no worker at all, none with a GPU, none with its extensions, none but those that have lost it again and again.
+             * @enum {string}
+             */
+            waits_for: "turn" | "worker" | "gpu" | "extension" | "other worker";
+        };
+        /**
          * Walker
          * @description Goes straight on until something is in the way, then in another direction.
          */
@@ -8986,6 +9209,102 @@ export interface components {
             x: number;
             /** Y */
             y: number;
+        };
+        /**
+         * Worker
+         * @description A worker process: it trains one run at a time.
+         */
+        Worker: {
+            /**
+             * Activity
+             * @description Share of each six hours of the last week in which it had a run, 0 to 1; the oldest first.
+             */
+            activity: number[];
+            /** Busy */
+            busy: boolean;
+            /**
+             * Draining
+             * @description It was asked to finish its run and take up no more.
+             */
+            draining: boolean;
+            /**
+             * Extensions
+             * @description That were found where it runs.
+             */
+            extensions: components["schemas"]["ExtensionState"][];
+            /** Last Seen */
+            last_seen: number;
+            /**
+             * Last Words
+             * @description Of one that has gone: the last line in the log of the run that it had last.
+             */
+            last_words: string | null;
+            /** @description Null until it has said so. */
+            machine: components["schemas"]["Machine"] | null;
+            /** Name */
+            name: string;
+            /**
+             * Queue
+             * @enum {string}
+             */
+            queue: "cpu" | "gpu";
+            /** @description Null where it has none, or one that one may not see. */
+            run: components["schemas"]["WorkersRun"] | null;
+            /**
+             * There
+             * @description It was heard of lately.
+             */
+            there: boolean;
+            /**
+             * Trouble
+             * @description Why it takes up no run, a full disk say; null while it does.
+             */
+            trouble: string | null;
+        };
+        /**
+         * WorkerName
+         * @description Which worker is meant.
+         */
+        WorkerName: {
+            /**
+             * Worker
+             * @description Its name, "worker@host" for all of its processes.
+             */
+            worker: string;
+        };
+        /**
+         * Workers
+         * @description All workers that have not been removed.
+         */
+        Workers: {
+            /**
+             * Items
+             * @description Those that are there first, by name.
+             */
+            items: components["schemas"]["Worker"][];
+        };
+        /**
+         * WorkersRun
+         * @description What a worker trains.
+         */
+        WorkersRun: {
+            /** Experiment Id */
+            experiment_id: string;
+            /** Experiment Name */
+            experiment_name: string;
+            /** Id */
+            id: string;
+            /**
+             * Progress
+             * @description 0 to 1.
+             */
+            progress: number;
+            /** Seconds Left */
+            seconds_left: number | null;
+            /** Seed */
+            seed: number;
+            /** Steps Per Second */
+            steps_per_second: number | null;
         };
         /**
          * WorkerStatus
@@ -12568,6 +12887,49 @@ export interface operations {
             };
         };
     };
+    list_queue_api_queue_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["QueuePage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_reproduction_api_reproduction_get: {
         parameters: {
             query?: {
@@ -13047,6 +13409,71 @@ export interface operations {
             };
         };
     };
+    move_to_front_api_runs__run_id__front_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Takes more rights */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_run_lineage_api_runs__run_id__lineage_get: {
         parameters: {
             query?: never;
@@ -13234,6 +13661,75 @@ export interface operations {
             };
             /** @description No such thing */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    set_priority_api_runs__run_id__priority_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Priority"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Takes more rights */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -14063,6 +14559,35 @@ export interface operations {
             };
         };
     };
+    list_workers_api_workers_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Workers"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
     drain_worker_api_workers_drain_post: {
         parameters: {
             query?: never;
@@ -14096,6 +14621,64 @@ export interface operations {
             };
             /** @description No such thing */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    remove_worker_api_workers_remove_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WorkerName"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -50,6 +50,7 @@ export function Shell() {
             <NavLink to="/policies">Policies</NavLink>
             <NavLink to="/arenas">Arenas</NavLink>
             <NavLink to="/reproduction">Paper</NavLink>
+            <NavLink to="/queue">Queue</NavLink>
           </nav>
         )}
         <Group gap={10} ml="auto" wrap="nowrap">

@@ -8,10 +8,12 @@ interface RowsProps {
   head: readonly string[]
   query: { isPending: boolean; isError: boolean; error: unknown; refetch: () => unknown }
   empty: string
+  /** Pixels below which it scrolls sideways. */
+  minWidth?: number
   children: readonly ReactNode[] | undefined
 }
 
-export function Rows({ what, head, query, empty, children }: RowsProps) {
+export function Rows({ what, head, query, empty, minWidth = 520, children }: RowsProps) {
   if (query.isError && !children) {
     return <QueryError error={query.error} what={what} retry={() => void query.refetch()} />
   }
@@ -23,7 +25,7 @@ export function Rows({ what, head, query, empty, children }: RowsProps) {
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={520}>
+    <Table.ScrollContainer type="native" minWidth={minWidth}>
       <Table aria-label={what} aria-busy={!children}>
         <Table.Thead>
           <Table.Tr>

@@ -1,0 +1,67 @@
+"""Routes of the queue and of the workers."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, status
+
+from server.paging import WindowDep
+from server.problems import CONFLICT, FORBIDDEN, NOT_FOUND
+from server.queueing.schemas import Priority, QueuePage, WorkerName, Workers
+from server.queueing.service import QueueService
+from server.security.permissions import ADMINISTRATE, SIGNED_IN, edit
+from server.security.principal import PrincipalDep
+from server.services import ServicesDep
+
+router = APIRouter(tags=["queue"])
+
+
+def _service(services: ServicesDep) -> QueueService:
+    return QueueService(services)
+
+
+QueueServiceDep = Annotated[QueueService, Depends(_service)]
+
+
+@router.get("/api/queue", dependencies=[SIGNED_IN])
+def list_queue(service: QueueServiceDep, window: WindowDep, principal: PrincipalDep) -> QueuePage:
+    """The runs that wait, in the order of their turns, with what for and until when."""
+    return service.page(window, principal.visible)
+
+
+@router.put(
+    "/api/runs/{run_id}/priority",
+    status_code=status.HTTP_204_NO_CONTENT,
+    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    dependencies=[edit("run_id")],
+)
+def set_priority(run_id: str, body: Priority, service: QueueServiceDep, principal: PrincipalDep) -> None:
+    """Say how urgent a run is that waits."""
+    service.prioritise(run_id, body.priority, principal)
+
+
+@router.post(
+    "/api/runs/{run_id}/front",
+    status_code=status.HTTP_204_NO_CONTENT,
+    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    dependencies=[edit("run_id")],
+)
+def move_to_front(run_id: str, service: QueueServiceDep, principal: PrincipalDep) -> None:
+    """Let a run that waits have the next turn."""
+    service.to_front(run_id, principal)
+
+
+@router.get("/api/workers", dependencies=[SIGNED_IN])
+def list_workers(service: QueueServiceDep, principal: PrincipalDep) -> Workers:
+    """Every worker with its machine, what it trains, how busy it was, and what was last heard of it."""
+    return service.workers(principal.visible)
+
+
+@router.post(
+    "/api/workers/remove",
+    status_code=status.HTTP_204_NO_CONTENT,
+    responses=NOT_FOUND | CONFLICT,
+    dependencies=[ADMINISTRATE],
+)
+def remove_worker(body: WorkerName, service: QueueServiceDep) -> None:
+    """Forget a worker that has gone."""
+    service.remove(body.worker)
