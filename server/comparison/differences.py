@@ -14,14 +14,28 @@ _SHORT_HASH = 8
 
 def differences(configurations: Sequence[Mapping[str, Any]]) -> list[Difference]:
     """The settings that are not the same in all `configurations`, by dotted path; a setting that one lacks is null there."""
-    flat = [dict(_flatten(configuration)) for configuration in configurations]
+    things: list[set[str]] = [set() for _ in configurations]
+    flat = [dict(_flatten(configuration, own)) for configuration, own in zip(configurations, things, strict=True)]
     # A dictionary keeps the order in which a person meets the settings in the form.
     paths = {path: None for settings in flat for path in settings}
-    rows = [Difference(path=path, values=[settings.get(path) for settings in flat]) for path in paths]
+    rows = [
+        Difference(
+            path=path,
+            values=[settings.get(path) for settings in flat],
+            left_out=[_is_of_another(path, own, things) for own in things],
+        )
+        for path in paths
+    ]
     return [row for row in rows if any(value != row.values[0] for value in row.values)]
 
 
-def _flatten(value: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+def _is_of_another(path: str, own: set[str], things: Sequence[set[str]]) -> bool:
+    """Whether a setting is of a list's thing that another configuration has and this one has not."""
+    return any(path.startswith(thing) for others in things for thing in others - own)
+
+
+def _flatten(value: Mapping[str, Any], things: set[str], prefix: str = "") -> list[tuple[str, Any]]:
+    """Pairs of path and value; puts the path of each of a list's named things, with a dot behind it, into `things`."""
     leaves: list[tuple[str, Any]] = []
     for key, child in value.items():
         path = f"{prefix}{key}"
@@ -30,5 +44,6 @@ def _flatten(value: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]
             child = f"{child['title'] or child['name']} ({(child['sha256'] or '')[:_SHORT_HASH]})"
         if isinstance(child, list) and child and all(isinstance(item, Mapping) and "name" in item for item in child):
             child = {item.get("label", item["name"]): {k: v for k, v in item.items() if k not in _NAMES} for item in child}
-        leaves.extend(_flatten(child, f"{path}.") if isinstance(child, Mapping) else [(path, child)])
+            things |= {f"{path}.{name}." for name in child}
+        leaves.extend(_flatten(child, things, f"{path}.") if isinstance(child, Mapping) else [(path, child)])
     return leaves

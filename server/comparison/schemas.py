@@ -26,6 +26,9 @@ class Difference(Schema):
 
     path: str = Field(description="Dotted path in the training's configuration.")
     values: list[Any] = Field(description="One an experiment, in their order; null where it has no such setting.")
+    left_out: list[bool] = Field(
+        description="Likewise: whether it is of something in a list, a part of an observation say, that is left out there."
+    )
 
 
 Measure = Literal["success", "steps_per_target"]

@@ -31,6 +31,12 @@ def list_start_policies(
     return service.policies(search, principal.visible)
 
 
+@router.get("/api/checkpoints/{checkpoint_id}/start", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
+def get_start_policy(checkpoint_id: str, service: LineageServiceDep) -> StartPolicy:
+    """A checkpoint as a policy that a training may begin with."""
+    return service.policy(checkpoint_id)
+
+
 @router.get("/api/experiments/{experiment_id}/lineage", responses=NOT_FOUND, dependencies=[view("experiment_id")])
 def get_experiment_lineage(experiment_id: str, service: LineageServiceDep, principal: PrincipalDep) -> Lineage:
     """What it began with, and what began with a checkpoint of it."""

@@ -12,7 +12,10 @@ class StartPolicy(Schema):
     """A policy that a training may begin with."""
 
     start_from: StartFrom
-    kind: Literal["best", "last", "shipped"] = Field(description="Which of its run's checkpoints, or one that ships.")
+    kind: Literal["best", "last", "other", "shipped"] = Field(
+        description="Which of its run's checkpoints, or one that ships."
+    )
+    experiment_id: str | None = Field(description="Of the training that made it; null for one that ships.")
     success: Estimate | None = Field(description="Of its own evaluation; null where there is none.")
 
 

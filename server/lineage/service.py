@@ -1,6 +1,7 @@
 """What a person sees of where trainings begin: policies to start from, a training's parent and children."""
 
 from collections.abc import Collection, Iterator
+from typing import Literal
 
 from sqlalchemy.orm import Session
 
@@ -42,6 +43,18 @@ class LineageService:
             found = [policy for run in runs for policy in _of_run(session, run)]
         shipped = [policy for policy in shipped_policies() if part.lower() in policy.card.title.lower()]
         return [*found, *map(_shipped, shipped)]
+
+    def policy(self, checkpoint_id: str) -> StartPolicy:
+        """The policy of a checkpoint.
+
+        Raises:
+            NotFoundError: there is no such checkpoint.
+        """
+        with self._services.database.read() as session:
+            row = LineageRepository(session).checkpoint(checkpoint_id)
+            if row is None:
+                raise NotFoundError.of("checkpoint", checkpoint_id)
+            return _policy(row[1], row[0], "other")
 
     def of_experiment(self, experiment_id: str, principal: Principal) -> Lineage:
         """Where an experiment comes from, and what came of any of its runs.
@@ -92,14 +105,24 @@ def _of_run(session: Session, run: tables.Run) -> Iterator[StartPolicy]:
     checkpoints = CheckpointRepository(session)
     best, last = checkpoints.best(run.id), checkpoints.last(run.id)
     if best is not None:
-        success = evaluation_view(best[1]).success
-        yield StartPolicy(start_from=_start(run, best[0]), kind="best", success=success)
+        yield _policy(run, best[0], "best", best[1])
     if last is not None and (best is None or last.id != best[0].id):
-        yield StartPolicy(start_from=_start(run, last), kind="last", success=None)
+        yield _policy(run, last, "last")
 
 
-def _start(run: tables.Run, checkpoint: tables.Checkpoint) -> StartFrom:
-    return StartFrom(source="checkpoint", name=checkpoint.id, sha256=checkpoint.sha256, title=policy_title(run, checkpoint))
+def _policy(
+    run: tables.Run,
+    checkpoint: tables.Checkpoint,
+    kind: Literal["best", "last", "other"],
+    evaluation: tables.Evaluation | None = None,
+) -> StartPolicy:
+    title = policy_title(run, checkpoint)
+    return StartPolicy(
+        start_from=StartFrom(source="checkpoint", name=checkpoint.id, sha256=checkpoint.sha256, title=title),
+        kind=kind,
+        experiment_id=run.experiment_id,
+        success=None if evaluation is None else evaluation_view(evaluation).success,
+    )
 
 
 def _shipped(policy: ShippedPolicy) -> StartPolicy:
@@ -108,5 +131,6 @@ def _shipped(policy: ShippedPolicy) -> StartPolicy:
     return StartPolicy(
         start_from=StartFrom(source="shipped", name=card.name, sha256=None, title=card.title),
         kind="shipped",
+        experiment_id=None,
         success=success_estimate([first.figures.arrivals], [first.figures.episodes], trained=True),
     )

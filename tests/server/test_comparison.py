@@ -56,13 +56,26 @@ def test_what_differs_in_the_configuration_is_listed_by_its_path(client: TestCli
     one = reports.experiment(steps=5_000)
     other = reports.experiment(steps=6_000, algorithm={"name": "ppo", "network": {"name": "resblock"}})
 
+    neither = [False, False]
     assert compare(client, one, other)["differences"] == [
-        {"path": "algorithm.network.name", "values": ["mlp", "resblock"]},
-        {"path": "algorithm.network.hidden_sizes", "values": [[64, 64], None]},
-        {"path": "algorithm.network.activation", "values": ["relu", None]},
-        {"path": "steps", "values": [5_000, 6_000]},
+        {"path": "algorithm.network.name", "values": ["mlp", "resblock"], "left_out": neither},
+        {"path": "algorithm.network.hidden_sizes", "values": [[64, 64], None], "left_out": neither},
+        {"path": "algorithm.network.activation", "values": ["relu", None], "left_out": neither},
+        {"path": "steps", "values": [5_000, 6_000], "left_out": neither},
     ]
-    assert {"path": "steps", "values": [6_000, 5_000]} in compare(client, other, one)["differences"]
+    steps = {"path": "steps", "values": [6_000, 5_000], "left_out": neither}
+    assert steps in compare(client, other, one)["differences"]
+
+
+def test_a_part_or_a_term_that_one_has_is_left_out_in_the_other(client: TestClient, reports: Reports) -> None:
+    one = reports.experiment()
+    parts = [part for part in one["training"]["task"]["observation"]["parts"] if part["name"] != "speeds"]
+    terms = [{"name": "arrival", "weight": 7.0}]
+    other = reports.experiment(task={"observation": {"parts": parts}, "reward": {"terms": terms}})
+    rows = {row["path"]: row for row in compare(client, one, other)["differences"]}
+    assert rows["task.observation.parts.speeds.frames"]["left_out"] == [False, True]
+    assert rows["task.reward.terms.progress.weight"]["left_out"] == [False, True]
+    assert rows["task.reward.terms.arrival.weight"]["left_out"] == [False, False]
 
 
 def test_the_same_configuration_does_not_differ(client: TestClient, reports: Reports) -> None:

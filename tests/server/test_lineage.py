@@ -221,6 +221,9 @@ def test_policies_to_start_from_are_the_best_and_the_last_of_ones_runs_and_those
     found = client.get("/api/training/starts?search=CORRI").json()
     assert [(one["start_from"]["name"], one["kind"]) for one in found] == [(checkpoint, "best"), (last, "last")]
     assert found[0]["success"]["value"] == 0.8
+    one = client.get(f"/api/checkpoints/{last}/start").json()
+    assert one == found[1] | {"kind": "other"}
+    assert one["experiment_id"] == parent["id"]
     every = client.get("/api/training/starts").json()
     assert {"source": "shipped", "name": "simple"}.items() <= every[2]["start_from"].items()
 

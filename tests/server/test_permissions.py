@@ -96,6 +96,7 @@ TABLE = {
         GET /api/runs/{run_id}/live
         PUT /api/runs/{run_id}/live
         GET /api/checkpoints/{checkpoint_id}/download
+        GET /api/checkpoints/{checkpoint_id}/start
         GET /api/checkpoints/{checkpoint_id}/episodes
         GET /api/checkpoints/{checkpoint_id}/bundle
         GET /api/checkpoints/{checkpoint_id}/replays/{episode}

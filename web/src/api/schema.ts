@@ -356,6 +356,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/checkpoints/{checkpoint_id}/start": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Start Policy
+         * @description A checkpoint as a policy that a training may begin with.
+         */
+        get: operations["get_start_policy_api_checkpoints__checkpoint_id__start_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/compare": {
         parameters: {
             query?: never;
@@ -3600,6 +3620,11 @@ export interface components {
          * @description A setting in which the experiments differ.
          */
         Difference: {
+            /**
+             * Left Out
+             * @description Likewise: whether it is of one of a list's named things, a part of an observation say, that is left out there.
+             */
+            left_out: boolean[];
             /**
              * Path
              * @description Dotted path in the training's configuration.
@@ -8165,11 +8190,16 @@ export interface components {
          */
         StartPolicy: {
             /**
+             * Experiment Id
+             * @description Of the training that made it; null for one that ships.
+             */
+            experiment_id: string | null;
+            /**
              * Kind
              * @description Which of its run's checkpoints, or one that ships.
              * @enum {string}
              */
-            kind: "best" | "last" | "shipped";
+            kind: "best" | "last" | "other" | "shipped";
             start_from: components["schemas"]["StartFrom-Output"];
             /** @description Of its own evaluation; null where there is none. */
             success: components["schemas"]["Estimate"] | null;
@@ -10281,6 +10311,55 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_start_policy_api_checkpoints__checkpoint_id__start_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                checkpoint_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StartPolicy"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

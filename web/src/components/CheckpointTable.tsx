@@ -1,5 +1,6 @@
 /** The policies of a run, to take away. */
 import { Badge, Button, Group, Table } from '@mantine/core'
+import { Link } from 'react-router'
 import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
@@ -111,6 +112,17 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                       Episodes
                     </Button>
                   )}
+                  <Button
+                    component={Link}
+                    to={`/new?checkpoint=${checkpoint.id}`}
+                    size="compact-sm"
+                    variant="default"
+                    visibleFrom="sm"
+                    title="A training that begins with this policy"
+                    aria-label={`Fine-tune step ${checkpoint.step}`}
+                  >
+                    Fine-tune
+                  </Button>
                   <Button
                     component="a"
                     href={`/api/checkpoints/${checkpoint.id}/bundle`}

@@ -1,9 +1,9 @@
-/** What can be done with a shipped policy: take it away, or train one like it. */
+/** What can be done with a shipped policy: take it away, train one like it, or train it further. */
 import { Button, Menu } from '@mantine/core'
 import { Link } from 'react-router'
 import type { ShippedPolicy } from '../api/types'
 import { fileSize } from '../lib/format'
-import { IconCopy, IconDownload } from './icons'
+import { IconCopy, IconDownload, IconPencil } from './icons'
 
 interface PolicyActionsProps {
   policy: ShippedPolicy
@@ -43,6 +43,16 @@ export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
         aria-label={`Train one like ${policy.title}`}
       >
         Train one like it
+      </Button>
+      <Button
+        component={Link}
+        to={`/new?shipped=${policy.name}`}
+        variant="default"
+        size={size}
+        leftSection={<IconPencil size={15} />}
+        aria-label={`Fine-tune ${policy.title}`}
+      >
+        Fine-tune
       </Button>
     </>
   )

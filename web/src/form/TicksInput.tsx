@@ -1,6 +1,9 @@
-/** A list of which each kind may be there once, such as an observation's parts: one tick leaves it out or takes it in. */
-import { Checkbox, Input } from '@mantine/core'
-import { useRef } from 'react'
+/**
+ * A list of which each kind may be there once, such as an observation's parts: one tick leaves it out or takes it in. What can be
+ * set of a part is told in a line, and shown when asked for.
+ */
+import { Anchor, Checkbox, Input, Text } from '@mantine/core'
+import { useRef, useState } from 'react'
 import { fieldId } from './FieldInput'
 import classes from './form.module.css'
 import type { Field } from './layout'
@@ -8,6 +11,7 @@ import { PresetSelect } from './PresetSelect'
 import { problemOf } from './problems'
 import { Setting } from './Setting'
 import { branches, defaults, type Json, resolve, type Schema, withoutNull } from './schema'
+import { settingText } from './settingText'
 import type { Form } from './useForm'
 import { pathKey, valueAt } from './values'
 
@@ -26,6 +30,7 @@ export function TicksInput({ field, form, root }: TicksInputProps) {
   const tag = field.item.discriminator?.propertyName ?? 'name'
   // What was left out comes back as it was.
   const left = useRef(new Map<string, Part>())
+  const [opened, setOpened] = useState<readonly string[]>([])
 
   function tick(kind: string, schema: Schema, ticked: boolean) {
     const gone = parts.find((part) => part[tag] === kind)
@@ -46,6 +51,11 @@ export function TicksInput({ field, form, root }: TicksInputProps) {
         {kinds.map(({ tag: kind, label, schema }) => {
           const index = parts.findIndex((part) => part[tag] === kind)
           const part = parts[index]
+          const settings = Object.entries(schema.properties ?? {}).filter(([name]) => name !== tag)
+          const place = pathKey([...field.path, index])
+          // What was refused is never hidden.
+          const isRefused = part !== undefined && problemOf(form.problems, place) !== undefined
+          const isOpen = opened.includes(kind) || isRefused
           return (
             <li key={kind} className={classes.row} aria-label={label}>
               <Checkbox
@@ -56,18 +66,40 @@ export function TicksInput({ field, form, root }: TicksInputProps) {
                 disabled={part !== undefined && parts.length <= (field.schema.minItems ?? 0)}
                 onChange={(event) => tick(kind, schema, event.currentTarget.checked)}
               />
+              {part && settings.length > 0 && (
+                <Text size="xs" c="dimmed" className={classes.brief}>
+                  {isOpen
+                    ? ''
+                    : settings
+                        .map(([name, one]) => `${resolve(one, root).title}: ${settingText(part[name])}`)
+                        .join(', ')}
+                  <Anchor
+                    component="button"
+                    type="button"
+                    inherit
+                    ml={8}
+                    aria-label={`Settings of ${label}`}
+                    aria-expanded={isOpen}
+                    disabled={isRefused}
+                    onClick={() =>
+                      setOpened(isOpen ? opened.filter((one) => one !== kind) : [...opened, kind])
+                    }
+                  >
+                    {isOpen ? 'Done' : 'Change'}
+                  </Anchor>
+                </Text>
+              )}
               {part &&
-                Object.entries(schema.properties ?? {})
-                  .filter(([name]) => name !== tag)
-                  .map(([name, one]) => (
-                    <Setting
-                      key={name}
-                      schema={withoutNull(resolve(one, root)).schema}
-                      value={part[name] ?? null}
-                      error={problemOf(form.problems, `${pathKey([...field.path, index])}.${name}`)}
-                      onChange={(next) => form.set([...field.path, index, name], next)}
-                    />
-                  ))}
+                isOpen &&
+                settings.map(([name, one]) => (
+                  <Setting
+                    key={name}
+                    schema={withoutNull(resolve(one, root)).schema}
+                    value={part[name] ?? null}
+                    error={problemOf(form.problems, `${place}.${name}`)}
+                    onChange={(next) => form.set([...field.path, index, name], next)}
+                  />
+                ))}
             </li>
           )
         })}

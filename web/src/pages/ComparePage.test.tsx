@@ -28,7 +28,7 @@ test('figures with intervals and N, warnings, curves, and what differs', async (
       .getAllByRole('row')
       .slice(1)
       .map((row) => row.textContent),
-  ).toEqual(['Learning rateAlgorithm0.0010.0003', 'Hidden layersNetwork64, 64–'])
+  ).toEqual(['Learning rateAlgorithm0.0010.0003', 'Hidden layersNetwork64, 64–', 'WeightProgress500left out'])
   const [chart] = await screen.findAllByRole('figure', { name: 'Success rate' })
   expect(chart).toHaveTextContent('Corridor, 2 seeds')
   expect(chart).toHaveTextContent('Alone, 1 seed')

@@ -7,7 +7,6 @@ import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
 import { ComparisonVerdicts } from '../components/ComparisonVerdicts'
-import { settingText } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
@@ -15,6 +14,7 @@ import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/
 import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
+import { settingText } from '../form/settingText'
 import { MAX_COMPARED } from '../lib/comparison'
 import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -279,7 +279,7 @@ function Differences({ comparison }: { comparison: Comparison }) {
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {differences.map(({ path, values }) => (
+          {differences.map(({ path, values, left_out }) => (
             <Table.Tr key={path}>
               <Table.Td title={path}>
                 <SettingName
@@ -291,8 +291,8 @@ function Differences({ comparison }: { comparison: Comparison }) {
                 />
               </Table.Td>
               {experiments.map((one, index) => (
-                <Table.Td key={one.id} className={ui.number} fw={550}>
-                  {settingText(values[index])}
+                <Table.Td key={one.id} className={ui.number} fw={left_out[index] ? undefined : 550}>
+                  {left_out[index] ? <span className={ui.quiet}>left out</span> : settingText(values[index])}
                 </Table.Td>
               ))}
             </Table.Tr>

@@ -1,4 +1,4 @@
-import { screen, waitFor } from '@testing-library/react'
+import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import { curves, experiment, form, training } from '../testing/examples'
 import { open } from '../testing/render'
@@ -70,4 +70,61 @@ test('seeds are added behind the last', async () => {
   await user.click(await screen.findByRole('button', { name: 'Seeds' }))
   await user.click(await screen.findByRole('button', { name: 'Train' }))
   await waitFor(() => expect(server.changes[0]?.body).toEqual({ seeds: [2, 3, 4, 5] }))
+})
+
+test('its parent and what was trained further from it are told', async () => {
+  startServer({
+    'GET /api/training/form': form,
+    'GET /api/experiments/exp1': experiment,
+    'GET /api/experiments/exp1/lineage': {
+      parent: {
+        start_from: {
+          source: 'checkpoint',
+          name: 'cp9',
+          sha256: 'cd'.repeat(32),
+          title: 'Maze, seed 1, step 9,000',
+        },
+        state: 'there',
+        run_id: 'run9',
+        step: 9000,
+      },
+      children: [{ id: 'exp7', name: 'Finer', seed: 0, step: 100_000 }],
+    },
+  })
+  open('/experiments/exp1')
+  const lineage = await screen.findByTestId('lineage')
+  expect(within(lineage).getByRole('link', { name: 'Maze, seed 1, step 9,000' })).toHaveAttribute(
+    'href',
+    '/runs/run9?step=9000',
+  )
+  expect(within(lineage).getByRole('link', { name: 'Finer' })).toHaveAttribute('href', '/experiments/exp7')
+  expect(lineage).toHaveTextContent(/from seed 0, step 100\s000/)
+})
+
+test('a parent that is gone, or not to be seen, is named without a link', async () => {
+  const parent = {
+    start_from: {
+      source: 'checkpoint',
+      name: 'cp9',
+      sha256: 'cd'.repeat(32),
+      title: 'Maze, seed 1, step 9,000',
+    },
+    state: 'gone',
+    run_id: null,
+    step: null,
+  }
+  const server = startServer({
+    'GET /api/training/form': form,
+    'GET /api/experiments/exp1': experiment,
+    'GET /api/experiments/exp1/lineage': { parent, children: [] },
+  })
+  const { unmount } = open('/experiments/exp1')
+  expect(await screen.findByTestId('lineage')).toHaveTextContent('Maze, seed 1, step 9,000 (deleted)')
+  unmount()
+  server.routes['GET /api/experiments/exp1/lineage'] = {
+    parent: { ...parent, state: 'hidden' },
+    children: [],
+  }
+  open('/experiments/exp1')
+  expect(await screen.findByTestId('lineage')).toHaveTextContent("in a project that you don't see")
 })

@@ -10,6 +10,7 @@ import { Configuration } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
+import { ExperimentLineage } from '../components/Lineage'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
@@ -146,6 +147,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         >
           <RunTable runs={experiment.runs} />
         </Panel>
+        <ExperimentLineage experimentId={experiment.id} />
         <Panel title="Curves">
           <div className={charts.grid}>
             {COMPARED.map((metric) => (

@@ -72,7 +72,7 @@ test('another algorithm starts with its own defaults', async () => {
 test('a preset sets the training and leaves name and seeds; a change of it is called one’s own', async () => {
   const server = start()
   const { user } = open('/new')
-  const presets = await screen.findByRole('radiogroup', { name: 'Start from' })
+  const presets = await screen.findByRole('radiogroup', { name: 'Settings' })
   await user.click(within(presets).getByRole('radio', { name: 'Paper settings' }))
   expect(screen.getByRole('radio', { name: 'ResBlock' })).toBeChecked()
   expect(screen.getByRole('radio', { name: 'Paper' })).toBeChecked()
@@ -242,4 +242,118 @@ test('advanced settings are searched by name, heading and description', async ()
   expect(screen.queryByRole('textbox', { name: /Learning rate/ })).not.toBeInTheDocument()
   await user.type(screen.getByRole('textbox', { name: 'Search these settings' }), 'xyz')
   expect(screen.getByText('None of these settings is called so.')).toBeInTheDocument()
+})
+
+const START = {
+  start_from: {
+    source: 'checkpoint',
+    name: 'cp2',
+    sha256: 'cd'.repeat(32),
+    title: 'Corridor, seed 0, step 100,000',
+  },
+  kind: 'best',
+  experiment_id: 'exp1',
+  success: null,
+}
+const SHIPPED = {
+  start_from: { source: 'shipped', name: 'simple', sha256: null, title: 'Simple arena' },
+  kind: 'shipped',
+  experiment_id: null,
+  success: null,
+}
+const STARTS = {
+  'GET /api/training/starts': [START, SHIPPED],
+  'GET /api/checkpoints/cp2/start': { ...START, kind: 'other' },
+  'GET /api/experiments/exp1': experiment,
+}
+
+test('a policy to start from is searched for, sent, and taken back', async () => {
+  const server = start(STARTS)
+  const { user } = open('/new')
+  const field = await screen.findByRole('combobox', { name: 'Start from' })
+  await user.type(field, 'corr')
+  await waitFor(() => expect(server.asked).toContain('/api/training/starts?search=corr'))
+  await user.click(await screen.findByRole('option', { name: /Corridor, seed 0, step 100,000/ }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server).training).toEqual({ ...training, start_from: START.start_from })
+})
+
+test('fine-tuning a checkpoint begins with the settings of its training', async () => {
+  const server = start(STARTS)
+  const { user } = open('/new?checkpoint=cp2')
+  expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('Corridor, further')
+  expect(screen.getByRole('combobox', { name: 'Start from' })).toHaveValue('Corridor, seed 0, step 100,000')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toMatchObject({ seeds: [0], training: { ...training, start_from: START.start_from } })
+})
+
+test('fine-tuning a policy that ships begins with its settings, and a preset leaves the policy as it is', async () => {
+  const server = start({ ...STARTS, 'GET /api/policies/simple': policy })
+  const { user } = open('/new?shipped=simple')
+  expect(await screen.findByRole('combobox', { name: 'Start from' })).toHaveValue(policy.title)
+  await user.click(screen.getByRole('radio', { name: 'Paper settings' }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server).training).toMatchObject({
+    task: { observation: 'paper' },
+    start_from: { source: 'shipped', name: policy.name },
+  })
+})
+
+test('a policy that does not fit says so at its field, and its settings can be taken over', async () => {
+  const server = start({
+    ...STARTS,
+    'POST /api/experiments': refusal(422, [
+      {
+        loc: ['body', 'training', 'start_from'],
+        msg: 'Corridor does not fit: its network is mlp',
+        type: 'value_error',
+      },
+    ]),
+  })
+  const { user } = open('/new?checkpoint=cp2')
+  await user.click(await screen.findByRole('radio', { name: 'ResBlock' }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  const field = screen.getByRole('combobox', { name: 'Start from' })
+  await waitFor(() => expect(field).toBeInvalid())
+  expect(field).toHaveAccessibleDescription(/its network is mlp/)
+  const summary = screen.getByTestId('problems')
+  await user.click(within(summary).getByRole('button', { name: 'Start from' }))
+  expect(field).toHaveFocus()
+  await user.click(screen.getByRole('button', { name: 'Take over its task, algorithm and network' }))
+  await waitFor(() => expect(screen.getByRole('radio', { name: 'MLP' })).toBeChecked())
+  expect(field).toBeValid()
+  server.routes['POST /api/experiments'] = LAUNCHED
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(2))
+  expect(sent(server).training).toEqual({ ...training, start_from: START.start_from })
+})
+
+test('what can be set of a part is told in a line, shown when asked for, and never hidden where it was refused', async () => {
+  const ticks = structuredClone(form) as unknown as { schema: { $defs: Record<string, unknown> } }
+  const reward = ticks.schema.$defs.Reward as { properties: { terms: Record<string, unknown> } }
+  reward.properties.terms['x-ticks'] = true
+  const server = start({ 'GET /api/training/form': ticks })
+  const { user } = open('/new')
+  const part = await screen.findByRole('listitem', { name: 'Progress' })
+  expect(part).toHaveTextContent('Weight: 500, Exponential: no')
+  expect(within(part).queryByRole('textbox')).not.toBeInTheDocument()
+  await user.click(within(part).getByRole('button', { name: 'Settings of Progress' }))
+  const weight = within(part).getByRole('textbox', { name: 'Weight' })
+  await user.clear(weight)
+  await user.type(weight, '70')
+  await user.click(within(part).getByRole('button', { name: 'Settings of Progress' }))
+  expect(part).toHaveTextContent('Weight: 70')
+
+  server.routes['POST /api/experiments'] = refusal(422, [
+    {
+      loc: ['body', 'training', 'task', 'reward', 'terms', 1, 'progress', 'weight'],
+      msg: 'too much',
+      type: 'x',
+    },
+  ])
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(within(part).getByRole('textbox', { name: 'Weight' })).toBeInvalid())
 })

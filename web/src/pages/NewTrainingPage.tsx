@@ -5,13 +5,14 @@ import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
-import type { Experiment, Preset, ShippedPolicy } from '../api/types'
+import type { Experiment, Preset, ShippedPolicy, StartFrom, StartPolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
 import { useLaunchProject } from '../components/people/useLaunchProject'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
+import { START_FIELD, StartFromInput } from '../form/StartFromInput'
 import type { Json, Schema } from '../form/schema'
 import { useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
@@ -28,7 +29,14 @@ type ExperimentLaunch = components['schemas']['ExperimentLaunch']
 export function NewTrainingPage() {
   useTitle('New training')
   const [search] = useSearchParams()
-  const from = search.get('from')
+  const checkpoint = search.get('checkpoint')
+  const start = $api.useQuery(
+    'get',
+    '/api/checkpoints/{checkpoint_id}/start',
+    { params: { path: { checkpoint_id: checkpoint ?? '' } } },
+    { enabled: checkpoint !== null, staleTime: Number.POSITIVE_INFINITY },
+  )
+  const from = search.get('from') ?? start.data?.experiment_id ?? null
   const form = $api.useQuery('get', '/api/training/form', undefined, { staleTime: Number.POSITIVE_INFINITY })
   const original = $api.useQuery(
     'get',
@@ -36,19 +44,25 @@ export function NewTrainingPage() {
     { params: { path: { experiment_id: from ?? '' } } },
     { enabled: from !== null },
   )
-  const like = search.get('policy')
+  const shipped = search.get('shipped')
+  const like = search.get('policy') ?? shipped
   const policy = $api.useQuery(
     'get',
     '/api/policies/{name}',
     { params: { path: { name: like ?? '' } } },
     { enabled: like !== null, staleTime: Number.POSITIVE_INFINITY },
   )
-  const copied = useCopy(original.data)
+  const copied = useCopy(original.data, start.data)
   const chosen = search.get('arena')
   const initial =
-    from !== null ? copied : like !== null ? likePolicy(policy.data) : withArena(form.data?.defaults, chosen)
-  const source = from !== null ? original : like !== null ? policy : null
+    from !== null || checkpoint !== null
+      ? copied
+      : like !== null
+        ? likePolicy(policy.data, shipped !== null)
+        : withArena(form.data?.defaults, chosen)
+  const source = from !== null ? original : checkpoint !== null ? start : like !== null ? policy : null
   const error = form.isError ? form.error : (source?.error ?? null)
+  const key = checkpoint ?? from ?? (shipped ? `from ${shipped}` : like) ?? chosen ?? ''
 
   return (
     <Page title="New training">
@@ -73,8 +87,8 @@ export function NewTrainingPage() {
         </Panel>
       ) : (
         <LaunchForm
-          key={from ?? like ?? chosen ?? ''}
-          draft={`mapless-draft:${from ?? like ?? chosen ?? ''}`}
+          key={key}
+          draft={`mapless-draft:${key}`}
           schema={form.data.schema as Schema}
           defaults={form.data.defaults as unknown as Json}
           initial={initial}
@@ -93,25 +107,50 @@ function withArena(defaults: unknown, chosen: string | null): Json | undefined {
   return arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
 }
 
-/** The training that made a shipped policy. */
-function likePolicy(policy: ShippedPolicy | undefined): Json | undefined {
+/** The training that made a shipped policy, from fresh weights or from the policy itself. */
+function likePolicy(policy: ShippedPolicy | undefined, further: boolean): Json | undefined {
   if (!policy) return undefined
-  const { title, seed, training } = policy
-  return { name: `Like “${title}”`, seeds: [seed], training: training as unknown as Json }
+  const { name, title, seed, training } = policy
+  if (!further) return { name: `Like “${title}”`, seeds: [seed], training: training as unknown as Json }
+  const start_from: StartFrom = { source: 'shipped', name, title, sha256: null }
+  return {
+    name: `“${title}”, trained further`,
+    seeds: [seed],
+    training: { ...training, start_from } as unknown as Json,
+  }
 }
 
-/** What a duplicate starts with; taken once, since its original may go on while the copy is being edited. */
-function useCopy(original: Experiment | undefined): Json | undefined {
+/**
+ * What a duplicate, or a training from a checkpoint, starts with; taken once, since its original may go on while the copy is
+ * being edited.
+ */
+function useCopy(original: Experiment | undefined, start: StartPolicy | undefined): Json | undefined {
   const [copy, setCopy] = useState<Json>()
   if (original && copy === undefined) {
     const { name, runs, training } = original
-    setCopy({
-      name: `${name.slice(0, LONGEST_COPIED_NAME)} (copy)`,
-      seeds: runs.map((run) => run.seed),
-      training: training as unknown as Json,
-    })
+    const short = name.slice(0, LONGEST_COPIED_NAME)
+    setCopy(
+      start
+        ? {
+            name: `${short}, further`,
+            seeds: [0],
+            training: { ...training, start_from: start.start_from } as unknown as Json,
+          }
+        : {
+            name: `${short} (copy)`,
+            seeds: runs.map((run) => run.seed),
+            training: training as unknown as Json,
+          },
+    )
   }
   return copy
+}
+
+/** A training without the policy that it begins with: which preset it is has nothing to do with that. */
+function fresh(training: Json): Json {
+  if (training === null || typeof training !== 'object' || Array.isArray(training)) return training
+  const { start_from: _, ...rest } = training
+  return rest
 }
 
 /** What was typed here before, where it can be read. */
@@ -160,7 +199,7 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
   const shared = { form, root: schema, initial: defaults }
 
   const training = valueAt(form.values, ['training']) ?? null
-  const preset = presets.find((one) => sameValue(training, one.training as unknown as Json))
+  const preset = presets.find((one) => sameValue(fresh(training), fresh(one.training as unknown as Json)))
   const runs = valueAt(form.values, ['seeds'])
   const steps = valueAt(training, ['steps'])
   const otherError = launch.error && !(launch.error instanceof ApiError && launch.error.problems.length > 0)
@@ -184,13 +223,13 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
             </Anchor>
           </Text>
         )}
-        <ProblemSummary fields={fields} problems={form.problems} root={schema} />
+        <ProblemSummary fields={[...fields, START_FIELD]} problems={form.problems} root={schema} />
         <Panel>
           <Stack gap="lg">
             <FieldGrid fields={name} {...shared} />
             <div>
               <Input.Label labelElement="div" id="preset-label" mb={2} display="block">
-                Start from
+                Settings
               </Input.Label>
               <SegmentedControl
                 aria-labelledby="preset-label"
@@ -202,14 +241,18 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                 value={preset?.id ?? 'own'}
                 onChange={(id) => {
                   const chosen = presets.find((one) => one.id === id)
-                  if (chosen) form.set(['training'], chosen.training as unknown as Json)
+                  if (!chosen) return
+                  const start = valueAt(training, ['start_from'])
+                  const settings = chosen.training as unknown as Json
+                  form.set(['training'], start ? withValue(settings, ['start_from'], start) : settings)
                 }}
               />
               <Text size="xs" c="dimmed" mt={6} mih={18}>
                 {preset?.description ??
-                  'Changed by you; choosing a preset again sets everything below back to it.'}
+                  'Changed by you; choosing a preset again sets the settings below back to it.'}
               </Text>
             </div>
+            <StartFromInput form={form} />
             <FieldGrid fields={main} {...shared} />
           </Stack>
         </Panel>

@@ -33,6 +33,10 @@ test('every policy with its figures, and what can be done with it', async () => 
     'href',
     '/new?policy=crowd',
   )
+  expect(within(card).getByRole('link', { name: 'Fine-tune Crowd' })).toHaveAttribute(
+    'href',
+    '/new?shipped=crowd',
+  )
   await user.click(within(card).getByRole('button', { name: 'Download Crowd' }))
   const menu = await screen.findByRole('menu')
   expect(

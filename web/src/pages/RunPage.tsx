@@ -18,6 +18,7 @@ import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { WaitsForExtensions } from '../components/Extensions'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
+import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
 import { canResume, canStop } from '../components/states'
@@ -159,6 +160,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             <Skeleton height={120} m="md" w="auto" />
           )}
         </Panel>
+        <RunLineage runId={run.id} />
         {chosen?.evaluation && (
           <div ref={episodes} className={classes.episodes}>
             <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>

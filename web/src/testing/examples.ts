@@ -336,8 +336,9 @@ export const comparison: Comparison = {
     },
   ],
   differences: [
-    { path: 'algorithm.learning_rate', values: [0.001, 0.0003] },
-    { path: 'algorithm.network.hidden_sizes', values: [[64, 64], null] },
+    { path: 'algorithm.learning_rate', values: [0.001, 0.0003], left_out: [false, false] },
+    { path: 'algorithm.network.hidden_sizes', values: [[64, 64], null], left_out: [false, false] },
+    { path: 'task.reward.terms.progress.weight', values: [500, null], left_out: [false, true] },
   ],
   verdicts: [
     {
