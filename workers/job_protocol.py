@@ -17,7 +17,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from sim.config import AnyArenaConfig, ArenaFile, Frozen, TaskConfig
-from workers.protocol import Text, WorkerName
+from workers.protocol import Extensions, Text, WorkerName
 from workers.reporting import EvaluationResult, Figure, WatchRequest
 
 JobKind = Literal["view", "replay", "export", "evaluate"]
@@ -176,12 +176,14 @@ class JobClaimRequest(Frozen):
         claim_id: chosen by the worker, new for each job that it takes up: asked again under the same id, because the answer
             got lost, the server grants the same attempt once more.
         kinds: that this place takes.
+        extensions: that the worker has.
         wait_seconds: for a job to come.
     """
 
     worker: WorkerName
     claim_id: str = Field(pattern="^[0-9a-f]{32}$")
     kinds: tuple[JobKind, ...] = Field(min_length=1, max_length=4)
+    extensions: Extensions = ()
     wait_seconds: float = Field(10.0, ge=0.0, le=30.0)
 
 

@@ -5,8 +5,10 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from server.database.tables import JobState
+from server.jobs.schemas import WAITS_FOR
 from server.schemas import Estimate, Page, Schema
 from sim.config import ArenaFile
+from sim.extending.discovery import UsedExtension
 from workers.job_protocol import OWN_SUITE, AnyPolicy, SuiteChoice
 from workers.reporting import EpisodeResult, Outcome
 
@@ -68,6 +70,7 @@ class AskedEvaluation(Schema):
     progress: float = Field(description="Share of the work that is done, 0 to 1.")
     seconds_left: float | None = Field(description="Null where that is not known yet, and once it has ended.")
     error: str | None
+    waits_for: list[UsedExtension] = Field(description=WAITS_FOR)
     suite: str | None = Field(description="Its name; null until it is measured.")
     suite_hash: str | None
     figures: EvaluationFigures | None = Field(description="Null until it is measured.")

@@ -201,6 +201,7 @@ def _view(
         progress=services.board.progress(evaluation.job_id) if is_open else float(evaluation.suite is not None),
         seconds_left=seconds_left(job, services.board.progress(evaluation.job_id)) if job is not None else None,
         error=evaluation.error,
+        waits_for=[] if job is None else list(JobService(services).lacking(job)),
         suite=evaluation.suite,
         suite_hash=evaluation.suite_hash,
         figures=None if evaluation.figures is None else EvaluationFigures.model_validate(evaluation.figures),

@@ -7,10 +7,11 @@ import asyncio
 import contextlib
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Coroutine, Iterable, Iterator
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from server.worker_api.losses import machine_of
+from sim.extending.discovery import UsedExtension, missing
 
 # A worker that has not asked for a job for as long has gone, or all of its places are taken.
 _LATELY_SECONDS = 30.0
@@ -27,7 +28,7 @@ class Board:
         self._bells: set[asyncio.Event] = set()
         self._ends: defaultdict[str, set[asyncio.Event]] = defaultdict(set)
         self._askers: Counter[str] = Counter()
-        self._heard: dict[str, float] = {}
+        self._heard: dict[str, tuple[float, Mapping[str, str | None]]] = {}
         self._progress: dict[str, tuple[int, float]] = {}
         self._tasks: set[asyncio.Task[object]] = set()
         self.closed = False
@@ -47,17 +48,18 @@ class Board:
 
     # -- workers ----------------------------------------------------------------------------------------------------------
 
-    def heard(self, worker: str) -> None:
-        """A worker has asked for a job, or told of one."""
+    def heard(self, worker: str, extensions: Mapping[str, str | None] | None = None) -> None:
+        """A worker has asked for a job; its extensions are names to versions."""
         now = time.monotonic()
-        self._heard[worker] = now
+        self._heard[worker] = now, extensions or {}
         if len(self._heard) > 1_000:
-            self._heard = {name: at for name, at in self._heard.items() if now - at < _LATELY_SECONDS}
+            self._heard = {name: said for name, said in self._heard.items() if now - said[0] < _LATELY_SECONDS}
 
-    def workers(self) -> list[str]:
-        """Those that were heard of lately."""
+    def workers(self, needed: Sequence[UsedExtension] = ()) -> list[str]:
+        """Those that were heard of lately, and have what is needed."""
         now = time.monotonic()
-        return [name for name, at in tuple(self._heard.items()) if now - at < _LATELY_SECONDS]
+        said = tuple(self._heard.items())
+        return [name for name, (at, there) in said if now - at < _LATELY_SECONDS and not missing(needed, there)]
 
     def machines(self) -> int:
         """How many workers there are, whatever places each has."""

@@ -2,13 +2,14 @@
 
 from fastapi import APIRouter
 
+from server.database import tables
 from server.jobs.schemas import Job, JobPage
 from server.jobs.service import JobService
 from server.jobs.views import job_view
 from server.paging import WindowDep
 from server.problems import NOT_FOUND
 from server.security.permissions import ADMINISTRATE
-from server.services import ServicesDep
+from server.services import Services, ServicesDep
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"])
 
@@ -22,10 +23,14 @@ def list_jobs(window: WindowDep, services: ServicesDep) -> JobPage:
 @router.get("/{job_id}", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
 def get_job(job_id: str, services: ServicesDep) -> Job:
     """One of them, with its progress and the time that is left."""
-    return job_view(JobService(services).find(job_id), services.board)
+    return _view(services, JobService(services).find(job_id))
 
 
 @router.post("/{job_id}/cancel", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
 def cancel_job(job_id: str, services: ServicesDep) -> Job:
     """Take a job back; one that has ended stays as it is."""
-    return job_view(JobService(services).cancel(job_id), services.board)
+    return _view(services, JobService(services).cancel(job_id))
+
+
+def _view(services: Services, job: tables.Job) -> Job:
+    return job_view(job, services.board, JobService(services).lacking(job))

@@ -4,7 +4,10 @@ from pydantic import Field
 
 from server.database.tables import JobState
 from server.schemas import Page, Schema
+from sim.extending.discovery import UsedExtension
 from workers.job_protocol import JobKind
+
+WAITS_FOR = "Extensions that a worker must have to do it, while no worker is there that has them."
 
 
 class Job(Schema):
@@ -19,6 +22,7 @@ class Job(Schema):
     progress: float = Field(description="Share of the work that is done, 0 to 1.")
     seconds_left: float | None = Field(description="Null where that is not known yet, and once it has ended.")
     error: str | None
+    waits_for: list[UsedExtension] = Field(description=WAITS_FOR)
     created_at: float
     started_at: float | None
     finished_at: float | None

@@ -14,6 +14,7 @@ from server.errors import BusyError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository
 from server.ids import new_id
 from server.jobs.asked import Asked
+from server.jobs.needed import needed_by
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.schemas import JobPage
 from server.jobs.views import job_view
@@ -23,6 +24,7 @@ from server.services import Services
 from server.worker_api.attempts import FencedError
 from server.worker_api.losses import count_loss, exhausted, hopeful, too_many
 from sim.config import ImportedArenaConfig
+from sim.extending.discovery import UsedExtension, missing
 from workers.job_protocol import (
     JOB_SPEC,
     KINDS,
@@ -47,8 +49,6 @@ KEPT_SECONDS = 24 * 3_600.0
 """Of a job that has ended, for people to look at."""
 
 _COME_AGAIN = 10.0
-# Of jobs that a claim looks at: one that this worker keeps losing is passed over.
-_LOOK_AT = 20
 
 
 class JobService:
@@ -89,6 +89,14 @@ class JobService:
         with self._services.database.read() as session:
             return JobRepository(session).get(job_id)
 
+    def lacking(self, job: tables.Job) -> tuple[UsedExtension, ...]:
+        """The extensions that a queued job waits for; none where it does not wait, or a worker is there that has them."""
+        if job.state != "queued":
+            return ()
+        with self._services.database.read() as session:
+            needed = needed_by(session, job.spec)
+        return () if self.board.workers(needed) else needed
+
     def current(self, job_id: str, attempt: int) -> tables.Job:
         """The job, where this attempt has it.
 
@@ -102,7 +110,8 @@ class JobService:
         """Some of the jobs, and how many workers take them up."""
         with self._services.database.read() as session:
             rows, total = JobRepository(session).page(window)
-        return JobPage(items=[job_view(row, self.board) for row in rows], total=total, workers=self.board.machines())
+        items = [job_view(row, self.board, self.lacking(row)) for row in rows]
+        return JobPage(items=items, total=total, workers=self.board.machines())
 
     def cancel(self, job_id: str) -> tables.Job:
         """Nobody wants it any more; its worker hears of it at its next report.
@@ -141,8 +150,11 @@ class JobService:
         if job is not None:
             return self._granted(job)
         others = [name for name in self.board.workers() if name != request.worker]
-        for waiting in repository.queued(request.kinds, _LOOK_AT):
+        there = {one.name: one.version for one in request.extensions}
+        for waiting in repository.queued(request.kinds, MAX_QUEUED):
             if exhausted(waiting, request.worker) and hopeful(waiting, others):
+                continue
+            if missing(needed_by(session, waiting.spec), there):
                 continue
             # One by one: who locked all of them would leave nothing to whoever asks in the same moment.
             if (job := repository.take(waiting.id)) is None:

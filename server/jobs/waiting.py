@@ -7,6 +7,7 @@ from pathlib import Path
 from server.errors import JobFailedError, JobTimeoutError, NoWorkerError
 from server.jobs.asked import Asked
 from server.jobs.names import result_name
+from server.jobs.needed import nobody_for
 from server.jobs.repository import OPEN
 from server.jobs.service import JobService
 from server.services import Services
@@ -51,12 +52,11 @@ async def _until_done(services: Services, job_id: str) -> None:
                 if board.closed:
                     raise JobTimeoutError("The server is about to end: try again later.", retry_after=_COME_AGAIN)
                 now = time.monotonic()
-                if job.state == "running" or board.workers():
+                lacking = await lane.run(service.lacking, job)
+                if job.state == "running" or (board.workers() and not lacking):
                     nobody_since = now
                 if now - nobody_since > NO_WORKER_SECONDS:
-                    raise NoWorkerError(
-                        "No worker is there that does such work: start one with `mapless worker`.", retry_after=_COME_AGAIN
-                    )
+                    raise NoWorkerError(nobody_for("does such work", lacking), retry_after=_COME_AGAIN)
                 if now > deadline:
                     raise JobTimeoutError(
                         f"It took longer than {TIMEOUT_SECONDS:.0f} s: the machine is busy; try again later.",

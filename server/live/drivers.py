@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from server.errors import ServiceError
 from server.ids import new_id
 from server.jobs.asked import Asked
+from server.jobs.needed import nobody_for
 from server.jobs.repository import OPEN
 from server.live.hub import LiveHub, TooManyViewsError
 from workers.errors import FrameError
@@ -49,7 +50,7 @@ class _Driver:
     watchers: int = 0
     job_id: str | None = None
     failure: str | None = None
-    waits_in_vain: bool = False
+    waits_in_vain: str | None = None
     wish: WatchRequest | None = None
     detach: "Callable[[], None] | None" = None
     task: "asyncio.Task[None] | None" = field(default=None)
@@ -108,7 +109,7 @@ class PolicyDrivers:
         if driver is not None and driver.ended and driver.failure is not None:
             return driver.failure
         if driver is not None and driver.waits_in_vain:
-            return "No worker is there that drives finished policies: start one with `mapless worker`."
+            return driver.waits_in_vain
         return self._full(subject)
 
     def frames(self, job_id: str, data: bytes | None = None) -> WatchRequest | None:
@@ -154,7 +155,9 @@ class PolicyDrivers:
             self._by_job[driver.job_id] = driver
             with jobs.board.asking(driver.job_id) as ended:
                 while (job := await jobs.lane.run(jobs.find, driver.job_id)).state in OPEN and not jobs.board.closed:
-                    driver.waits_in_vain = job.state == "queued" and not jobs.board.workers()
+                    lacking = await jobs.lane.run(jobs.lacking, job)
+                    nobody = job.state == "queued" and (bool(lacking) or not jobs.board.workers())
+                    driver.waits_in_vain = nobody_for("drives finished policies", lacking) if nobody else None
                     if job.state == "queued":
                         self._left(driver)
                     with contextlib.suppress(TimeoutError):

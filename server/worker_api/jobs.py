@@ -43,7 +43,7 @@ async def claim_job(
     gone = asyncio.create_task(_until_gone(request))
     try:
         while not gone.done() and not services.board.closed:
-            services.board.heard(body.worker)
+            services.board.heard(body.worker, {one.name: one.version for one in body.extensions})
             with services.board.listening() as bell:
                 claim = await services.lanes.jobs.run(service.claim, body)
                 if claim is not None:

@@ -1,15 +1,20 @@
 """Runs that need extensions: who may claim them, what is said meanwhile, and trainings whose extension is not here."""
 
+import uuid
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from server.database import tables
+from server.jobs import waiting
+from server.jobs.asked import Asked
+from server.jobs.service import JobService
 from server.services import Services
 from server.sweeper import Sweeper
 from server.workbench.indexing import index_some
-from tests.server.harness import WORKER_TOKEN
+from tests.server.harness import WORKER_TOKEN, Reports
+from workers.job_protocol import CheckpointPolicy, EvaluateJob, ExportJob, JobSpec, ShippedPolicyName
 from workers.protocol import Queue
 
 MY_LAB = {"name": "my_lab", "version": "1.2", "source": "pip install my_lab==1.2"}
@@ -100,6 +105,48 @@ def test_a_training_whose_extension_is_not_here_is_shown_and_waits_for_it(client
     assert refused.status_code == 409
     assert "It needs my_lab 1.2, which the service does not have: install it (pip install my_lab==1.2)." in refused.text
     assert client.get(f"/api/runs/{run_id}").json()["state"] == "queued"
+
+
+def asked(jobs: JobService, spec: JobSpec, key: str) -> str:
+    return jobs.ask(Asked(spec, key, "A policy", "0" * 64))
+
+
+def next_job(client: TestClient, *extensions: dict[str, Any]) -> str | None:
+    kinds = ["view", "replay", "export", "evaluate"]
+    body = {"worker": "w@host/jobs0", "claim_id": uuid.uuid4().hex, "kinds": kinds, "wait_seconds": 0.0}
+    answer = client.post("/api/worker/jobs/claim", json=body | {"extensions": list(extensions)}, headers=WORKER)
+    return None if answer.status_code == 204 else str(answer.json()["id"])
+
+
+def test_a_job_of_a_policy_that_needs_an_extension_waits_for_a_worker_that_has_it(
+    client: TestClient, services: Services, reports: Reports
+) -> None:
+    checkpoint = reports.checkpoint({"id": launched(client, services)}, 1_000, None)
+    jobs, policy = JobService(services), CheckpointPolicy(id=checkpoint)
+    needs = asked(jobs, ExportJob(policy=policy), "needs")
+    anybodys = asked(jobs, EvaluateJob(policy=ShippedPolicyName(name="simple")), "anybodys")
+    old = {"name": "my_lab", "version": "1.1"}
+    # It is first in the queue, and in nobody's way.
+    assert next_job(client, old) == anybodys
+    assert next_job(client, old) is None
+    assert client.get(f"/api/jobs/{needs}").json()["waits_for"] == [MY_LAB]
+    assert client.get("/api/jobs").json()["items"][1]["waits_for"] == [MY_LAB]
+    assert next_job(client, {"name": "my_lab", "version": "1.2"}) == needs
+    assert client.get(f"/api/jobs/{needs}").json()["waits_for"] == []
+
+
+def test_who_waits_for_it_is_told_for_what(
+    client: TestClient, services: Services, reports: Reports, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(waiting, "NO_WORKER_SECONDS", 0.0)
+    checkpoint = reports.checkpoint({"id": launched(client, services)}, 1_000, None)
+    assert next_job(client) is None  # a worker is there, without it
+    refused = client.get(f"/api/checkpoints/{checkpoint}/bundle")
+    assert refused.status_code == 503
+    assert "This waits for a worker with my_lab 1.2: install it (pip install my_lab==1.2) where one runs" in refused.text
+    evaluation = {"policies": [{"source": "checkpoint", "id": checkpoint}], "suites": [{"by": "own"}]}
+    answer = client.post("/api/evaluations", json=evaluation)
+    assert answer.json()[0]["waits_for"] == [MY_LAB], answer.text
 
 
 def test_the_status_tells_what_each_worker_has(client: TestClient) -> None:

@@ -2538,6 +2538,11 @@ export interface components {
              * @description Of the policy.
              */
             title: string;
+            /**
+             * Waits For
+             * @description Extensions that a worker must have to do it, while no worker is there that has them.
+             */
+            waits_for: components["schemas"]["UsedExtension-Output"][];
         };
         /**
          * AskedEvaluationPage
@@ -4984,6 +4989,11 @@ export interface components {
              * @description Whose: a policy's name.
              */
             title: string;
+            /**
+             * Waits For
+             * @description Extensions that a worker must have to do it, while no worker is there that has them.
+             */
+            waits_for: components["schemas"]["UsedExtension-Output"][];
             /** Worker */
             worker: string | null;
         };

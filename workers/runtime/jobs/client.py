@@ -8,6 +8,7 @@ import httpx
 
 from workers.errors import ArchiveIntegrityError
 from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobKind, JobOrders, JobReport
+from workers.protocol import found_extensions
 from workers.runtime.client import ServerClient, check, read_answer, unavailable
 
 _BLOCK = 256 * 1024
@@ -18,7 +19,9 @@ class JobClient(ServerClient):
 
     def claim_job(self, worker: str, kinds: tuple[JobKind, ...], claim_id: str, wait_seconds: float) -> JobClaim | None:
         """Take up the next job, waiting for one; None where none came."""
-        request = JobClaimRequest(worker=worker, claim_id=claim_id, kinds=kinds, wait_seconds=wait_seconds)
+        request = JobClaimRequest(
+            worker=worker, claim_id=claim_id, kinds=kinds, extensions=found_extensions(), wait_seconds=wait_seconds
+        )
         response = self._send("POST", "/api/worker/jobs/claim", content=request.model_dump_json())
         return None if response.status_code == httpx.codes.NO_CONTENT else read_answer(JobClaim, response)
 
