@@ -16,7 +16,7 @@ from sim.observations import observation_layout
 from sim.suites import run_suite, suite_for
 from workers.algorithms import build_algorithm
 from workers.algorithms.flat import FlatParameters
-from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
+from workers.config import GruNetwork, MlpNetwork, Network, PpoConfig, ResBlockNetwork
 from workers.networks.compiled import TensorPasses
 from workers.networks.modules import build_network
 
@@ -32,7 +32,7 @@ def warm_up() -> None:
 def _update_all() -> None:
     """Everything that learns, once."""
     task = TaskConfig()
-    networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork())
+    networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork(), GruNetwork(sequence_length=2))
     for network in networks:
         _update_once(PpoConfig(network=network, robots=4, rollout_steps=4, minibatch_size=16, epochs=1), task)
     critic = build_network(MlpNetwork(), 1, 1)

@@ -14,9 +14,10 @@ from workers.errors import NetworkError
 from workers.export.ros2.mapless_navigator.policy import Forward, evaluate
 from workers.kernels.constants import LEAKY_SLOPE
 from workers.networks.config import GruNetwork, NetworkConfig
+from workers.networks.convolution import convolve
 from workers.networks.description import Description, describe
-from workers.networks.gates import GruGates
 from workers.networks.inputs import Inputs, as_inputs
+from workers.networks.recurrence import GruSequence
 from workers.networks.registry import build_of
 from workers.networks.squashing import bound_actions
 
@@ -69,21 +70,26 @@ class Described(nn.Module):
         steps, rows = inputs.shape[:2]
         given: dict[str, Any] = {"x": inputs.flatten(0, 1)}
         self._run(self._before, given)
-        at_steps = {name: value.view(steps, rows, -1).unbind(0) for name, value in given.items() if name != "x"}
-        memories = []
-        for step in range(steps):
-            memory = memory * keep[step]
-            if isinstance(self.config, GruNetwork):
-                memory = GruGates.apply(at_steps["i"][step], self.get_submodule("memory")(memory), memory)
-            else:
-                values = {name: value[step] for name, value in at_steps.items()} | {"h": memory}
-                self._run(self._steps, values)
-                memory = values["h"]
-            memories.append(memory)
-        given["h"] = torch.cat(memories)
+        if isinstance(self.config, GruNetwork) and inputs.device.type == "cpu":
+            layer = self.get_submodule("memory")
+            gates = given["i"].view(steps, rows, -1)
+            given["h"] = GruSequence.apply(gates, layer.weight, layer.bias, memory, keep[..., 0]).flatten(0, 1)
+        else:
+            given["h"] = self._remember(given, memory, keep)
         self._run(self._after, given)
         outputs: Tensor = given["y"]
         return outputs.view(steps, rows, -1)
+
+    def _remember(self, given: dict[str, Any], memory: Tensor, keep: Tensor) -> Tensor:
+        """Memory (steps * n, memory_size) after each step."""
+        at_steps = {name: value.view(*keep.shape[:2], -1).unbind(0) for name, value in given.items() if name != "x"}
+        memories = []
+        for step in range(len(keep)):
+            values = {name: value[step] for name, value in at_steps.items()} | {"h": memory * keep[step]}
+            self._run(self._steps, values)
+            memory = values["h"]
+            memories.append(memory)
+        return torch.cat(memories)
 
     def _run(self, lines: Sequence[tuple[str, Any]], values: dict[str, Any]) -> None:
         for name, expression in lines:
@@ -96,7 +102,8 @@ class Described(nn.Module):
         layer = self.get_submodule(name)
         if isinstance(layer, nn.Conv1d):
             values, stride, padding = arguments
-            return functional.conv1d(values, layer.weight, layer.bias, stride, padding)
+            assert layer.bias is not None
+            return convolve(values, layer.weight, layer.bias, stride, padding)
         output: Tensor = layer(*arguments)
         return output
 
