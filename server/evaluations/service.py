@@ -225,9 +225,6 @@ def _with_stored_arena(services: Services, choice: SuiteChoice) -> SuiteChoice:
 
 
 def _digest(spec: EvaluateJob, sha256: str | None) -> str:
-    """What decides how an evaluation ends: the policy's bytes, the suite, and what drives.
-
-    A checkpoint's id says nothing that its archive's hash does not.
-    """
-    policy = spec.policy.model_dump_json() if sha256 is None else sha256
-    return hashlib.sha256(f"{policy}\n{spec.suite.model_dump_json()}\n{simulator()}".encode()).hexdigest()
+    """What decides how an evaluation ends and who may see it: the policy and its bytes, the suite, and what drives."""
+    policy = spec.policy.model_dump_json()
+    return hashlib.sha256(f"{policy} {sha256}\n{spec.suite.model_dump_json()}\n{simulator()}".encode()).hexdigest()

@@ -49,6 +49,18 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/QueuePage')).QueuePage }),
           },
           {
+            path: 'evaluations',
+            lazy: async () => ({ Component: (await import('./pages/EvaluationsPage')).EvaluationsPage }),
+          },
+          {
+            path: 'evaluations/:evaluationId',
+            lazy: async () => ({ Component: (await import('./pages/EvaluationPage')).EvaluationPage }),
+          },
+          {
+            path: 'leaderboards/:suiteHash?',
+            lazy: async () => ({ Component: (await import('./pages/LeaderboardPage')).LeaderboardPage }),
+          },
+          {
             path: 'reproduction',
             lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },

@@ -6,6 +6,8 @@ interface ArenaDrawingProps {
   geometry: ArenaGeometry
   /** What a screen reader says instead of the drawing. */
   label: string
+  /** What else is drawn over it, in metres, y upwards. */
+  children?: React.ReactNode
 }
 
 /** How thick the outer wall is drawn, as a share of the longer side. */
@@ -19,7 +21,7 @@ function wayOf(mover: ArenaGeometry['movers'][number]): readonly { x: number; y:
   return mover.kind === 'timed' ? mover.keyframes : []
 }
 
-export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
+export function ArenaDrawing({ geometry, label, children }: ArenaDrawingProps) {
   const { width, height, circles, boxes, movers, start, target } = geometry
   const unit = Math.max(width, height)
   const wall = unit * WALL
@@ -80,6 +82,7 @@ export function ArenaDrawing({ geometry, label }: ArenaDrawingProps) {
           />
         )}
         {target && <circle className={classes.target} cx={target.x} cy={target.y} r={arrow / 2} />}
+        {children}
       </g>
     </svg>
   )

@@ -47,6 +47,9 @@ export function Shell() {
               New<span className={classes.wide}> training</span>
             </NavLink>
             <NavLink to="/compare">Compare</NavLink>
+            <NavLink to="/evaluations">
+              Eval<span className={classes.wide}>uations</span>
+            </NavLink>
             <NavLink to="/policies">Policies</NavLink>
             <NavLink to="/arenas">Arenas</NavLink>
             <NavLink to="/reproduction">Paper</NavLink>

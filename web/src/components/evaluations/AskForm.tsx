@@ -1,0 +1,175 @@
+/** Which policies are to be measured on which suites. */
+import { Button, Group, MultiSelect, Slider, Stack, Text } from '@mantine/core'
+import { useDebouncedValue } from '@mantine/hooks'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useState } from 'react'
+import { useSearchParams } from 'react-router'
+import { $api } from '../../api/client'
+import type { ArenaConfig } from '../../api/types'
+import { plural, words } from '../../lib/format'
+import { useChange } from '../people/useChange'
+import { BASELINES, isFamily, OWN, policyKey, policyOf, suiteByName, suiteInArena, suiteOf } from './choices'
+
+const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
+
+interface Option {
+  value: string
+  label: string
+}
+
+/** The chosen ones that no list has: their titles come with the address, or are not known. */
+function strangers(chosen: readonly string[], known: readonly Option[], what: string): Option[] {
+  const values = new Set(known.map(({ value }) => value))
+  return chosen
+    .filter((value) => !values.has(value))
+    .map((value) => ({ value, label: `${what} ${value.slice(value.indexOf(':') + 1).slice(0, 24)}` }))
+}
+
+export function AskForm() {
+  const [search] = useSearchParams()
+  const settle = useChange()
+  const [policies, setPolicies] = useState(() =>
+    search.getAll('policy').filter((key) => policyOf(key) !== null),
+  )
+  const [suites, setSuites] = useState(() =>
+    search.getAll('suite').filter((key) => suiteOf(key, 0.5) !== null),
+  )
+  const [difficulty, setDifficulty] = useState(() => {
+    const family = search.getAll('suite').flatMap((key) => {
+      const suite = suiteOf(key, 0.5)
+      const asked = key.startsWith('arena:') && suite ? (JSON.parse(key.slice(6)) as ArenaConfig) : null
+      return asked && isFamily(asked) ? [asked.difficulty] : []
+    })
+    return family[0] ?? 0.5
+  })
+  const [typed, setTyped] = useState('')
+  const [wanted] = useDebouncedValue(typed, 200)
+  const shipped = $api.useQuery('get', '/api/policies', {}, FOR_GOOD)
+  const boards = $api.useQuery('get', '/api/leaderboards')
+  const arenas = $api.useQuery('get', '/api/arenas')
+  const trainings = $api.useQuery(
+    'get',
+    '/api/experiments',
+    { params: { query: { limit: 30, ...(wanted ? { query: JSON.stringify(wanted) } : {}) } } },
+    { placeholderData: keepPreviousData },
+  )
+  const ask = $api.useMutation('post', '/api/evaluations', settle('ask for these evaluations'))
+
+  const own: Option[] = (trainings.data?.items ?? []).map((each) => ({
+    value: policyKey('training', each.id),
+    label: each.name,
+  }))
+  const ready: Option[] = (shipped.data ?? []).map((each) => ({
+    value: policyKey('shipped', each.name),
+    label: each.title,
+  }))
+  const untrained: Option[] = BASELINES.map((name) => ({
+    value: policyKey('baseline', name),
+    label: words(name),
+  }))
+  const frozen: Option[] = (boards.data?.suites ?? [])
+    .filter((each) => each.frozen)
+    .map((each) => ({ value: suiteByName(each.suite), label: each.suite }))
+  const places = (kind: 'generated' | 'imported' | 'fixed'): Option[] =>
+    (arenas.data ?? [])
+      .filter((each) => each.kind === kind)
+      .map((each) => ({ value: suiteInArena(each.config), label: each.title }))
+  const known = [...own, ...ready, ...untrained]
+  const grounds = [...frozen, ...places('generated'), ...places('imported'), ...places('fixed')]
+  const families = suites.some((key) => {
+    const suite = suiteOf(key, difficulty)
+    return suite?.by === 'arena' && isFamily(suite.arena)
+  })
+  const many = policies.length * Math.max(1, suites.length)
+
+  return (
+    <Stack
+      component="form"
+      gap="sm"
+      onSubmit={(event) => {
+        event.preventDefault()
+        ask.mutate(
+          {
+            body: {
+              policies: policies.flatMap((key) => policyOf(key) ?? []),
+              suites: (suites.length > 0 ? suites : [OWN]).flatMap((key) => suiteOf(key, difficulty) ?? []),
+            },
+          },
+          { onSuccess: () => setPolicies([]) },
+        )
+      }}
+    >
+      <Group align="flex-start" gap="md" grow preventGrowOverflow={false} wrap="wrap">
+        <MultiSelect
+          label="Policies"
+          description="A training stands for the best checkpoint of each of its runs."
+          placeholder={policies.length === 0 ? 'Search trainings, shipped policies, baselines' : undefined}
+          miw={260}
+          searchable
+          clearable
+          nothingFoundMessage="Nothing by that name"
+          maxDropdownHeight={320}
+          searchValue={typed}
+          onSearchChange={setTyped}
+          value={policies}
+          onChange={setPolicies}
+          data={[
+            { group: 'Chosen', items: strangers(policies, known, 'Checkpoint') },
+            { group: 'Your trainings', items: own },
+            { group: 'Shipped', items: ready },
+            { group: 'Untrained', items: untrained },
+          ]}
+        />
+        <MultiSelect
+          label="On"
+          description="Each suite has its own scenarios, the same for all. Empty: each policy's own suite."
+          placeholder={suites.length === 0 ? "Each policy's own suite" : undefined}
+          miw={260}
+          searchable
+          clearable
+          nothingFoundMessage="No suite or arena by that name"
+          maxDropdownHeight={320}
+          value={suites}
+          onChange={setSuites}
+          data={[
+            { group: 'Chosen', items: strangers(suites, [{ value: OWN, label: '' }, ...grounds], 'Arena') },
+            { group: 'Of the policy', items: [{ value: OWN, label: "The policy's own suite" }] },
+            { group: 'Frozen suites', items: frozen },
+            { group: 'Generated families', items: places('generated') },
+            { group: 'Imported arenas', items: places('imported') },
+            { group: 'Built-in arenas', items: places('fixed') },
+          ]}
+        />
+      </Group>
+      {families && (
+        <Group gap="sm" maw={420} wrap="nowrap">
+          <Text size="sm" component="span" aria-hidden>
+            Difficulty of families
+          </Text>
+          <Slider
+            flex={1}
+            miw={120}
+            thumbLabel="Difficulty of families"
+            min={0}
+            max={1}
+            step={0.05}
+            label={null}
+            value={difficulty}
+            onChange={setDifficulty}
+          />
+          <Text size="sm" component="span" w={34}>
+            {difficulty.toFixed(2)}
+          </Text>
+        </Group>
+      )}
+      <Group gap="sm">
+        <Button type="submit" disabled={policies.length === 0} loading={ask.isPending}>
+          {policies.length === 0 ? 'Evaluate' : `Evaluate, ${plural(many, 'time')}`}
+        </Button>
+        <Text size="xs" c="dimmed">
+          Some seconds each, beside trainings; what is measured already is not measured again.
+        </Text>
+      </Group>
+    </Stack>
+  )
+}

@@ -1,0 +1,189 @@
+/** A policy on a suite: its figures, where it drove, every episode. */
+import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
+import { Link, useParams } from 'react-router'
+import { $api } from '../api/client'
+import type { AskedEvaluation } from '../api/types'
+import { EpisodesQuery } from '../components/Episodes'
+import { suiteTitle } from '../components/evaluations/choices'
+import { isOpen, Progress, titleOf } from '../components/evaluations/EvaluationTable'
+import { WaysMap } from '../components/evaluations/WaysMap'
+import { SuccessEstimate } from '../components/MeasuredEstimate'
+import { ReplayDialog } from '../components/Replay'
+import { Message, Page, Panel, QueryError } from '../components/ui'
+import { byInterest } from '../lib/episodes'
+import { percent, significant } from '../lib/format'
+import { useNumberInAddress, useTitle } from '../lib/hooks'
+import classes from './EvaluationPage.module.css'
+
+const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
+const EVERY_MS = 1_000
+
+export function EvaluationPage() {
+  const { evaluationId = '' } = useParams()
+  const path = { evaluation_id: evaluationId }
+  const { data, error, refetch } = $api.useQuery(
+    'get',
+    '/api/evaluations/{evaluation_id}',
+    { params: { path } },
+    { refetchInterval: (query) => (query.state.data && isOpen(query.state.data) ? EVERY_MS : false) },
+  )
+  useTitle(data ? `${titleOf(data)} on ${data.suite ?? suiteTitle(data.choice)}` : 'Evaluation')
+  return (
+    <Page
+      title={data ? titleOf(data) : error ? 'Evaluation' : <Skeleton height={24} width={240} />}
+      above={
+        <Anchor component={Link} to="/evaluations" size="xs">
+          Evaluations
+        </Anchor>
+      }
+      below={
+        data && (
+          <Text size="sm" c="dimmed" mt={4}>
+            On {data.suite ?? suiteTitle(data.choice)}
+          </Text>
+        )
+      }
+      actions={data && <Links evaluation={data} />}
+    >
+      {data ? (
+        <Loaded evaluation={data} />
+      ) : (
+        <Panel>
+          {error ? <QueryError error={error} what="evaluation" retry={refetch} /> : <Skeleton height={460} />}
+        </Panel>
+      )}
+    </Page>
+  )
+}
+
+/** Where its policy comes from, and what else was measured on its suite. */
+function Links({ evaluation: { policy, run_id, suite_hash } }: { evaluation: AskedEvaluation }) {
+  return (
+    <Group gap="xs">
+      {run_id && (
+        <Button component={Link} to={`/runs/${run_id}`} variant="default">
+          Its run
+        </Button>
+      )}
+      {policy.source === 'shipped' && (
+        <Button component={Link} to={`/policies/${policy.name}`} variant="default">
+          The policy
+        </Button>
+      )}
+      {suite_hash && (
+        <Button component={Link} to={`/leaderboards/${suite_hash}`} variant="default">
+          Leaderboard
+        </Button>
+      )}
+    </Group>
+  )
+}
+
+function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
+  const [episode, setEpisode] = useNumberInAddress('episode')
+  const path = { evaluation_id: evaluation.id }
+  const { figures } = evaluation
+  const episodes = $api.useQuery(
+    'get',
+    '/api/evaluations/{evaluation_id}/episodes',
+    { params: { path } },
+    { ...FOR_GOOD, enabled: figures !== null },
+  )
+  if (figures === null) {
+    return (
+      <Panel>
+        {isOpen(evaluation) ? (
+          <Stack gap="xs" role="status">
+            <Text size="sm">It is being measured: figures, map and episodes appear here by themselves.</Text>
+            <Progress evaluation={evaluation} />
+          </Stack>
+        ) : (
+          <Message
+            title={evaluation.state === 'cancelled' ? 'Called off' : 'It could not be measured'}
+            role="alert"
+          >
+            {evaluation.error ?? 'No reason was given.'}
+          </Message>
+        )}
+      </Panel>
+    )
+  }
+  const facts: [name: string, value: string, hint?: string][] = [
+    ['Collision', percent(figures.collision)],
+    ['Time-out', percent(figures.timeout)],
+    ['SPL', figures.spl.toFixed(3), 'Success weighted by path length'],
+    [
+      'SPL of the worst tenth',
+      figures.worst_tenth_spl.toFixed(3),
+      'Over the tenth of the episodes that did worst',
+    ],
+    [
+      'Time to target',
+      figures.seconds === null ? '–' : `${significant(figures.seconds, 3)} s`,
+      'Of arrivals',
+    ],
+    ['Path', figures.path_length === null ? '–' : `${significant(figures.path_length, 3)} m`, 'Of arrivals'],
+    [
+      'Clearance',
+      `${figures.min_clearance.toFixed(2)} m`,
+      "Mean of the episodes' smallest distance to anything",
+    ],
+    ['Jerk', `${significant(figures.jerk, 3)} m/s³`, 'Mean size along the heading'],
+    ['Return', significant(figures.reward, 3), "By the policy's own reward, mean over episodes"],
+  ]
+  return (
+    <Stack gap="md">
+      <div className={classes.stage}>
+        <Panel title="Where it drove">
+          <WaysMap evaluationId={evaluation.id} onReplay={setEpisode} />
+        </Panel>
+        <Panel title="Figures">
+          <div className={classes.success}>
+            <Text size="xs" c="dimmed">
+              Success, 95 % interval
+            </Text>
+            <SuccessEstimate estimate={figures.success} detail />
+          </div>
+          <dl className={classes.facts}>
+            {facts.map(([name, value, hint]) => (
+              <div key={name} title={hint}>
+                <dt>{name}</dt>
+                <dd>{value}</dd>
+              </div>
+            ))}
+          </dl>
+        </Panel>
+      </div>
+      <Panel title="Episodes" flush>
+        <EpisodesQuery query={episodes} onReplay={setEpisode} />
+      </Panel>
+      {episode !== null && (
+        <EvaluationReplay
+          path={path}
+          episode={episode}
+          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          onReplay={setEpisode}
+          onClose={() => setEpisode(null)}
+        />
+      )}
+    </Stack>
+  )
+}
+
+interface EvaluationReplayProps {
+  path: { evaluation_id: string }
+  episode: number
+  order: readonly number[]
+  onReplay: (episode: number) => void
+  onClose: () => void
+}
+
+function EvaluationReplay({ path, ...dialog }: EvaluationReplayProps) {
+  const replay = $api.useQuery(
+    'get',
+    '/api/evaluations/{evaluation_id}/replays/{episode}',
+    { params: { path: { ...path, episode: dialog.episode } } },
+    { ...FOR_GOOD, retry: false },
+  )
+  return <ReplayDialog query={replay} {...dialog} />
+}

@@ -1,0 +1,63 @@
+/** Does this policy work there? Ask for it, and see what was asked before. */
+import { Anchor, Skeleton, Stack } from '@mantine/core'
+import { useState } from 'react'
+import { Link, useSearchParams } from 'react-router'
+import { $api } from '../api/client'
+import { AskForm } from '../components/evaluations/AskForm'
+import { EvaluationTable, isOpen } from '../components/evaluations/EvaluationTable'
+import { Pager } from '../components/Pager'
+import { Message, Page, Panel, QueryError } from '../components/ui'
+import { useTitle } from '../lib/hooks'
+
+const SIZE = 50
+/** How often what is under way is asked after. */
+const EVERY_MS = 1_500
+
+export function EvaluationsPage() {
+  useTitle('Evaluations')
+  const [page, setPage] = useState(1)
+  const [search] = useSearchParams()
+  const { data, error, refetch } = $api.useQuery(
+    'get',
+    '/api/evaluations',
+    { params: { query: { limit: SIZE, offset: (page - 1) * SIZE } } },
+    { refetchInterval: (query) => (query.state.data?.items.some(isOpen) ? EVERY_MS : false) },
+  )
+  return (
+    <Page
+      title="Evaluations"
+      actions={
+        <Anchor component={Link} to="/leaderboards" size="sm">
+          Leaderboards
+        </Anchor>
+      }
+    >
+      <Stack gap="md">
+        <Panel title="Measure policies">
+          {/* Another address is another question. */}
+          <AskForm key={search.toString()} />
+        </Panel>
+        <Panel title="Measured" flush>
+          {error && !data ? (
+            <QueryError error={error} what="list of evaluations" retry={refetch} />
+          ) : !data ? (
+            <Skeleton height={160} m="md" w="auto" />
+          ) : data.items.length === 0 ? (
+            <Message title="Nothing was evaluated yet">
+              Choose policies above, and what they are to be measured on.
+            </Message>
+          ) : (
+            <EvaluationTable evaluations={data.items} />
+          )}
+          <Pager
+            page={page}
+            size={SIZE}
+            total={data?.total ?? 0}
+            label="Pages of evaluations"
+            onChange={setPage}
+          />
+        </Panel>
+      </Stack>
+    </Page>
+  )
+}
