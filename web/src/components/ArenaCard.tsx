@@ -10,6 +10,7 @@ import type { ArenaSummary, ArenaView } from '../api/types'
 import { arenaFacts, trainOn } from '../lib/arenas'
 import classes from './ArenaCard.module.css'
 import { ArenaDrawing } from './ArenaDrawing'
+import { evaluate, suiteInArena } from './evaluations/choices'
 import { IconRefresh, IconTrash } from './icons'
 
 export function ArenaCard({
@@ -151,9 +152,20 @@ function Card({ title, view, error, config, action, children }: CardProps) {
         {view ? arenaFacts(view) : ' '}
       </Text>
       {children}
-      <Button component={Link} to={trainOn(config)} variant="default" size="xs" mt="auto" fullWidth>
-        Train on it
-      </Button>
+      <Group gap={6} mt="auto" grow>
+        <Button component={Link} to={trainOn(config)} variant="default" size="xs">
+          Train on it
+        </Button>
+        <Button
+          component={Link}
+          to={evaluate([], [suiteInArena(config)])}
+          variant="default"
+          size="xs"
+          aria-label={`Evaluate on ${title}`}
+        >
+          Evaluate
+        </Button>
+      </Group>
     </li>
   )
 }

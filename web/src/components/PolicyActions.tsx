@@ -1,8 +1,9 @@
-/** What can be done with a shipped policy: take it away, train one like it, or train it further. */
+/** What can be done with a shipped policy: take it away, measure it elsewhere, train one like it, or train it further. */
 import { Button, Menu } from '@mantine/core'
 import { Link } from 'react-router'
 import type { ShippedPolicy } from '../api/types'
 import { fileSize } from '../lib/format'
+import { evaluate, policyKey } from './evaluations/choices'
 import { IconCopy, IconDownload, IconPencil } from './icons'
 
 interface PolicyActionsProps {
@@ -34,6 +35,15 @@ export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
           </Menu.Item>
         </Menu.Dropdown>
       </Menu>
+      <Button
+        component={Link}
+        to={evaluate([policyKey('shipped', policy.name)])}
+        variant="default"
+        size={size}
+        aria-label={`Evaluate ${policy.title}`}
+      >
+        Evaluate
+      </Button>
       <Button
         component={Link}
         to={`/new?policy=${policy.name}`}

@@ -7,7 +7,7 @@ import table from '../components/ExperimentTable.module.css'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
-import { count, plural, significant, words } from '../lib/format'
+import { plural, significant, words } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
 type Entry = Leaderboard['entries'][number]
@@ -40,10 +40,10 @@ export function LeaderboardPage() {
           placeholder="Suite"
           value={hash ?? null}
           onChange={(next) => next !== null && navigate(`/leaderboards/${next}`)}
-          data={suites.map(({ suite, suite_hash, entries }) => ({
+          data={suites.map(({ suite, suite_hash }) => ({
             value: suite_hash,
             // Of one name there may be several, of other scenarios each.
-            label: `${suite}${names.indexOf(suite) === names.lastIndexOf(suite) ? '' : ` ${suite_hash.slice(0, 6)}`}, ${count(entries)}`,
+            label: `${suite}${names.indexOf(suite) === names.lastIndexOf(suite) ? '' : ` ${suite_hash.slice(0, 6)}`}`,
           }))}
         />
       }

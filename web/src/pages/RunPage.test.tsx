@@ -85,8 +85,18 @@ test('its policies, the newest first, the best marked, each to take away', async
   const rows = await screen.findAllByTestId('checkpoint')
   const links = rows.map((row) => within(row).getAllByRole('link'))
   expect(links.map((row) => row.map((link) => link.getAttribute('href')))).toEqual([
-    ['/new?checkpoint=cp2', '/api/checkpoints/cp2/bundle', '/api/checkpoints/cp2/download'],
-    ['/new?checkpoint=cp1', '/api/checkpoints/cp1/bundle', '/api/checkpoints/cp1/download'],
+    [
+      '/new?checkpoint=cp2',
+      '/evaluations?policy=checkpoint%3Acp2',
+      '/api/checkpoints/cp2/bundle',
+      '/api/checkpoints/cp2/download',
+    ],
+    [
+      '/new?checkpoint=cp1',
+      '/evaluations?policy=checkpoint%3Acp1',
+      '/api/checkpoints/cp1/bundle',
+      '/api/checkpoints/cp1/download',
+    ],
   ])
   expect(rows[0]).toHaveTextContent('Best')
   expect(rows[0]).toHaveTextContent(/88\.5\s%\s*83\.3–92\.2\s%\s*N = 200/)

@@ -8,7 +8,17 @@ import { $api } from '../../api/client'
 import type { ArenaConfig } from '../../api/types'
 import { plural, words } from '../../lib/format'
 import { useChange } from '../people/useChange'
-import { BASELINES, isFamily, OWN, policyKey, policyOf, suiteByName, suiteInArena, suiteOf } from './choices'
+import {
+  BASELINES,
+  isFamily,
+  OWN,
+  policyKey,
+  policyOf,
+  suiteByName,
+  suiteInArena,
+  suiteOf,
+  suiteTitle,
+} from './choices'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
 
@@ -17,12 +27,26 @@ interface Option {
   label: string
 }
 
-/** The chosen ones that no list has: their titles come with the address, or are not known. */
-function strangers(chosen: readonly string[], known: readonly Option[], what: string): Option[] {
+/** The chosen ones that no list has yet: they came with the address. */
+function strangers(
+  chosen: readonly string[],
+  known: readonly Option[],
+  label: (key: string) => string,
+): Option[] {
   const values = new Set(known.map(({ value }) => value))
-  return chosen
-    .filter((value) => !values.has(value))
-    .map((value) => ({ value, label: `${what} ${value.slice(value.indexOf(':') + 1).slice(0, 24)}` }))
+  return chosen.filter((value) => !values.has(value)).map((value) => ({ value, label: label(value) }))
+}
+
+/** "Checkpoint 9a1…", "crowd". */
+function nameOf(key: string): string {
+  const name = key.slice(key.indexOf(':') + 1)
+  return key.startsWith('checkpoint:') ? `Checkpoint ${name}` : name
+}
+
+/** "maze, difficulty 0.5". */
+function groundOf(key: string, difficulty: number): string {
+  const suite = suiteOf(key, difficulty)
+  return suite ? suiteTitle(suite) : key
 }
 
 export function AskForm() {
@@ -114,7 +138,7 @@ export function AskForm() {
           value={policies}
           onChange={setPolicies}
           data={[
-            { group: 'Chosen', items: strangers(policies, known, 'Checkpoint') },
+            { group: 'Chosen', items: strangers(policies, known, nameOf) },
             { group: 'Your trainings', items: own },
             { group: 'Shipped', items: ready },
             { group: 'Untrained', items: untrained },
@@ -132,7 +156,12 @@ export function AskForm() {
           value={suites}
           onChange={setSuites}
           data={[
-            { group: 'Chosen', items: strangers(suites, [{ value: OWN, label: '' }, ...grounds], 'Arena') },
+            {
+              group: 'Chosen',
+              items: strangers(suites, [{ value: OWN, label: '' }, ...grounds], (key) =>
+                groundOf(key, difficulty),
+              ),
+            },
             { group: 'Of the policy', items: [{ value: OWN, label: "The policy's own suite" }] },
             { group: 'Frozen suites', items: frozen },
             { group: 'Generated families', items: places('generated') },

@@ -58,13 +58,13 @@ function Ways({ ways: { places, arena, geometry, ways }, onArena, onReplay }: Wa
             size="xs"
             aria-label="Arena"
             searchable
-            w={260}
+            w={200}
             allowDeselect={false}
             value={String(arena)}
             onChange={(next) => next !== null && onArena(Number(next))}
             data={places.map((place) => ({
               value: String(place.arena),
-              label: `${place.name}: ${percent(place.arrivals / place.episodes)}, ${count(place.episodes)} episodes`,
+              label: `Map ${place.arena + 1}: ${percent(place.arrivals / place.episodes)} of ${count(place.episodes)}`,
             }))}
           />
         )}

@@ -1,0 +1,55 @@
+"""Does this policy work in my arena? Asked from the gallery, measured by a worker, looked at, replayed."""
+
+import base64
+import re
+
+import pytest
+from playwright.sync_api import BrowserContext, expect
+
+from sim.config import ArenaFile
+
+pytestmark = pytest.mark.browser
+MEASURED = 120_000
+
+
+def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: BrowserContext) -> None:
+    wall = ArenaFile.model_validate(
+        {"name": "A wall", "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
+    )
+    content = base64.b64encode(wall.model_dump_json().encode()).decode()
+    files = [{"name": "wall.json", "content": content}]
+    imported = context.request.post("/api/arenas/imported", data={"files": files, "keep": True})
+    assert imported.ok, imported.text()
+
+    page = context.new_page()
+    page.goto("/arenas")
+    page.get_by_role("link", name="Evaluate on A wall").click()
+    policies = page.get_by_role("combobox", name="Policies")
+    for typed, name in (("go-to", "Go-to-goal"), ("complex", "Complex arena")):
+        policies.fill(typed)
+        page.get_by_role("option", name=name, exact=True).click()
+    page.get_by_role("button", name="Evaluate, 2 times").click()
+
+    rows = page.get_by_test_id("evaluation")
+    expect(rows).to_have_count(2)
+    for row in rows.all():
+        expect(row).to_have_attribute("data-state", "done", timeout=MEASURED)
+        expect(row).to_contain_text("A wall-200")
+    page.get_by_role("link", name="Go-to-goal").click()
+    expect(page.get_by_role("heading", name="Go-to-goal")).to_be_visible()
+
+    # Blind as it is, it ends at the wall; each way is on the map, and a click replays it.
+    expect(page.get_by_role("img", name="200 ways in A wall, from above")).to_be_visible()
+    page.get_by_text(re.compile("^Collisions")).first.click()
+    expect(page.get_by_role("img", name=re.compile(r"^\d{1,2} ways in A wall, from above"))).to_be_visible()
+    page.get_by_role("button", name=re.compile("^Replay episode")).first.click()
+    replay = page.frame_locator("[data-testid=replay-frame]")
+    expect(replay.locator("#display")).to_contain_text("Collided", timeout=MEASURED)
+    page.get_by_role("dialog").locator(".mantine-Modal-close").click()
+
+    # Both stand on the board of this suite, the one that sees before the one that does not.
+    page.get_by_role("link", name="Leaderboard").click()
+    entries = page.get_by_test_id("entry")
+    expect(entries).to_have_count(2)
+    expect(entries.nth(0)).to_contain_text("Complex arena")
+    expect(entries.nth(1)).to_contain_text("Below")

@@ -1,0 +1,198 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import type { AskedEvaluation, Leaderboard } from '../api/types'
+import { policy } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const success = {
+  value: 0.75,
+  low: 0.68,
+  high: 0.81,
+  unit: 'episodes' as const,
+  seeds: 1,
+  episodes: 200,
+  per_seed: [0.75],
+  failed: null,
+}
+
+const measured: AskedEvaluation = {
+  id: 'ev1',
+  title: 'dynamic window',
+  policy: { source: 'baseline', name: 'dynamic window', task: null },
+  choice: { by: 'name', name: 'complex-200' },
+  run_id: null,
+  created_at: 0,
+  job_id: 'job1',
+  state: 'done',
+  progress: 1,
+  seconds_left: null,
+  error: null,
+  suite: 'complex-200',
+  suite_hash: 'abc',
+  figures: {
+    episodes: 200,
+    success,
+    collision: 0.2,
+    timeout: 0.05,
+    spl: 0.7,
+    worst_tenth_spl: 0,
+    steps: 90,
+    seconds: 18,
+    path_length: 4.4,
+    min_clearance: 0.21,
+    jerk: 0.3,
+    reward: 12,
+  },
+}
+const running: AskedEvaluation = {
+  ...measured,
+  id: 'ev2',
+  state: 'running',
+  progress: 0.4,
+  seconds_left: 6,
+  suite: null,
+  suite_hash: null,
+  figures: null,
+}
+const routes = {
+  'GET /api/evaluations': { items: [running, measured], total: 2 },
+  'GET /api/policies': [policy],
+  'GET /api/leaderboards': {
+    suites: [{ suite: 'complex-200', suite_hash: 'abc', entries: 3, frozen: true }],
+  },
+  'GET /api/arenas': [],
+  'GET /api/experiments': { items: [], total: 0 },
+  'POST /api/evaluations': [running],
+}
+
+test('what is under way says how long it takes, what is measured its figures', async () => {
+  const server = startServer({
+    ...routes,
+    'POST /api/evaluations/ev2/cancel': { ...running, state: 'cancelled' },
+  })
+  const { user } = open('/evaluations')
+  const [open_, done] = await screen.findAllByTestId('evaluation')
+  expect(open_).toHaveTextContent('6 s left')
+  expect(within(open_ as HTMLElement).getByRole('progressbar')).toHaveAttribute('aria-valuenow', '40')
+  expect(done).toHaveTextContent(/Dynamic window\s*complex-200\s*75\.0\s%/)
+  expect(done).toHaveTextContent(/20\.0\s%\s*0\.70\s*18\ss\s*0\.21\sm/)
+  await user.click(screen.getByRole('button', { name: 'Call it off: Dynamic window' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/evaluations/ev2/cancel'))
+})
+
+test('policies on suites are chosen, or come with the address', async () => {
+  const server = startServer(routes)
+  const arena = JSON.stringify({ name: 'maze', difficulty: 0.8 })
+  const { user } = open(
+    `/evaluations?policy=shipped:crowd&policy=nonsense&suite=${encodeURIComponent(`arena:${arena}`)}`,
+  )
+  await waitFor(() => expect(screen.getAllByText('Crowd').length).toBeGreaterThan(0))
+  expect(screen.getByRole('slider', { name: 'Difficulty of families' })).toHaveAttribute(
+    'aria-valuenow',
+    '0.8',
+  )
+  await user.click(screen.getByRole('combobox', { name: 'Policies' }))
+  await user.click(await screen.findByRole('option', { name: 'Dynamic window' }))
+  await user.click(screen.getByRole('combobox', { name: 'On' }))
+  await user.click(await screen.findByRole('option', { name: 'complex-200' }))
+  await user.click(screen.getByRole('button', { name: 'Evaluate, 4 times' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(server.changes[0]?.body).toEqual({
+    policies: [
+      { source: 'shipped', name: 'crowd' },
+      { source: 'baseline', name: 'dynamic window', task: null },
+    ],
+    suites: [
+      { by: 'arena', arena: { name: 'maze', difficulty: 0.8 } },
+      { by: 'name', name: 'complex-200' },
+    ],
+  })
+})
+
+test('an evaluation shows its figures and its ways, and a click on one replays it', async () => {
+  const place = { arena: 0, name: 'room', episodes: 2, arrivals: 1 }
+  startServer({
+    ...routes,
+    'GET /api/evaluations/ev1': measured,
+    'GET /api/evaluations/ev1/episodes': { suite: 'complex-200', suite_hash: 'abc', episodes: [] },
+    'GET /api/evaluations/ev1/ways': {
+      places: [place],
+      arena: 0,
+      geometry: {
+        format: 'mapless-arena/1',
+        name: 'room',
+        width: 6,
+        height: 6,
+        circles: [],
+        boxes: [],
+        movers: [],
+        start: null,
+        target: null,
+      },
+      ways: [
+        {
+          episode: 0,
+          outcome: 'arrival',
+          target: [1, 1],
+          points: [
+            [0, 0],
+            [1, 1],
+          ],
+        },
+        {
+          episode: 1,
+          outcome: 'collision',
+          target: [2, 2],
+          points: [
+            [0, 0],
+            [-2.9, 0],
+          ],
+        },
+      ],
+    },
+  })
+  const { user } = open('/evaluations/ev1')
+  expect(await screen.findByRole('img', { name: '2 ways in room, from above' })).toBeInTheDocument()
+  expect(screen.getByText('SPL of the worst tenth').parentElement).toHaveTextContent('0.000')
+  await user.click(screen.getByText('Collisions 1'))
+  expect(screen.getByRole('img', { name: '1 ways in room, from above' })).toBeInTheDocument()
+  await user.click(screen.getByRole('switch', { name: 'Where it collides' }))
+  expect(screen.getByRole('link', { name: 'Leaderboard' })).toHaveAttribute('href', '/leaderboards/abc')
+})
+
+test('a leaderboard says what is tied with the best, and by what that is known', async () => {
+  const entry = { kind: 'shipped' as const, spl: 0.9, steps: 80, success }
+  const board: Leaderboard = {
+    suite: 'complex-200',
+    suite_hash: 'abc',
+    comparisons: 2,
+    entries: [
+      { ...entry, rank: 1, id: 'crowd', title: 'Crowd', tied: true, told_by: 'best' },
+      { ...entry, rank: 2, kind: 'training', id: 'e1', title: 'Mine', tied: true, told_by: 'seeds' },
+      {
+        ...entry,
+        rank: 3,
+        kind: 'baseline',
+        id: 'random',
+        title: 'random',
+        tied: false,
+        told_by: 'episodes',
+      },
+    ],
+  }
+  startServer({ ...routes, 'GET /api/leaderboards/abc': board })
+  open('/leaderboards')
+  const rows = await screen.findAllByTestId('entry')
+  expect(rows.map((row) => row.textContent)).toEqual([
+    expect.stringMatching(/^1CrowdShipped.*Best/),
+    expect.stringMatching(/^2MineTraining.*Tied/),
+    expect.stringMatching(/^3RandomUntrained.*Below/),
+  ])
+  expect(screen.getByRole('link', { name: 'Mine' })).toHaveAttribute('href', '/experiments/e1')
+  expect(
+    screen.getByText(/2 entries can't be told from the best, itself included\. 2 comparisons/),
+  ).toBeInTheDocument()
+})
