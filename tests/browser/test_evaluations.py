@@ -28,6 +28,7 @@ def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: Brow
     for typed, name in (("go-to", "Go-to-goal"), ("complex", "Complex arena")):
         policies.fill(typed)
         page.get_by_role("option", name=name, exact=True).click()
+    policies.press("Escape")
     page.get_by_role("button", name="Evaluate, 2 times").click()
 
     rows = page.get_by_test_id("evaluation")
