@@ -24,6 +24,7 @@ const measured: AskedEvaluation = {
   policy: { source: 'baseline', name: 'dynamic window', task: null },
   choice: { by: 'name', name: 'complex-200' },
   run_id: null,
+  waits_for: [],
   created_at: 0,
   job_id: 'job1',
   state: 'done',

@@ -117,11 +117,12 @@ function Outcome({ evaluation }: { evaluation: AskedEvaluation }) {
 
 /** A bar with the time that is left. */
 export function Progress({ evaluation }: { evaluation: AskedEvaluation }) {
-  const { state, progress, seconds_left: left } = evaluation
+  const { state, progress, seconds_left: left, waits_for: lacking } = evaluation
   if (state === 'queued') {
+    const having = lacking.map(({ name, version }) => `${name} ${version}`).join(', ')
     return (
       <Text size="sm" c="dimmed">
-        Waits for a worker
+        {lacking.length > 0 ? `Waits for a worker that has ${having}` : 'Waits for a worker'}
       </Text>
     )
   }
