@@ -40,6 +40,7 @@ from server.projects import endpoints as projects
 from server.queueing import endpoints as queueing
 from server.replays import endpoints as replays
 from server.reproduction import endpoints as reproduction
+from server.run_log import endpoints as run_log
 from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
@@ -73,6 +74,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     workbench.router,
     gallery.router,
     runs.router,
+    run_log.router,
     metrics.router,
     diagnoses.router,
     checkpoints.router,

@@ -39,6 +39,10 @@ MAX_INTEGER = 2**63 - 1
 """Of steps and numbers of items: what both databases hold."""
 MAX_TEXT = 10_000
 """Characters of an event's message, or of an error."""
+MAX_LOG_LINE = 2_000
+"""Characters of a printed line."""
+MAX_LOG_LINES = 500
+"""Printed lines in one message, at most: some hundred kilobytes."""
 
 
 def _storable(text: object) -> object:
@@ -298,6 +302,25 @@ class Orders(Frozen):
     stop: bool = False
     watch: WatchRequest | None = None
     over: bool = False
+
+
+class LogLine(Frozen):
+    """A line that a trainer has printed, and when."""
+
+    at: EpochSeconds
+    text: Annotated[str, BeforeValidator(_storable), Field(max_length=MAX_LOG_LINE)]
+
+
+class LogBatch(Frozen):
+    """Lines for a run's log; sent again until the server has them.
+
+    Attributes:
+        first: number of the first one, from 1, among all that the attempt has printed. What is missing was dropped.
+        lines: one after another.
+    """
+
+    first: int = Field(ge=1, le=MAX_INTEGER)
+    lines: tuple[LogLine, ...] = Field(max_length=MAX_LOG_LINES)
 
 
 class CheckpointUpload(Frozen):

@@ -168,6 +168,23 @@ class RunEvent(Base):
     message: Mapped[str] = mapped_column(Text)
 
 
+class RunLogChunk(Base):
+    """Lines that a run's trainer printed one after another: zlib over JSON, a pair of time and text each.
+
+    `first` is the number of the first one among all that the attempt has printed, from 1; `size` counts bytes of text.
+    """
+
+    __tablename__ = "run_log_chunks"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), index=True)
+    attempt: Mapped[int] = mapped_column(Integer)
+    first: Mapped[int] = mapped_column(BigInteger)
+    count: Mapped[int] = mapped_column(Integer)
+    size: Mapped[int] = mapped_column(Integer)
+    lines: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class MetricRow(Base):
     """A numbered message of metrics as it came, until it is compacted into chunks."""
 

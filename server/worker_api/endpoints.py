@@ -13,6 +13,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from server.errors import TooLargeError
 from server.ids import new_id
+from server.run_log.service import LogService
 from server.security.permissions import WORK
 from server.security.principal import Principal, PrincipalDep, principal_of
 from server.services import Services, ServicesDep
@@ -33,6 +34,7 @@ from workers.protocol import (
     ClaimRequest,
     Heartbeat,
     HeartbeatAnswer,
+    LogBatch,
 )
 
 # Pages have no business here, so the routes stay out of the OpenAPI description that their types are made from.
@@ -63,6 +65,21 @@ async def claim_run(
 ) -> Claim:
     """Take up a run; 409 where it is not to be had."""
     return await services.lanes.workers.run(service.claim, run_id, body, principal)
+
+
+@router.post("/runs/{run_id}/log", status_code=204, dependencies=[WORK])
+async def append_log(
+    run_id: str,
+    attempt: AttemptQuery,
+    body: LogBatch,
+    service: WorkerServiceDep,
+    services: ServicesDep,
+    principal: PrincipalDep,
+) -> None:
+    """What the trainer of an attempt has printed."""
+    lane = services.lanes.workers
+    await lane.run(service.check_claimed, run_id, principal)
+    await lane.run(LogService(services).append, run_id, attempt, body)
 
 
 # The file store has a cap of its own, which the settings say.

@@ -88,6 +88,8 @@ TABLE = {
         GET /api/experiments/{experiment_id}/marks
         GET /api/runs/{run_id}
         GET /api/runs/{run_id}/events
+        GET /api/runs/{run_id}/log
+        GET /api/runs/{run_id}/log/text
         GET /api/runs/{run_id}/metrics
         GET /api/runs/{run_id}/diagnoses
         GET /api/runs/{run_id}/checkpoints
@@ -166,6 +168,7 @@ TABLE = {
     "work": """
         POST /api/worker/heartbeat
         POST /api/worker/runs/{run_id}/claim
+        POST /api/worker/runs/{run_id}/log
         PUT /api/worker/runs/{run_id}/checkpoints/{step}
         GET /api/worker/runs/{run_id}/start
         GET /api/worker/checkpoints/{checkpoint_id}

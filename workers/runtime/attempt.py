@@ -17,6 +17,7 @@ from workers.protocol import Claim, Final, FinalOutcome, Orders
 from workers.reporting import EvaluationResult
 from workers.runtime.client import ServerClient
 from workers.runtime.link import Link
+from workers.runtime.output import Output
 from workers.runtime.pipe import CheckpointReport, Control, Ended, EventReport, FrameReport, Job, MetricsReport, Report
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.spool import Spool
@@ -75,6 +76,7 @@ class Attempt:
         directory.mkdir(mode=0o700)
         self._spool = Spool(directory / "spool.jsonl", claim.last_seq)
         self._uploads = Uploads(client, run_id, claim.attempt, self._spool)
+        self._output = Output(client, run_id, claim.attempt)
         self._link = Link(
             settings.server_url,
             settings.worker_token.get_secret_value(),
@@ -98,6 +100,9 @@ class Attempt:
         """
         try:
             final = self._train_or_explain(trainer)
+            # Its last lines go before its last word: the next attempt may begin right after that.
+            trainer.close()
+            self._output.close()
             if final is None:
                 return None
             self._link.finish(final)
@@ -106,6 +111,7 @@ class Attempt:
             return final.outcome if self._broken is None else "lost"
         finally:
             trainer.close()
+            self._output.close()
             self._uploads.close()
             self._link.close()
             self._spool.close()
@@ -143,6 +149,7 @@ class Attempt:
                 start=str(resume) if resume and not self._claim.checkpoint else None,
             ),
             self._on_report,
+            self._output.line,
         )
         self._trainer = trainer
         self._tell(trainer)

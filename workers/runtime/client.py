@@ -24,6 +24,7 @@ from workers.protocol import (
     ClaimRequest,
     Heartbeat,
     HeartbeatAnswer,
+    LogBatch,
     Machine,
     Queue,
     found_extensions,
@@ -143,6 +144,11 @@ class ServerClient:
             params={"attempt": attempt},
             content=_upload_body(head, archive),
         )
+
+    def log(self, run_id: str, attempt: int, batch: LogBatch) -> None:
+        """Bring what the trainer has printed."""
+        body = batch.model_dump_json()
+        self._send("POST", f"/api/worker/runs/{run_id}/log", params={"attempt": attempt}, content=body)
 
     def _send(
         self,

@@ -49,6 +49,7 @@ class TrainerHandle:
         self._orders = Sender(self._process.stdin)
         self._orders_lock = threading.Lock()
         self._output: deque[str] = deque(maxlen=_STDERR_LINES)
+        self._on_output: Callable[[str], None] | None = None
         self._output_thread = threading.Thread(
             target=self._read_output, args=(self._process.stdout,), name="trainer output", daemon=True
         )
@@ -73,8 +74,9 @@ class TrainerHandle:
         """Whether it has come as far as to wait for its job."""
         return self._ready.is_set()
 
-    def train(self, job: Job, on_report: Callable[[Report], None]) -> None:
-        """Give it its one job; `on_report` is called with all that it reports, in order, on a thread of its own."""
+    def train(self, job: Job, on_report: Callable[[Report], None], on_output: Callable[[str], None]) -> None:
+        """Give it its one job; all that it reports, and all lines that it prints, are told in order on threads."""
+        self._on_output = on_output
         self._on_report = on_report
         self._send(job)
 
@@ -141,4 +143,6 @@ class TrainerHandle:
         for line in stream:
             text = line.decode(errors="replace").replace("\0", "").rstrip()
             self._output.append(text)
+            if self._on_output is not None:
+                self._on_output(text)
             sys.stderr.write(f"trainer {self._process.pid}: {text}\n")

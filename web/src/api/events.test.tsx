@@ -32,7 +32,7 @@ describe('which questions a change makes old', () => {
     [change('checkpoint'), key('/api/runs/{run_id}/checkpoints', ofRun), true],
     [change('metrics'), key('/api/runs/{run_id}/diagnoses', ofRun), false],
     [change('run'), key('/api/runs/{run_id}/diagnoses', ofRun), true],
-    [change('run'), key('/api/runs/{run_id}/events', ofRun), true],
+    [change('run'), key('/api/runs/{run_id}/log', ofRun), true],
     [change('run', null), key('/api/runs/{run_id}', { path: { run_id: 'any' } }), true],
     [change('metrics'), key('/api/experiments'), true],
     [change('metrics'), key('/api/reproduction'), false],

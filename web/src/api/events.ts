@@ -55,7 +55,7 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   if (path === '/api/compare/curves') return ofCompared
   if (path === '/api/runs/{run_id}') return ofRun
   if (path === '/api/runs/{run_id}/metrics') return ofRun && change.kind !== 'checkpoint'
-  if (path === '/api/runs/{run_id}/events') return ofRun && change.kind !== 'metrics'
+  if (path === '/api/runs/{run_id}/log') return ofRun && change.kind !== 'metrics'
   // Diagnoses read whole curves: while a run goes on, they are asked for at their own pace.
   if (path === '/api/runs/{run_id}/diagnoses') return ofRun && change.kind !== 'metrics'
   if (path === '/api/runs/{run_id}/checkpoints') return ofRun && change.kind !== 'metrics'

@@ -1485,6 +1485,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run_id}/log": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Log
+         * @description What the trainer printed and what happened, in one stream.
+         */
+        get: operations["get_log_api_runs__run_id__log_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/log/text": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Log
+         * @description All that is kept of it, as text.
+         */
+        get: operations["download_log_api_runs__run_id__log_text_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run_id}/metrics": {
         parameters: {
             query?: never;
@@ -5433,6 +5473,37 @@ export interface components {
             token: string;
         };
         /**
+         * LogLine
+         * @description A line of a run's log.
+         */
+        LogLine: {
+            /** At */
+            at: number;
+            /**
+             * Attempt
+             * @description That printed it; null for an event.
+             */
+            attempt: number | null;
+            /**
+             * Kind
+             * @description Printed by the trainer; of the event log; or in place of printed lines that were not kept.
+             * @enum {string}
+             */
+            kind: "output" | "event" | "left out";
+            /**
+             * Level
+             * @enum {string}
+             */
+            level: "info" | "warning" | "error";
+            /**
+             * Step
+             * @description Environment step of an event; null for the others.
+             */
+            step: number | null;
+            /** Text */
+            text: string;
+        };
+        /**
          * Machine
          * @description What a worker runs on.
          *
@@ -7539,6 +7610,22 @@ export interface components {
             message: string;
             /** Step */
             step: number;
+        };
+        /**
+         * RunLog
+         * @description The end of a run's log.
+         */
+        RunLog: {
+            /**
+             * Lines
+             * @description The oldest first.
+             */
+            lines: components["schemas"]["LogLine"][];
+            /**
+             * Total
+             * @description Lines that there are, or that hold what was searched for.
+             */
+            total: number;
         };
         /**
          * SacConfig
@@ -13683,6 +13770,109 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LiveState"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_log_api_runs__run_id__log_get: {
+        parameters: {
+            query?: {
+                /** @description Lines at most, the last of all. */
+                limit?: number;
+                /** @description Only lines that hold this, whatever its case. */
+                search?: string;
+            };
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunLog"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    download_log_api_runs__run_id__log_text_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
                 };
             };
             /** @description No valid login */

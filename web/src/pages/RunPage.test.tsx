@@ -22,10 +22,28 @@ const routes = {
     series: [{ name: 'train/success_rate', steps: [4096, 8192], values: [0.1, 0.4], min: null, max: null }],
   },
   'GET /api/runs/run1/checkpoints': checkpoints,
-  'GET /api/runs/run1/events': [
-    { id: 1, at: NOW - 50, step: 0, level: 'info', message: 'Claimed by worker-1' },
-    { id: 2, at: NOW - 10, step: 90_000, level: 'warning', message: 'Link lost for 2 s' },
-  ],
+  'GET /api/runs/run1/log': {
+    total: 3,
+    lines: [
+      { at: NOW - 50, kind: 'event', attempt: null, step: 0, level: 'info', text: 'Claimed by worker-1' },
+      {
+        at: NOW - 30,
+        kind: 'output',
+        attempt: 1,
+        step: null,
+        level: 'info',
+        text: 'UserWarning: old driver',
+      },
+      {
+        at: NOW - 10,
+        kind: 'event',
+        attempt: null,
+        step: 90_000,
+        level: 'warning',
+        text: 'Link lost for 2 s',
+      },
+    ],
+  },
   'GET /api/runs/run1/live': live,
   'GET /api/checkpoints/cp2/episodes': episodes,
   'GET /api/experiments/exp1': experiment,
@@ -261,7 +279,25 @@ test('what happened, the newest first', async () => {
     within(log)
       .getAllByRole('listitem')
       .map((line) => line.textContent),
-  ).toEqual([expect.stringContaining('Link lost for 2 s'), expect.stringContaining('Claimed by worker-1')])
+  ).toEqual([
+    expect.stringContaining('Link lost for 2 s'),
+    expect.stringMatching(/attempt 1.*UserWarning: old driver/),
+    expect.stringContaining('Claimed by worker-1'),
+  ])
+})
+
+test('the log is searched by the server, and downloaded', async () => {
+  const server = startServer(routes)
+  const { user } = open('/runs/run1')
+  const panel = await screen.findByTestId('log')
+  server.routes['GET /api/runs/run1/log'] = { total: 0, lines: [] }
+  await user.type(within(panel).getByRole('textbox', { name: 'Search the log' }), 'driver')
+  expect(await within(panel).findByText('No line holds this')).toBeInTheDocument()
+  expect(server.asked).toContain('/api/runs/run1/log?limit=200&search=driver')
+  expect(within(panel).getByRole('link', { name: 'Download' })).toHaveAttribute(
+    'href',
+    '/api/runs/run1/log/text',
+  )
 })
 
 test('a choice about the view shows at once and is sent with the others', async () => {

@@ -14,13 +14,13 @@ import { chartOf } from '../charts/shape'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
-import { EventLog } from '../components/EventLog'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { WaitsForExtensions } from '../components/Extensions'
 import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
+import { RunLog } from '../components/RunLog'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
@@ -79,7 +79,6 @@ function LoadedRun({ run }: { run: RunDetail }) {
     },
     { placeholderData: keepPreviousData },
   )
-  const events = $api.useQuery('get', '/api/runs/{run_id}/events', init)
   const [step, setStep] = useNumberInAddress('step')
   const [episode] = useNumberInAddress('episode')
   const episodes = useRef<HTMLDivElement>(null)
@@ -188,15 +187,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             ))}
           </Tabs>
         </Panel>
-        <Panel title="Event log" flush>
-          {events.data ? (
-            <EventLog events={events.data} />
-          ) : events.error ? (
-            <QueryError error={events.error} what="event log" retry={events.refetch} />
-          ) : (
-            <Skeleton height={80} m="md" w="auto" />
-          )}
-        </Panel>
+        <RunLog runId={run.id} state={run.state} />
       </Stack>
     </Page>
   )
