@@ -22,9 +22,13 @@ from sim.extending.expression import QUANTITIES
 from sim.observations import observation_layout
 from sim.rewards import constants, evaluate, parameters_of, program_of
 from sim.world import World
+from tests.workers.test_trainer import Recorder
 from workers.algorithms.added import build_added
-from workers.config import AddedAlgorithmConfig
+from workers.checkpoints import read_policy
+from workers.config import AddedAlgorithmConfig, EvaluationConfig, PpoConfig, TrainingConfig
 from workers.extending.learning import Learner
+from workers.networks.config import NETWORKS, complete_network
+from workers.training.trainer import train
 
 PAGES = Path(__file__).parents[1] / "docs" / "extending"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
@@ -95,6 +99,39 @@ def test_add_an_observation(module: Module) -> None:
 def test_add_a_baseline(module: Module) -> None:
     task, bold = TaskConfig(), declared(module, "add-a-baseline.md", "bold")
     assert (drive(controller_of(bold(), task), task, load_suite("simple-200")) == "arrival").mean() > 0.9
+
+
+@pytest.mark.parametrize(("block", "part", "memory"), [(0, "gated", 0), (2, "elman", 32)])
+def test_add_a_network(module: Module, tmp_path: Path, block: int, part: str, memory: int) -> None:
+    lines = blocks("add-a-network.md")
+    extension = module("my_lab", lines[block]).extension
+    module("my_lab.networks", lines[1])
+    assert discover([("my_lab", lambda: extension)]).refused == ()
+    network: Any = complete_network(extension.part(part))
+    NETWORKS.add(network)
+    try:
+        recorder = Recorder()
+        training = TrainingConfig(
+            algorithm=PpoConfig(network=network(), robots=16, rollout_steps=16, minibatch_size=64),
+            steps=1_000,
+            evaluation=EvaluationConfig(every_steps=1_000),
+        )
+        assert train(training, 0, recorder, tmp_path) == "completed"
+        manifest, policy = read_policy(recorder.checkpoints[-1][1])
+    finally:
+        NETWORKS.remove(network)
+    assert manifest.network.name == f"my_lab.{part}"
+    assert policy.memory_size == memory
+
+
+def test_every_page_says_how_many_files_it_takes_and_the_overview_leads_to_it() -> None:
+    overview = (PAGES / "extensions.md").read_text(encoding="utf-8")
+    pages = sorted(PAGES.glob("add-*.md"))
+    assert len(pages) == 7
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert text.splitlines()[0].endswith(": 1 file")
+        assert f"({page.name}) | 1 |" in overview
 
 
 def test_add_an_algorithm(module: Module) -> None:

@@ -214,6 +214,13 @@ class AddedAlgorithmConfig(AddedAlgorithm):
         json_schema_extra=ADVANCED,
     )
 
+    @field_validator("network")
+    @classmethod
+    def _remembers_nothing(cls, value: NetworkConfig) -> NetworkConfig:
+        if value.recurrent:
+            raise ValueError("recurrent networks are for PPO: nothing keeps their memory here; take another network")
+        return value
+
 
 if TYPE_CHECKING:
     Algorithm = PpoConfig | DdpgConfig | Td3Config | SacConfig | AddedAlgorithmConfig

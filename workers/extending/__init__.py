@@ -9,9 +9,10 @@
 ...     implementation = "my_lab.learning:Reinforce"
 >>> extension = Extension(name="my_lab", version="1.0", api=1, parts=(ReinforceConfig,))
 
-What it may learn with stands in `workers.extending.learning`.
+What it may learn with stands in `workers.extending.learning`, what a network is said with that is a formula in
+`workers.extending.formulas`.
 """
 
-from workers.extending.parts import Algorithm, Network
+from workers.extending.parts import Algorithm, FormulaNetwork, Network, RecurrentNetwork
 
-__all__ = ["Algorithm", "Network"]
+__all__ = ["Algorithm", "FormulaNetwork", "Network", "RecurrentNetwork"]

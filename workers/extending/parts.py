@@ -28,3 +28,19 @@ class Network(Part):
     """
 
     kind: ClassVar[str] = "network"
+
+
+class FormulaNetwork(Network):
+    """A network that is said as a formula, once: PyTorch, the ONNX graph, the NumPy runner and the robot's node all run it.
+
+    Attributes:
+        implementation: a function (config, inputs, outputs) to a `workers.extending.formulas.Description`, which needs no
+            torch.
+    """
+
+
+class RecurrentNetwork(FormulaNetwork):
+    """One that remembers, for PPO: its description says how many numbers, `memory`, and how they follow, `h`.
+
+    `sequence_length`, how far gradients go back through time, is added to its fields.
+    """

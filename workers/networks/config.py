@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from sim.config import ADVANCED, Frozen, OpenUnion
 from sim.extending.discovery import added, complete
+from workers.extending.parts import FormulaNetwork, RecurrentNetwork
 from workers.extending.parts import Network as AddedNetwork
 
 
@@ -106,12 +107,27 @@ class AddedNetworkConfig(NetworkConfig, AddedNetwork):
     """A network of an extension."""
 
 
+class AddedFormulaNetworkConfig(AddedNetworkConfig, FormulaNetwork):
+    """A network of an extension that is said as a formula."""
+
+
+class AddedRecurrentNetworkConfig(RecurrentNetworkConfig, AddedFormulaNetworkConfig):
+    """One that remembers."""
+
+
+def complete_network(network: type[AddedNetwork]) -> type[AddedNetworkConfig]:
+    """A network of an extension with the fields that all of its kind have."""
+    if issubclass(network, RecurrentNetwork):
+        return complete(network, AddedRecurrentNetworkConfig)
+    return complete(network, AddedFormulaNetworkConfig if issubclass(network, FormulaNetwork) else AddedNetworkConfig)
+
+
 NETWORKS: OpenUnion[NetworkConfig] = OpenUnion(
     ResBlockNetwork,
     MlpNetwork,
     ConvNetwork,
     GruNetwork,
-    *(complete(network, AddedNetworkConfig) for network in added(AddedNetwork)),
+    *map(complete_network, added(AddedNetwork)),
 )
 """Every network that a training may have."""
 

@@ -10,8 +10,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from sim.extending.discovery import implementation
 from workers.errors import NetworkError
-from workers.networks.config import ConvNetwork, GruNetwork, MlpNetwork, NetworkConfig, ResBlockNetwork
+from workers.networks.config import (
+    AddedFormulaNetworkConfig,
+    ConvNetwork,
+    GruNetwork,
+    MlpNetwork,
+    NetworkConfig,
+    ResBlockNetwork,
+)
 from workers.networks.inputs import Inputs
 
 RESBLOCK_WIDTH = 512
@@ -47,10 +55,24 @@ def describe(network: NetworkConfig, inputs: Inputs, outputs: int) -> Descriptio
     """A network in words; None where only its module knows what it computes.
 
     Raises:
-        NetworkError: it cannot be of these inputs.
+        NetworkError: it cannot be of these inputs, or its extension describes something else than it declares.
     """
+    if isinstance(network, AddedFormulaNetworkConfig):
+        return _of_extension(network, inputs, outputs)
     description = _DESCRIPTIONS.get(type(network))
     return None if description is None else description(network, inputs, outputs)
+
+
+def _of_extension(network: AddedFormulaNetworkConfig, inputs: Inputs, outputs: int) -> Description:
+    description = implementation(network)(network, inputs, outputs)
+    if not isinstance(description, Description):
+        raise NetworkError(f"the network {network.name!r} should be a Description, not a {type(description).__name__}")
+    if network.recurrent != (description.memory > 0):
+        raise NetworkError(
+            f"the network {network.name!r} describes {description.memory} numbers of memory: a RecurrentNetwork has some, "
+            "every other none"
+        )
+    return description
 
 
 def _resblock(network: ResBlockNetwork, inputs: Inputs, outputs: int) -> Description:

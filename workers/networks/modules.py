@@ -13,7 +13,7 @@ from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from workers.errors import NetworkError
 from workers.export.ros2.mapless_navigator.policy import Forward, evaluate
 from workers.kernels.constants import LEAKY_SLOPE
-from workers.networks.config import GruNetwork, NetworkConfig
+from workers.networks.config import AddedFormulaNetworkConfig, GruNetwork, NetworkConfig
 from workers.networks.convolution import convolve
 from workers.networks.description import Description, describe
 from workers.networks.inputs import Inputs, as_inputs
@@ -82,7 +82,7 @@ class Described(nn.Module):
 
     def _remember(self, given: dict[str, Any], memory: Tensor, keep: Tensor) -> Tensor:
         """Memory (steps * n, memory_size) after each step."""
-        at_steps = {name: value.view(*keep.shape[:2], -1).unbind(0) for name, value in given.items() if name != "x"}
+        at_steps = {name: value.view(*keep.shape[:2], -1).unbind(0) for name, value in given.items()}
         memories = []
         for step in range(len(keep)):
             values = {name: value[step] for name, value in at_steps.items()} | {"h": memory * keep[step]}
@@ -153,9 +153,15 @@ def build_network(config: NetworkConfig, inputs: Inputs | int, outputs: int) -> 
     """
     description = describe(config, as_inputs(inputs), outputs)
     if description is not None:
-        return Described(config, description)
+        described = Described(config, description)
+        if isinstance(config, AddedFormulaNetworkConfig):
+            _refuse_unfit_formula(config, described, as_inputs(inputs).size, outputs)
+        return described
     if config.recurrent:
-        raise NetworkError(f"the network {config.name!r} is recurrent: those that others bring must remember nothing")
+        raise NetworkError(
+            f"the network {config.name!r} is recurrent, and a module: one that remembers has to be said as a formula "
+            "(workers.extending.RecurrentNetwork)"
+        )
     network: nn.Module = build_of(config)(config, as_inputs(inputs), outputs)
     _refuse_unfit(config, network, as_inputs(inputs).size, outputs)
     return network
@@ -195,6 +201,23 @@ def take_weights(network: nn.Module, weights: Mapping[str, NDArray[np.generic]])
     for name, parameter in network.named_parameters():
         array = torch.from_numpy(np.array(weights[name], np.float32))
         (parameter if parameter.shape == array.shape else parameter[: len(array)]).copy_(array)
+
+
+@torch.no_grad()
+def _refuse_unfit_formula(config: NetworkConfig, network: Described, inputs: int, outputs: int) -> None:
+    observations, memory = torch.zeros(3, inputs), torch.zeros(3, network.memory_size)
+    try:
+        made, following = network(observations, memory)
+        found = [tuple(made.shape), tuple(following.shape)]
+        if network.memory_size:
+            found.append(tuple(network.unroll(observations.expand(2, 3, inputs), memory, torch.ones(2, 3, 1)).shape))
+    except Exception as error:  # whatever a stranger's lines lead to
+        raise NetworkError(f"the formula of the network {config.name!r} can't be computed: {error!r}") from error
+    if found != [(3, outputs), (3, network.memory_size), (2, 3, outputs)][: len(found)]:
+        raise NetworkError(
+            f"the formula of the network {config.name!r} makes {', '.join(map(str, found))} of (3, {inputs}), "
+            f"not (3, {outputs})"
+        )
 
 
 def head_of(network: nn.Module) -> nn.Linear | None:

@@ -3667,7 +3667,7 @@ export interface components {
         Difference: {
             /**
              * Left Out
-             * @description Likewise: whether it is of one of a list's named things, a part of an observation say, that is left out there.
+             * @description Likewise: whether it is of something in a list, a part of an observation say, that is left out there.
              */
             left_out: boolean[];
             /**
