@@ -54,6 +54,7 @@ from server.slow_clients import SlowClientMiddleware
 from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.system.readiness import ReadinessProbe
+from server.uploads import endpoints as uploads
 from server.version import version
 from server.workbench import endpoints as workbench
 from server.workbench.indexing import keep_indexed
@@ -90,6 +91,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     jobs.router,
     evaluations.router,
     leaderboards.router,
+    uploads.router,
     monitoring.router,
 )
 

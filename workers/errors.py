@@ -75,6 +75,10 @@ class UnknownPolicyError(WorkerError):
     """There is no shipped policy of that name, or none that was measured on that suite."""
 
 
+class ForeignPolicyError(WorkerError):
+    """A policy that somebody has uploaded can't be run, or is for another robot."""
+
+
 class EpisodesTooLongError(WorkerError):
     """The moments of an evaluation do not fit into memory."""
 

@@ -72,8 +72,21 @@ class BaselineName(Frozen):
     task: TaskConfig | None = None
 
 
+class UploadedPolicy(Frozen):
+    """An ONNX file that somebody has uploaded.
+
+    Attributes:
+        id: of the upload.
+        task: that it is for; the server puts it in, whatever a request says.
+    """
+
+    source: Literal["uploaded"] = "uploaded"
+    id: Identifier
+    task: TaskConfig | None = None
+
+
 ArchivedPolicy = Annotated[CheckpointPolicy | ShippedPolicyName, Field(discriminator="source")]
-AnyPolicy = Annotated[CheckpointPolicy | ShippedPolicyName | BaselineName, Field(discriminator="source")]
+AnyPolicy = Annotated[CheckpointPolicy | ShippedPolicyName | BaselineName | UploadedPolicy, Field(discriminator="source")]
 
 
 class NamedSuite(Frozen):

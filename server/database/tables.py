@@ -461,6 +461,22 @@ class Job(Base):
     finished_at: Mapped[float | None] = mapped_column(Float)
 
 
+class UploadedPolicy(Base):
+    """An ONNX file of somebody's, to be measured."""
+
+    __tablename__ = "uploaded_policies"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    project_id: Mapped[str] = mapped_column(ForeignKey("projects.id"), index=True)
+    name: Mapped[str] = mapped_column(String(120))
+    # Robot, LiDAR and observation that it is for.
+    task: Mapped[dict[str, Any]] = mapped_column(JSON)
+    sha256: Mapped[str] = mapped_column(String(64))
+    size: Mapped[int] = mapped_column(Integer)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    graph: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+
+
 class PolicyEvaluation(Base):
     """A policy or a baseline on a suite that somebody asked for; without figures until its job is done."""
 
@@ -473,8 +489,9 @@ class PolicyEvaluation(Base):
     title: Mapped[str] = mapped_column(String(200))
     policy: Mapped[dict[str, Any]] = mapped_column(JSON)
     choice: Mapped[dict[str, Any]] = mapped_column(JSON)
-    # Of its policy, where it is a run's; no foreign key: what was measured stays.
+    # Of its policy, where it is a run's or was uploaded; no foreign keys: what was measured stays.
     checkpoint_id: Mapped[str | None] = mapped_column(String(16), index=True)
+    upload_id: Mapped[str | None] = mapped_column(String(16), index=True)
     created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
     # Why there will be no figures.
     error: Mapped[str | None] = mapped_column(Text)

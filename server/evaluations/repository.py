@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
-from sqlalchemy import ColumnElement, Select, func, or_, select, update
+from sqlalchemy import ColumnElement, Select, and_, func, or_, select, update
 from sqlalchemy.orm import Session, undefer
 
 from server.database import tables
@@ -39,7 +39,8 @@ class Wanted:
         """For a query that knows evaluations, runs and experiments."""
         row, found = tables.PolicyEvaluation, []
         if self.visible is not None:
-            found.append(or_(row.checkpoint_id.is_(None), tables.Experiment.project_id.in_(self.visible)))
+            mine = (tables.Experiment.project_id.in_(self.visible), tables.UploadedPolicy.project_id.in_(self.visible))
+            found.append(or_(and_(row.checkpoint_id.is_(None), row.upload_id.is_(None)), *mine))
         if self.suite_hash is not None:
             found.append(row.suite_hash == self.suite_hash)
         if self.run_id is not None:
@@ -117,10 +118,11 @@ class PolicyEvaluationRepository:
 
 
 def _with_run(query: _Query) -> _Query:
-    """With the run and the experiment of each evaluation's policy, where there are any."""
+    """With the run and the experiment of each evaluation's policy, or with the upload, where there are any."""
     joined = query.outerjoin(tables.Checkpoint, tables.Checkpoint.id == tables.PolicyEvaluation.checkpoint_id)
     joined = joined.outerjoin(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
-    return joined.outerjoin(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+    joined = joined.outerjoin(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+    return joined.outerjoin(tables.UploadedPolicy, tables.UploadedPolicy.id == tables.PolicyEvaluation.upload_id)
 
 
 def episodes_of(evaluation: tables.PolicyEvaluation) -> tuple[EpisodeResult, ...]:

@@ -30,7 +30,7 @@ from server.replays.subject import Subject
 from server.security.principal import Principal
 from server.services import Services
 from sim.config import ImportedArenaConfig, TaskConfig
-from workers.job_protocol import AnyPolicy, ArenaSuite, CheckpointPolicy, EvaluateJob, SuiteChoice
+from workers.job_protocol import AnyPolicy, ArenaSuite, CheckpointPolicy, EvaluateJob, SuiteChoice, UploadedPolicy
 from workers.reporting import EvaluationResult
 
 _POLICY: TypeAdapter[AnyPolicy] = TypeAdapter(AnyPolicy)
@@ -76,6 +76,7 @@ def _queued(session: Session, subject: Measured, spec: EvaluateJob) -> tables.Po
             policy=spec.policy.model_dump(mode="json"),
             choice=spec.suite.model_dump(mode="json"),
             checkpoint_id=spec.policy.id if isinstance(spec.policy, CheckpointPolicy) else None,
+            upload_id=spec.policy.id if isinstance(spec.policy, UploadedPolicy) else None,
         )
         session.add(evaluation)
         session.flush()

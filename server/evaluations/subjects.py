@@ -13,7 +13,9 @@ from server.experiments.repository import ExperimentRepository
 from server.policies.service import find, shipped_hash
 from server.runs.repository import RunRepository
 from server.security.principal import Principal
-from workers.job_protocol import AnyPolicy, BaselineName, CheckpointPolicy
+from server.uploads.repository import UploadRepository
+from sim.config import TaskConfig
+from workers.job_protocol import AnyPolicy, BaselineName, CheckpointPolicy, UploadedPolicy
 
 
 @dataclass(frozen=True)
@@ -41,14 +43,19 @@ def wanted_policies(
     """
     found: list[tuple[AnyPolicy, Measured]] = []
     for policy in policies:
-        if isinstance(policy, TrainingPolicies):
+        if isinstance(policy, UploadedPolicy):
+            upload = UploadRepository(session).get(policy.id)
+            whole = policy.model_copy(update={"task": TaskConfig.model_validate(upload.task)})
+            found.append((whole, measured(session, whole)))
+        elif isinstance(policy, TrainingPolicies):
             best = _best_of(session, policy.id)
             found += [(each, measured(session, each)) for each in best]
         else:
             found.append((policy, measured(session, policy)))
     for policy, subject in found:
         if subject.project_id is not None and principal.role_in(subject.project_id) is None:
-            raise NotFoundError.of("checkpoint", policy.id if isinstance(policy, CheckpointPolicy) else "")
+            what = "checkpoint" if isinstance(policy, CheckpointPolicy) else "uploaded policy"
+            raise NotFoundError.of(what, policy.id if isinstance(policy, CheckpointPolicy | UploadedPolicy) else "")
     return found
 
 
@@ -73,5 +80,8 @@ def measured(session: Session, policy: AnyPolicy) -> Measured:
         checkpoint = CheckpointRepository(session).get(policy.id)
         run = RunRepository(session).get(checkpoint.run_id)
         return Measured(policy_title(run, checkpoint), checkpoint.sha256, run.experiment.project_id)
+    if isinstance(policy, UploadedPolicy):
+        upload = UploadRepository(session).get(policy.id)
+        return Measured(upload.name, upload.sha256, upload.project_id)
     shipped = find(policy.name)
     return Measured(shipped.card.title, shipped_hash(policy.name))

@@ -21,6 +21,7 @@ from server.jobs.views import job_view
 from server.paging import Window
 from server.policies.service import find
 from server.services import Services
+from server.uploads.repository import UploadRepository
 from server.worker_api.attempts import FencedError
 from server.worker_api.losses import count_loss, exhausted, hopeful, too_many
 from sim.config import ImportedArenaConfig
@@ -39,6 +40,7 @@ from workers.job_protocol import (
     JobSpec,
     Measurement,
     ReplayJob,
+    UploadedPolicy,
 )
 
 logger = logging.getLogger(__name__)
@@ -199,6 +201,9 @@ class JobService:
         policy = JOB_SPEC.validate_python(self.current(job_id, attempt).spec).policy
         if isinstance(policy, CheckpointPolicy):
             return self._services.files.read(policy.id)
+        if isinstance(policy, UploadedPolicy):
+            with self._services.database.read() as session:
+                return iter([UploadRepository(session).graph(policy.id)])
         if isinstance(policy, BaselineName):
             raise NotFoundError(f"The baseline {policy.name} has no archive.")
         return iter([find(policy.name).archive.read_bytes()])

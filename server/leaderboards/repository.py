@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, Float, cast, func, or_, select
+from sqlalchemy import ColumnElement, Float, and_, cast, func, or_, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -104,4 +104,8 @@ class LeaderboardRepository:
             .join(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
             .where(tables.Checkpoint.id == row.checkpoint_id, *self._seen())
         )
-        return or_(row.checkpoint_id.is_(None), mine.exists())
+        upload = tables.UploadedPolicy
+        sent = select(upload.id).where(upload.id == row.upload_id)
+        if self._visible is not None:
+            sent = sent.where(upload.project_id.in_(self._visible))
+        return or_(and_(row.checkpoint_id.is_(None), row.upload_id.is_(None)), mine.exists(), sent.exists())

@@ -86,13 +86,21 @@ class ProjectRepository:
         row = tables.Experiment
         return self._grouped(select(row.campaign, row.project_id).where(row.campaign.in_(campaign_ids)).distinct())
 
+    def of_uploads(self, upload_ids: Collection[str]) -> dict[str, set[str]]:
+        """The project of each of the uploaded policies that there are, as a set."""
+        row = tables.UploadedPolicy
+        return self._grouped(select(row.id, row.project_id).where(row.id.in_(upload_ids)))
+
     def of_evaluations(self, evaluation_ids: Collection[str]) -> dict[str, set[str]]:
         """The project of each of the evaluations that there are; none where its policy is everybody's.
 
-        That of a checkpoint that was deleted is in a project that nobody is in.
+        That of a checkpoint or an upload that was deleted is in a project that nobody is in.
         """
         row = tables.PolicyEvaluation
-        query = select(row.id, row.checkpoint_id, tables.Experiment.project_id).where(row.id.in_(evaluation_ids))
+        upload = tables.UploadedPolicy
+        owner = func.coalesce(tables.Experiment.project_id, upload.project_id)
+        query = select(row.id, func.coalesce(row.checkpoint_id, row.upload_id), owner).where(row.id.in_(evaluation_ids))
+        query = query.outerjoin(upload, upload.id == row.upload_id)
         query = query.outerjoin(tables.Checkpoint, tables.Checkpoint.id == row.checkpoint_id)
         query = query.outerjoin(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
         query = query.outerjoin(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)

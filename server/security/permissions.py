@@ -122,6 +122,7 @@ _OF: dict[str, tuple[str, _Find]] = {
     "checkpoint_id": ("checkpoint", ProjectRepository.of_checkpoints),
     "campaign_id": ("campaign", ProjectRepository.of_campaigns),
     "campaign": ("campaign", ProjectRepository.of_campaigns),
+    "upload_id": ("uploaded policy", ProjectRepository.of_uploads),
     "evaluation_id": ("evaluation", ProjectRepository.of_evaluations),
 }
 

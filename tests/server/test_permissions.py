@@ -57,6 +57,7 @@ TABLE = {
         GET /api/arenas/generated
         GET /api/arenas/imported/{sha256}
         GET /api/evaluations
+        GET /api/uploads
         GET /api/leaderboards
         GET /api/leaderboards/{suite_hash}
         GET /api/policies
@@ -75,6 +76,7 @@ TABLE = {
         DELETE /api/workbench/views/{view_id}
         POST /api/experiments
         POST /api/evaluations
+        POST /api/uploads
         POST /api/reproduction
         POST /api/arenas/imported
     """,
@@ -128,6 +130,7 @@ TABLE = {
         POST /api/runs/{run_id}/resume
         POST /api/evaluations/{evaluation_id}/cancel
         DELETE /api/evaluations/{evaluation_id}
+        DELETE /api/uploads/{upload_id}
         PUT /api/runs/{run_id}/priority
         POST /api/runs/{run_id}/front
         DELETE /api/reproduction/{campaign_id}
@@ -325,6 +328,8 @@ def everybody(
             policies = [{"source": "checkpoint", "id": checkpoint}]
             (evaluation,) = client.post("/api/evaluations", json={"policies": policies}).json()
             Reports(client, services).measured(evaluation)
+            onnx = {"name": "Mine", "project_id": here, "content": "AAAA", "task": {}}
+            upload = client.post("/api/uploads", json=onnx).json()
             del client.headers["Authorization"]
             people = {role: lab.person(role, {here: role}) for role in get_args(Role)}
             people["foreigner"] = lab.person("foreigner", {elsewhere: "admin"})
@@ -350,6 +355,7 @@ def everybody(
                 "experiment_id": experiment["id"],
                 "run_id": experiment["runs"][0]["id"],
                 "checkpoint_id": checkpoint,
+                "upload_id": upload["id"],
                 "evaluation_id": evaluation["id"],
                 "campaign_id": campaign.json()["campaign"]["id"],
                 "theme": "light",

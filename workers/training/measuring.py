@@ -23,7 +23,9 @@ from workers.job_protocol import (
     Measurement,
     NamedSuite,
     SuiteChoice,
+    UploadedPolicy,
 )
+from workers.onnx_policy import OnnxPolicy
 from workers.policy import torch_policy
 from workers.training.evaluation import to_result
 
@@ -58,6 +60,7 @@ def drive(
 
     Raises:
         ArchiveError: the archive is not one that this release reads.
+        ForeignPolicyError: an uploaded one can't be run, or is for another robot.
         SuiteError: there is no such suite, or the robot has no room in it.
     """
     if isinstance(policy, BaselineName):
@@ -66,6 +69,11 @@ def drive(
         table = run_controller(controller_of(TABLED[policy.name], task), task, suite, observer(suite, task))
         return Driven(suite, task, table)
     assert archive is not None
+    if isinstance(policy, UploadedPolicy):
+        assert policy.task is not None
+        task, suite = policy.task, choose_suite(choice, policy.task)
+        foreign = OnnxPolicy(archive.read_bytes(), task)
+        return Driven(suite, task, run_suite(foreign, task, suite, observer(suite, task)))
     manifest, read = read_policy(archive)
     task = manifest.training.task
     suite = choose_suite(choice, task)

@@ -1709,6 +1709,50 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/uploads": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Uploads
+         * @description Some of the uploaded policies, the newest first.
+         */
+        get: operations["list_uploads_api_uploads_get"];
+        put?: never;
+        /**
+         * Upload Policy
+         * @description Keep an ONNX file, to be measured as any other policy.
+         */
+        post: operations["upload_policy_api_uploads_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/uploads/{upload_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Delete Upload
+         * @description Forget one; what was measured of it stays.
+         */
+        delete: operations["delete_upload_api_uploads__upload_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/version": {
         parameters: {
             query?: never;
@@ -2545,7 +2589,7 @@ export interface components {
             /** Job Id */
             job_id: string;
             /** Policy */
-            policy: components["schemas"]["CheckpointPolicy-Output"] | components["schemas"]["ShippedPolicyName-Output"] | components["schemas"]["BaselineName-Output"];
+            policy: components["schemas"]["CheckpointPolicy-Output"] | components["schemas"]["ShippedPolicyName-Output"] | components["schemas"]["BaselineName-Output"] | components["schemas"]["workers__job_protocol__UploadedPolicy-Output"];
             /**
              * Progress
              * @description Share of the work that is done, 0 to 1.
@@ -4187,7 +4231,7 @@ export interface components {
          */
         EvaluationRequest: {
             /** Policies */
-            policies: ((components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["BaselineName-Input"]) | components["schemas"]["TrainingPolicies"])[];
+            policies: ((components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["BaselineName-Input"] | components["schemas"]["UploadedPolicy-Input"]) | components["schemas"]["TrainingPolicies"])[];
             /**
              * Suites
              * @default [
@@ -6352,6 +6396,26 @@ export interface components {
             suite_hash: string;
         };
         /**
+         * PolicyUpload
+         * @description An ONNX file, or a bundle of this project, which brings its own task.
+         */
+        PolicyUpload: {
+            /**
+             * Content
+             * @description The file's bytes in base64: `.onnx`, or a bundle's `.zip`.
+             */
+            content: string;
+            /** Name */
+            name: string;
+            /**
+             * Project Id
+             * @default default
+             */
+            project_id: string;
+            /** @description Robot, LiDAR, observation and limits that an `.onnx` file is for; a bundle has them in its manifest. */
+            task?: components["schemas"]["TaskConfig-Input"] | null;
+        };
+        /**
          * PpoConfig
          * @description Proximal Policy Optimization (Schulman et al. 2017) with a Gaussian policy of bounded mean.
          */
@@ -7912,6 +7976,28 @@ export interface components {
             values: (number | null)[];
         };
         /**
+         * UploadedPolicy
+         * @description A policy that was uploaded.
+         */
+        server__uploads__schemas__UploadedPolicy: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Project Id */
+            project_id: string;
+            /** Sha256 */
+            sha256: string;
+            /**
+             * Size
+             * @description Bytes of its ONNX file.
+             */
+            size: number;
+            task: components["schemas"]["TaskConfig-Output"];
+        };
+        /**
          * Session
          * @description A browser that was signed in.
          */
@@ -8972,6 +9058,37 @@ export interface components {
             source: "training";
         };
         /**
+         * UploadedPolicy
+         * @description An ONNX file that somebody has uploaded.
+         *
+         *     Attributes:
+         *         id: of the upload.
+         *         task: that it is for; the server puts it in, whatever a request says.
+         */
+        "UploadedPolicy-Input": {
+            /** Id */
+            id: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "uploaded";
+            task?: components["schemas"]["TaskConfig-Input"] | null;
+        };
+        /**
+         * UploadedPolicyPage
+         * @description Some of the uploaded policies, the newest first.
+         */
+        UploadedPolicyPage: {
+            /** Items */
+            items: components["schemas"]["server__uploads__schemas__UploadedPolicy"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
          * UsedExtension
          * @description An extension that a configuration needs.
          *
@@ -9409,6 +9526,24 @@ export interface components {
              * @description Those that are there first, by name.
              */
             items: components["schemas"]["Worker"][];
+        };
+        /**
+         * UploadedPolicy
+         * @description An ONNX file that somebody has uploaded.
+         *
+         *     Attributes:
+         *         id: of the upload.
+         *         task: that it is for; the server puts it in, whatever a request says.
+         */
+        "workers__job_protocol__UploadedPolicy-Output": {
+            /** Id */
+            id: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            source: "uploaded";
+            task: components["schemas"]["TaskConfig-Output"] | null;
         };
         /**
          * WorkersRun
@@ -14329,6 +14464,147 @@ export interface operations {
             };
             /** @description No valid login */
             401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_uploads_api_uploads_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UploadedPolicyPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    upload_policy_api_uploads_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PolicyUpload"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["server__uploads__schemas__UploadedPolicy"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_upload_api_uploads__upload_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                upload_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -1,0 +1,1 @@
+"""Policies from elsewhere: ONNX files that people upload, to be measured as any other."""

@@ -1,0 +1,60 @@
+"""Uploaded policies in SQL."""
+
+from collections.abc import Collection, Sequence
+
+from sqlalchemy import func, select, true
+from sqlalchemy.orm import Session
+
+from server.database import tables
+from server.errors import NotFoundError
+from server.paging import Window
+
+
+class UploadRepository:
+    """Reads and writes them within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def add(self, upload: tables.UploadedPolicy) -> None:
+        """Add one."""
+        self._session.add(upload)
+
+    def count(self) -> int:
+        """How many there are."""
+        return self._session.scalar(select(func.count()).select_from(tables.UploadedPolicy)) or 0
+
+    def get(self, upload_id: str) -> tables.UploadedPolicy:
+        """The policy, its file left in the database.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        found = self._session.get(tables.UploadedPolicy, upload_id)
+        if found is None:
+            raise NotFoundError.of("uploaded policy", upload_id)
+        return found
+
+    def graph(self, upload_id: str) -> bytes:
+        """Its file.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        return self.get(upload_id).graph
+
+    def page(self, window: Window, visible: Collection[str] | None) -> tuple[Sequence[tables.UploadedPolicy], int]:
+        """Some of them, the newest first, and how many there are in the `visible` projects (None: all)."""
+        row = tables.UploadedPolicy
+        seen = row.project_id.in_(visible) if visible is not None else true()
+        total = self._session.scalar(select(func.count()).select_from(row).where(seen)) or 0
+        query = select(row).where(seen).order_by(row.created_at.desc(), row.id)
+        return self._session.scalars(query.offset(window.offset).limit(window.limit)).all(), total
+
+    def delete(self, upload_id: str) -> None:
+        """Remove one.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        self._session.delete(self.get(upload_id))
