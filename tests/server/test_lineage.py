@@ -235,7 +235,7 @@ def test_in_a_comparison_it_is_one_difference_with_a_name(
     compared = client.get("/api/compare", params={"experiment": [parent["id"], child["id"]]}).json()
     sha256 = child["training"]["start_from"]["sha256"]
     named = f"Corridor, seed 3, step 50,000 ({sha256[:8]})"
-    assert compared["differences"] == [{"path": "start_from", "values": [None, named]}]
+    assert compared["differences"] == [{"path": "start_from", "values": [None, named], "left_out": [False, False]}]
 
 
 def test_trainings_are_found_by_what_they_began_with(client: TestClient, parent: dict[str, Any], checkpoint: str) -> None:
