@@ -92,6 +92,11 @@ types: .venv/.dev
 # The header that uv writes names the command, and nothing in these files names a host.
 LOCK := $(BIN)/uv pip compile -q --universal --generate-hashes --python-version 3.11 --custom-compile-command 'make lock'
 lock: .venv/bin/uv
-	$(LOCK) pyproject.toml --extra build -o requirements.txt
-	$(LOCK) pyproject.toml --extra build --extra dev -o requirements-dev.txt -c requirements.txt
+	$(LOCK) pyproject.toml --extra all --extra build -o requirements.txt
+	$(LOCK) pyproject.toml --extra all --extra build --extra dev -o requirements-dev.txt -c requirements.txt
+	$(LOCK) pyproject.toml -o requirements-base.txt -c requirements.txt
+	$(LOCK) pyproject.toml --extra server -o requirements-server.txt -c requirements.txt
+	$(LOCK) pyproject.toml --extra worker -o requirements-worker.txt -c requirements.txt
+	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["build"], sep="\n")' \
+	  | $(LOCK) - -o requirements-build.txt -c requirements.txt
 	echo 'uv==0.13.8' | $(LOCK) - -o requirements-uv.txt

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 import mapless_client.command
 from server.arenas.cli import app as arena_app
 from server.people.cli import app as people_app
+from sim.parts import explained, require
 from workers.extension_cli import app as extension_app
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ app.add_typer(extension_app, name="extension")
 # Those of the client, which speak to a server that runs anywhere.
 app.registered_commands.extend(mapless_client.command.app.registered_commands)
 
+_OF_WORKERS = ("train", "evaluate", "export", "policies", "reproduce", "worker")
 # Everything after the command's name belongs to the workers' own command line, --help included.
 _PASSED_ON: dict[str, Any] = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 
@@ -40,7 +42,9 @@ DataDir = Annotated[Path | None, typer.Option(help="Where everything is kept [MA
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; a refusal is one line on standard error and exit status 1."""
-    app(arguments, prog_name="mapless")
+    given = sys.argv[1:] if arguments is None else arguments
+    with explained("worker" if given and given[0] in _OF_WORKERS else "server"):
+        app(arguments, prog_name="mapless")
 
 
 @app.callback(invoke_without_command=True)
@@ -93,6 +97,8 @@ def up(
 ) -> None:
     """Start the server and its workers, and keep them running."""
     settings = _settings(host=host, port=port, data_dir=data_dir, workers=0 if no_workers else workers)
+    if settings.workers != 0:
+        require("worker")
     from server.errors import ServiceError
     from server.supervisor import Supervisor
 

@@ -1,5 +1,8 @@
 """`python -m workers` is the workers' part of the `mapless` command."""
 
-from workers.cli import app
+from sim.parts import explained
 
-app(prog_name="mapless")
+with explained("worker"):
+    from workers.cli import app
+
+    app(prog_name="mapless")

@@ -93,15 +93,25 @@ def test_the_image_is_built_with_the_arguments_that_it_takes() -> None:
         assert set(build["args"]) <= set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE))
     # What compose hands over where nobody says otherwise is what the Dockerfile takes by itself.
     usual = dict(re.findall(r'^ARG (\w+)="?([^"\n]*)"?$', DOCKERFILE, re.MULTILINE))
-    assert {name: substituted(value) for name, value in COMPOSE["services"]["server"]["build"]["args"].items()} == usual
+    handed = {name: value for service in OURS for name, value in COMPOSE["services"][service]["build"]["args"].items()}
+    assert {name: substituted(value) for name, value in handed.items()} == usual
+
+
+def test_each_service_has_the_part_that_it_runs() -> None:
+    built = {service: COMPOSE["services"][service]["build"]["target"] for service in OURS}
+    assert built == {"server": "server", "worker": "worker", "jobs": "worker"}
+    assert set(built.values()) <= set(re.findall(r"^FROM \S+ AS (\w+)$", DOCKERFILE, re.MULTILINE))
+    packages = {part: (ROOT / f"requirements-{part}.txt").read_text() for part in ("server", "worker")}
+    assert re.search(r"^torch==", packages["worker"], re.MULTILINE)
+    assert not re.search(r"^(torch|onnx|onnxruntime|triton|nvidia-\S+)==", packages["server"], re.MULTILINE)
 
 
 def test_the_image_runs_without_rights_on_files_that_exist() -> None:
-    last_stage = DOCKERFILE.split("\nFROM ")[-1]
-    assert re.findall(r"^USER (\w+)$", last_stage, re.MULTILINE) == ["mapless"]
+    for stage in DOCKERFILE.split("\nFROM ")[-2:]:
+        assert re.findall(r"^USER (\w+)$", stage, re.MULTILINE) == ["mapless"]
     ignored = (ROOT / ".dockerignore").read_text().splitlines()
     for copied in re.findall(r"^COPY (?!--from)(.+) \S+$", DOCKERFILE, re.MULTILINE):
-        for source in copied.replace("${LOCK}", "requirements.txt").split():
+        for source in re.sub(r"\$\{(\w+)_LOCK\}", lambda m: f"requirements-{m[1].lower()}.txt", copied).split():
             assert (ROOT / source).exists()
             assert f"!{source}" in ignored
 

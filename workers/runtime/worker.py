@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from pydantic import ValidationError
 
+from sim.parts import require
 from workers.errors import UnfitError
 from workers.logs import configure
 from workers.protocol import Queue
@@ -52,6 +53,7 @@ def worker(
     ] = None,
 ) -> None:
     """Start a worker for a server, here or on another machine."""
+    require("worker")
     given = {
         "server_url": server,
         # Jobs need none.
