@@ -3,7 +3,17 @@
 import math
 
 from workers.export.check import CheckReport
-from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
+from workers.export.graph import (
+    LAST_ACTION,
+    MEMORY,
+    NEXT_MEMORY,
+    POSE,
+    PREVIOUS,
+    RANGES,
+    SPEEDS,
+    TARGET,
+    scan_inputs,
+)
 from workers.export.ros2.mapless_navigator.policy import Part, Specification
 from workers.manifest import Manifest
 
@@ -19,8 +29,17 @@ policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
 frames = Frames(policy.specification)  # of one robot, from start to target
 observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[ZEROS]]ADDED))
+STEPprint(f"FORMAT")
+"""
+
+_NUMPY_STEP = """\
 NAMES = policy.velocities(observation)[0]
-print(f"FORMAT")
+"""
+
+_NUMPY_STEP_WITH_MEMORY = """\
+memory = policy.memory(1)  # zeros, of one robot that begins
+actions, memory = policy.step(observation, memory)  # at every step with the memory of the one before
+NAMES = actions[0] * policy.specification.action_limits
 """
 
 _ONNX_EXAMPLE = """\
@@ -31,8 +50,8 @@ session = onnxruntime.InferenceSession("policy_from_scan.onnx")
 inputs = {
 INPUTS
 }
-PREVIOUSaction, velocity = session.run(["action", "velocity"], inputs)
-NAMES = velocity[0]
+PREVIOUSOUTPUTS = session.run(["QUOTED"], inputs)
+NEXTNAMES = velocity[0]
 print(f"FORMAT")
 """
 
@@ -53,11 +72,17 @@ def readme(manifest: Manifest, specification: Specification, report: CheckReport
             _files(report),
             _contract(manifest, specification),
             _added(manifest, specification),
+            _memory(specification),
             _ros(specification),
-            f"## Python, without ROS\n\nWith NumPy alone:\n\n```python\n{_filled(_NUMPY_EXAMPLE, specification)}```\n",
+            f"## Python, without ROS\n\nWith NumPy alone:\n\n```python\n{_numpy_example(specification)}```\n",
             f"With onnxruntime:\n\n```python\n{_onnx_example(specification)}```\n",
         )
     )
+
+
+def _numpy_example(specification: Specification) -> str:
+    step = _NUMPY_STEP_WITH_MEMORY if specification.memory else _NUMPY_STEP
+    return _filled(_NUMPY_EXAMPLE.replace("STEP", step), specification)
 
 
 def _onnx_example(specification: Specification) -> str:
@@ -71,11 +96,18 @@ def _onnx_example(specification: Specification) -> str:
             part.kind: f"np.zeros((1, {part.size}), np.float32),  # as its extension makes it"
             for part in _added_parts(specification)
         },
+        MEMORY: f"np.zeros((1, {specification.memory}), np.float32),  # of a robot that begins",
         PREVIOUS: f"np.zeros((1, {len(specification.carried)}), np.float32),  # see below",
     }
-    inputs = "\n".join(f'    "{name}": {lines[name]}' for name in scan_inputs(specification))
+    names = [*scan_inputs(specification), *([MEMORY] if specification.memory else [])]
+    inputs = "\n".join(f'    "{name}": {lines[name]}' for name in names)
+    outputs = ["action", "velocity", *([NEXT_MEMORY] if specification.memory else [])]
+    following = f'inputs["{MEMORY}"] = {NEXT_MEMORY}  # for the next step\n' if specification.memory else ""
     earlier = bool(specification.carried)
     example = _ONNX_EXAMPLE.replace("INPUTS", inputs).replace("PREVIOUS", _PREVIOUS if earlier else "")
+    example = (
+        example.replace("OUTPUTS", ", ".join(outputs)).replace("QUOTED", '", "'.join(outputs)).replace("NEXT", following)
+    )
     return _filled(example.replace("IMPORT", "import json\n\n" if earlier else ""), specification)
 
 
@@ -164,6 +196,18 @@ def _added(manifest: Manifest, specification: Specification) -> str:
 number is, the training had {extensions}. `policy_from_scan.onnx` takes these numbers as inputs of their own, `observe` as
 `added`, and the ROS 2 node ends with this reason until `Navigator` in `node.py` is given a function `make_added` that makes
 them.
+"""
+
+
+def _memory(specification: Specification) -> str:
+    """What a recurrent policy is given besides, and gives back."""
+    if not (size := specification.memory):
+        return ""
+    return f"""\
+**The policy remembers** {size} numbers of each robot. Both graphs take them as one more input, `memory` (n, {size}), and
+give those of the next step as one more output, `next_memory`; `step` of the NumPy runner likewise. They are zeros where a
+robot begins, and each step is given what the one before returned: with a step left out, or the memory of another robot, it
+no longer does what it was measured to do. The ROS 2 node sees to this by itself.
 """
 
 

@@ -31,7 +31,7 @@ from sim.config import (
     TaskConfig,
 )
 from workers.checkpoints import read_policy
-from workers.config import MlpNetwork, Network, ResBlockNetwork
+from workers.config import ConvNetwork, GruNetwork, MlpNetwork, Network, ResBlockNetwork
 from workers.errors import ArchiveFormatError, ExportError
 from workers.export.bundle import bundle, export_checkpoint
 from workers.export.check import check_export, run_graph
@@ -173,13 +173,17 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
     assert bundle(export_checkpoint(archive)) == bundle(export_checkpoint(archive))
 
 
+@pytest.mark.parametrize("network", [ResBlockNetwork(), ConvNetwork(), GruNetwork(units=8)], ids=lambda one: str(one.name))
 @pytest.mark.parametrize("frames", [1, 4])
-def test_readme_examples_run_and_agree(make_checkpoint: Callable[..., Path], tmp_path: Path, frames: int) -> None:
+def test_readme_examples_run_and_agree(
+    make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, frames: int
+) -> None:
     unpacked = unpack(
-        make_checkpoint(ResBlockNetwork(), TaskConfig(observation=ObservationConfig.preset("improved", frames=frames))),
+        make_checkpoint(network, TaskConfig(observation=ObservationConfig.preset("improved", frames=frames))),
         tmp_path,
     )
     readme = (unpacked / "README.md").read_text()
+    assert ("`next_memory`" in readme) == isinstance(network, GruNetwork)
     numpy_example, onnx_example = (part.split("```")[0] for part in readme.split("```python\n")[1:])
 
     said = [
