@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
 from sim.arenas import Arena, Mover
-from sim.config import FormulaTerm, ProximityTerm, RewardConfig, TaskConfig, TimeTerm, preset_terms
+from sim.config import FormulaTerm, PathProgressTerm, ProximityTerm, RewardConfig, TaskConfig, TimeTerm, preset_terms
 from sim.kernels.commands import write_commands
 from sim.kernels.step import step_usual_robots
 from sim.plain import PlainWorld
@@ -38,6 +38,7 @@ SIX_TERMS = RewardConfig(
         FormulaTerm(formula="min(0, clearance - 0.3) * speed - 0.1 * abs(turning_rate)"),
     )
 )
+BY_PATH = RewardConfig(terms=(*preset_terms("basic"), PathProgressTerm()))
 MAPS = 64
 ROBOTS = (1, 16, 64, 256, 1024, 4096)
 ROUNDS = 7
@@ -48,6 +49,7 @@ ACTIONS = 64  # precomputed batches of actions that are used in turn
 MOVERS, AMONG_MOVERS = 4, (256, 1024)
 
 PLAIN, IRSIM, KERNEL, TERMS = "plain_pymunk", "ir_sim", "kernel_without_physics_256", "robots_256_five_terms_and_a_formula"
+PATH = "robots_256_progress_along_the_shortest_path"
 
 
 def arena(seed: int, movers: int = 0) -> Arena:
@@ -199,6 +201,7 @@ def main() -> None:
     cases |= {f"robots_{n}_among_movers": (ours(n, MOVERS)[0], n) for n in AMONG_MOVERS}
     cases |= {PLAIN: (plain(), 1), KERNEL: (kernel_only(256), 256)}
     cases[TERMS] = ours(256, task=TaskConfig(reward=SIX_TERMS))[0], 256
+    cases[PATH] = ours(256, task=TaskConfig(reward=BY_PATH))[0], 256
     if (other := ir_sim()) is not None:
         cases[IRSIM] = (other, 1)
     rates = measure(cases)
@@ -212,6 +215,7 @@ def main() -> None:
         "to_kernel_at_256": round(many / rates[KERNEL], 2),
         "kept_at_4096": round(rates["robots_4096"] / many, 2),
         "kept_with_five_terms_and_a_formula": round(rates[TERMS] / many, 2),
+        "kept_with_progress_along_the_shortest_path": round(rates[PATH] / many, 3),
     }
     for n in AMONG_MOVERS:
         figures[f"kept_among_movers_at_{n}"] = round(rates[f"robots_{n}_among_movers"] / rates[f"robots_{n}"], 2)

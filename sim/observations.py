@@ -26,12 +26,10 @@ from sim.config import (
     TaskConfig,
     part_key,
 )
-from sim.config.observation import MAX_FRAMES, MAX_PARTS, part_size
+from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
-from sim.kernels.records import PART_KINDS, ROOM_FOR_FRAMES, ROOM_FOR_PARTS
-
-assert MAX_PARTS <= ROOM_FOR_PARTS
-assert MAX_FRAMES <= ROOM_FOR_FRAMES
+from sim.kernels.records import PART_KINDS
+from sim.kernels.room import MAX_FRAMES, MAX_PARTS
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -193,7 +191,7 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
     """Those fields of `sim.kernels.records.PARAMETERS` that say what is seen."""
     observation = task.observation
     rows = {part_key(part): row for row, part in enumerate(observation.parts)}
-    starts = np.zeros((ROOM_FOR_PARTS, ROOM_FOR_FRAMES), np.int32)
+    starts = np.zeros((MAX_PARTS, MAX_FRAMES), np.int32)
     for block in observation_layout(task).blocks:
         starts[rows[block.key], block.age] = block.start
     places, options = np.full(len(PART_KINDS), -1, np.int32), np.zeros(len(PART_KINDS), np.int32)
@@ -203,7 +201,7 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
         kind = PART_KINDS.index(part.name)
         places[kind], options[kind] = starts[row, 0], _option(part)
     sizes = _robot_sizes(task)
-    room = (0, ROOM_FOR_PARTS - len(observation.parts))
+    room = (0, MAX_PARTS - len(observation.parts))
     return {
         "part_places": places,
         "part_options": options,

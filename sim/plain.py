@@ -35,6 +35,7 @@ from sim.extending.parts import RewardTerm as AddedTerm
 from sim.footprint import rectangle_clearance
 from sim.lidar import drawn_ray_angles, ray_origins
 from sim.observations import near_distance
+from sim.paths import Paths
 from sim.physics import add_arena, robot_body
 from sim.rewards import constants, evaluate, parameters_of, program_of
 
@@ -110,6 +111,8 @@ class PlainWorld:
         self.velocities: tuple[float, ...] = (0.0,) * action_layout(task.robot).size
         self.last_velocities = self.velocities
         self.distance = math.dist(pose[:2], target)
+        self._paths = Paths([arena], task.passable_clearance) if task.reward.weight("path_progress") else None
+        self.path = self.last_path = self._path()
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
         self._seen: list[list[NDArray[np.float64]]] = []
         self._added_parts = AddedParts(task)
@@ -144,6 +147,10 @@ class PlainWorld:
         reach = self.arena.diagonal
         hit = self.space.point_query_nearest(self.body.position, reach, self.shape.filter)
         return (hit.distance if hit is not None else reach) - self.task.robot.inscribed_radius
+
+    def _path(self) -> float:
+        """Length of the shortest path to the target, metres; 0 where the reward does not depend on it."""
+        return 0.0 if self._paths is None else self._paths.length(0, self.body.position, self.target)
 
     def bearing(self) -> float:
         """Direction of the target against the heading, radians, left positive."""
@@ -213,6 +220,8 @@ class PlainWorld:
             case "progress":
                 ratio = min(before / self.distance, _MAX_RATIO)
                 return (before - self.distance) * (2.0**ratio if term.exponential else 1.0)
+            case "path_progress":
+                return self.last_path - self.path
             case "time":
                 return self.task.control_period
             case "clearance":
@@ -272,6 +281,7 @@ class PlainWorld:
         self.steps += 1
         self.last_velocities, self.velocities = self.velocities, action
         before, self.distance = self.distance, math.dist(self.body.position, self.target)
+        self.last_path, self.path = self.path, self._path()
         ranges = self.scan()
         outcome: Outcome = "none"
         if self.distance < task.arrival_distance:

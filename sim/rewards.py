@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arrays import Floats
-from sim.config import MAX_TERMS, FormulaTerm, ProgressTerm, RewardConfig, SmoothnessTerm, TaskConfig, term_key
+from sim.config import FormulaTerm, ProgressTerm, RewardConfig, SmoothnessTerm, TaskConfig, term_key
 from sim.errors import FormulaError
 from sim.extending.discovery import implementation
 from sim.extending.expression import FUNCTIONS, OPERATIONS, QUANTITIES, Step, depth, operands, parse
 from sim.extending.parts import RewardTerm as AddedTerm
 from sim.kernels import rewards as kernels
 from sim.kernels.bundles import Robots
-from sim.kernels.records import FORMULA_TERM, ROOM_FOR_TERMS, TERM_KINDS
+from sim.kernels.records import FORMULA_TERM, TERM_KINDS
+from sim.kernels.room import MAX_TERMS
 
-assert MAX_TERMS <= ROOM_FOR_TERMS
 assert OPERATIONS.index("clip") == kernels.CLIP
 assert len(OPERATIONS) == kernels.CLIP + 1
 
@@ -36,7 +36,7 @@ def pack_terms(reward: RewardConfig) -> dict[str, object]:
     ]
     values: dict[str, object] = {"terms": len(kinds), "tabulates": FORMULA_TERM in kinds}
     for name, column in (("term_kinds", kinds), ("term_weights", weights), ("term_options", options)):
-        values[name] = np.pad(np.array(column, np.float64), (0, ROOM_FOR_TERMS - len(column)))
+        values[name] = np.pad(np.array(column, np.float64), (0, MAX_TERMS - len(column)))
     return values
 
 

@@ -23,6 +23,7 @@ from sim.kernels.disturbances import rays_ahead
 from sim.kernels.random import seed_streams
 from sim.kernels.records import (
     ACKERMANN,
+    ARRIVAL,
     DIFFERENTIAL,
     DISTANCE_NOISE,
     DROPOUT,
@@ -41,6 +42,7 @@ from sim.kernels.step import ARRIVAL_MARGIN, MIN_TARGET_DISTANCE, reset_robots, 
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.movers import Movers
 from sim.observations import observation_size, pack_parts
+from sim.paths import PathProgress
 from sim.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.rewards import Formulas, pack_terms, reads_changes
 from sim.shapes import pack_shapes
@@ -219,7 +221,7 @@ class World:
         )
         numbers = observation_size(task)
         self._formulas = formulas = Formulas(task, robots)
-        self._added_parts = AddedParts(task)
+        self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, self.arenas, robots)
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
@@ -245,8 +247,9 @@ class World:
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
-        # What extensions see of a step that ends an episode has to be seen before the next one begins.
-        starts_anew = restart == "same step" and not self._added_parts
+        # What extensions see of a step that ends an episode, and how far it was, has to be seen before the next one begins.
+        self._looks_back = bool(self._added_parts) or bool(self._path_progress)
+        starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         is_usual = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
         self._step_robots = step_usual_robots if is_usual else step_any_robots
@@ -303,6 +306,7 @@ class World:
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
         self._see_added_parts(everybody, begins=True)
+        self._path_progress.begin(self.robots, everybody)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -391,8 +395,9 @@ class World:
         if count:
             space.put(self._placed[:count])
         self._formulas.add(self.robots)
-        if self._added_parts:
-            self._end_with_added_parts()
+        self._path_progress.add(self.robots)
+        if self._looks_back:
+            self._look_back()
         if ended is not None and ended.any():
             self._begin(ended)
 
@@ -403,11 +408,13 @@ class World:
         reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
         self._space.put(np.flatnonzero(which).astype(np.int32))
         self._see_added_parts(which, begins=True)
+        self._path_progress.begin(self.robots, which)
 
-    def _end_with_added_parts(self) -> None:
+    def _look_back(self) -> None:
         """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
+        self._path_progress.begin(robots, robots.outcomes == ARRIVAL)
         ended = robots.terminations | robots.truncations
         if not ended.any():
             return
@@ -513,3 +520,4 @@ class World:
         for name, target in targets.items():
             target[...] = state[name]
         self._space.put_all()
+        self._path_progress.begin(self.robots, np.ones(len(self), np.bool_))

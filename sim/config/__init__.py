@@ -54,9 +54,9 @@ from sim.config.observation import (
 )
 from sim.config.open_union import OpenUnion
 from sim.config.reward import (
-    MAX_TERMS,
     AlignmentTerm,
     FormulaTerm,
+    PathProgressTerm,
     PeopleTerm,
     ProgressTerm,
     ProximityTerm,
@@ -96,7 +96,6 @@ __all__ = [
     "MAX_MOVERS",
     "MAX_OBSTACLES",
     "MAX_SIDE",
-    "MAX_TERMS",
     "MIN_SIDE",
     "AckermannDrive",
     "ActionsPart",
@@ -138,6 +137,7 @@ __all__ = [
     "OdometryConfig",
     "OmnidirectionalDrive",
     "OpenUnion",
+    "PathProgressTerm",
     "Patrol",
     "Pedestrian",
     "PeopleTerm",

@@ -13,12 +13,7 @@ from sim.config.base import ADVANCED, Frozen
 from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ObservationPart as AddedPart
 from sim.extending.parts import check_numbers
-
-MAX_PARTS = 16
-"""Parts of one observation, at most."""
-
-MAX_FRAMES = 8
-"""Moments at which a part is seen, at most."""
+from sim.kernels.room import MAX_FRAMES, MAX_PARTS
 
 MAX_NUMBERS = 4_000
 """Numbers of one observation, at most: all rays of a full scanner at all moments, and some more."""

@@ -2,7 +2,7 @@
 
 A step's reward is the sum of its terms. Arrival, collision and time-out are paid in the step in which they happen; all
 other terms but formulas of one's own in every step that ends in neither arrival nor collision, as in the paper (section
-'Reward function'). `d` is the distance to the target.
+'Reward function'). `d` is the distance to the target, `l` the length of the shortest path to it.
 """
 
 from collections.abc import Mapping
@@ -14,9 +14,7 @@ from sim.config.base import ADVANCED, Frozen
 from sim.extending.discovery import added, with_added
 from sim.extending.expression import MAX_CHARACTERS, parse
 from sim.extending.parts import RewardTerm as AddedTerm
-
-MAX_TERMS = 16
-"""Terms of one reward, at most."""
+from sim.kernels.room import MAX_TERMS
 
 
 def _weight(default: float, unit: str) -> Any:
@@ -61,6 +59,13 @@ class ProgressTerm(Frozen):
         description="Times 2^(d before / d now), as in the paper's advanced reward; the ratio is cut at 8.",
         json_schema_extra=ADVANCED,
     )
+
+
+class PathProgressTerm(Frozen):
+    """Metres by which the shortest path became shorter: l before - l now, around walls and obstacles, not movers."""
+
+    name: Literal["path_progress"] = Field("path_progress", title="Progress along the shortest path")
+    weight: float = _weight(500.0, "per metre gained")
 
 
 class TimeTerm(Frozen):
@@ -149,6 +154,7 @@ BuiltInTerm = (
     | CollisionTerm
     | TimeoutTerm
     | ProgressTerm
+    | PathProgressTerm
     | TimeTerm
     | ClearanceTerm
     | ProximityTerm

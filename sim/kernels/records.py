@@ -2,17 +2,13 @@
 
 import numpy as np
 
+from sim.kernels.room import MAX_FRAMES, MAX_PARTS, MAX_TERMS
+
 CELL = 0.1
 """Edge of a cell of free space (`sim.arenas.freespace`), metres."""
 
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
-
-ROOM_FOR_PARTS = 16
-"""Parts of one observation, at most."""
-
-ROOM_FOR_FRAMES = 8
-"""Moments at which a part is seen, at most."""
 
 PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation")
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
@@ -31,9 +27,6 @@ PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing",
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2
 """Drives, see `sim.config.AnyDrive`."""
 
-ROOM_FOR_TERMS = 16
-"""Terms of one reward, at most."""
-
 TERM_KINDS = (
     "arrival",
     "collision",
@@ -47,6 +40,7 @@ TERM_KINDS = (
     "speed",
     "people",
     "formula",
+    "path_progress",
 )
 """Kinds of reward terms, see `sim.config.RewardTerm`; a kind's place here is its number."""
 
@@ -63,6 +57,7 @@ TERM_KINDS = (
     SPEED_TERM,
     PEOPLE_TERM,
     FORMULA_TERM,
+    PATH_PROGRESS_TERM,
 ) = range(len(TERM_KINDS))
 
 QUANTITIES = (
@@ -110,14 +105,14 @@ PARAMETERS = np.dtype(
         ("rays_per_batch", "i4"),
         ("frames", "i4"),  # moments at which anything is seen
         ("parts", "i4"),  # of the observation
-        ("part_sizes", "i4", (ROOM_FOR_PARTS,)),  # numbers of each at one moment
-        ("part_frames", "i4", (ROOM_FOR_PARTS,)),
-        ("part_starts", "i4", (ROOM_FOR_PARTS, ROOM_FOR_FRAMES)),  # where the numbers of each moment begin
+        ("part_sizes", "i4", (MAX_PARTS,)),  # numbers of each at one moment
+        ("part_frames", "i4", (MAX_PARTS,)),
+        ("part_starts", "i4", (MAX_PARTS, MAX_FRAMES)),  # where the numbers of each moment begin
         ("near", "f4"),  # m, see `sim.observations.near_distance`
         ("terms", "i4"),  # of the reward
-        ("term_kinds", "i4", (ROOM_FOR_TERMS,)),
-        ("term_weights", "f4", (ROOM_FOR_TERMS,)),
-        ("term_options", "f4", (ROOM_FOR_TERMS,)),  # a margin, m; of progress 1 where it is exponential
+        ("term_kinds", "i4", (MAX_TERMS,)),
+        ("term_weights", "f4", (MAX_TERMS,)),
+        ("term_options", "f4", (MAX_TERMS,)),  # a margin, m; of progress 1 where it is exponential
         ("tabulates", "i4"),  # 1 where a formula reads `Robots.quantities`
         ("arrival_distance", "f4"),  # m
         ("collision_distance", "f4"),  # m

@@ -6113,6 +6113,40 @@ export interface components {
             old: string;
         };
         /**
+         * PathProgressTerm
+         * @description Metres by which the shortest path became shorter: l before - l now, around walls and obstacles, not movers.
+         */
+        "PathProgressTerm-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "path_progress";
+            /**
+             * Weight
+             * @description Reward per metre gained.
+             * @default 500
+             */
+            weight: number;
+        };
+        /**
+         * PathProgressTerm
+         * @description Metres by which the shortest path became shorter: l before - l now, around walls and obstacles, not movers.
+         */
+        "PathProgressTerm-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "path_progress";
+            /**
+             * Weight
+             * @description Reward per metre gained.
+             * @default 500
+             */
+            weight: number;
+        };
+        /**
          * Patrol
          * @description Goes round its waypoints in straight lines, from the last one back to the first; it starts anywhere on its way.
          */
@@ -7279,7 +7313,7 @@ export interface components {
              * Terms
              * @description Their sum is the reward of a step; each is logged by itself.
              */
-            terms?: (components["schemas"]["ArrivalTerm-Input"] | components["schemas"]["CollisionTerm-Input"] | components["schemas"]["TimeoutTerm-Input"] | components["schemas"]["ProgressTerm-Input"] | components["schemas"]["TimeTerm-Input"] | components["schemas"]["ClearanceTerm-Input"] | components["schemas"]["ProximityTerm-Input"] | components["schemas"]["AlignmentTerm-Input"] | components["schemas"]["SmoothnessTerm-Input"] | components["schemas"]["SpeedTerm-Input"] | components["schemas"]["PeopleTerm-Input"] | components["schemas"]["FormulaTerm-Input"])[];
+            terms?: (components["schemas"]["ArrivalTerm-Input"] | components["schemas"]["CollisionTerm-Input"] | components["schemas"]["TimeoutTerm-Input"] | components["schemas"]["ProgressTerm-Input"] | components["schemas"]["PathProgressTerm-Input"] | components["schemas"]["TimeTerm-Input"] | components["schemas"]["ClearanceTerm-Input"] | components["schemas"]["ProximityTerm-Input"] | components["schemas"]["AlignmentTerm-Input"] | components["schemas"]["SmoothnessTerm-Input"] | components["schemas"]["SpeedTerm-Input"] | components["schemas"]["PeopleTerm-Input"] | components["schemas"]["FormulaTerm-Input"])[];
         };
         /**
          * RewardConfig
@@ -7290,7 +7324,7 @@ export interface components {
              * Terms
              * @description Their sum is the reward of a step; each is logged by itself.
              */
-            terms: (components["schemas"]["ArrivalTerm-Output"] | components["schemas"]["CollisionTerm-Output"] | components["schemas"]["TimeoutTerm-Output"] | components["schemas"]["ProgressTerm-Output"] | components["schemas"]["TimeTerm-Output"] | components["schemas"]["ClearanceTerm-Output"] | components["schemas"]["ProximityTerm-Output"] | components["schemas"]["AlignmentTerm-Output"] | components["schemas"]["SmoothnessTerm-Output"] | components["schemas"]["SpeedTerm-Output"] | components["schemas"]["PeopleTerm-Output"] | components["schemas"]["FormulaTerm-Output"])[];
+            terms: (components["schemas"]["ArrivalTerm-Output"] | components["schemas"]["CollisionTerm-Output"] | components["schemas"]["TimeoutTerm-Output"] | components["schemas"]["ProgressTerm-Output"] | components["schemas"]["PathProgressTerm-Output"] | components["schemas"]["TimeTerm-Output"] | components["schemas"]["ClearanceTerm-Output"] | components["schemas"]["ProximityTerm-Output"] | components["schemas"]["AlignmentTerm-Output"] | components["schemas"]["SmoothnessTerm-Output"] | components["schemas"]["SpeedTerm-Output"] | components["schemas"]["PeopleTerm-Output"] | components["schemas"]["FormulaTerm-Output"])[];
         };
         /**
          * RidgebackConfig

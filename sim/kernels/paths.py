@@ -1,0 +1,191 @@
+"""Shortest paths to targets over an arena's free cells: straight where nothing is in the way, else from corner to corner.
+
+Lazy Theta* (Nash, Koenig and Tovey, AAAI 2010) from the target, over all cells at once: each keeps the corner that its
+path leads to first. Neighbours over a corner of two cells count, since a free cell is free to its corners.
+"""
+
+import heapq
+import math
+
+import numpy as np
+
+from sim.kernels.options import kernel
+from sim.kernels.records import CELL
+
+ZERO = np.float32(0.0)
+
+FAR_OFF = -1
+"""In place of a corner: no path leads from here to the target."""
+
+
+@kernel()
+def _sees(free, row, column, to_row, to_column):
+    """Whether every cell between the middles of two free cells is free."""
+    rows = abs(to_row - row)
+    columns = abs(to_column - column)
+    down = 1 if to_row > row else -1
+    right = 1 if to_column > column else -1
+    ahead = columns - rows
+    rows *= 2
+    columns *= 2
+    while row != to_row or column != to_column:
+        if ahead > 0:
+            column += right
+            ahead -= rows
+        elif ahead < 0:
+            row += down
+            ahead += columns
+        else:
+            row += down
+            column += right
+            ahead += columns - rows
+        if not free[row, column]:
+            return False
+    return True
+
+
+@kernel(allocates=True)
+def lead(free, target, corners):
+    """Write for each cell where the shortest path to a target leads first.
+
+    Args:
+        free: (rows, columns) bool.
+        target: a free cell, row * columns + column.
+        corners: (rows * columns or more,) int32, written: the cell at the next corner, the target itself where it is in
+            sight, or `FAR_OFF`.
+    """
+    rows, columns = free.shape
+    costs = np.full(rows * columns, np.inf, np.float32)
+    settled = np.zeros(rows * columns, np.bool_)
+    corners[: rows * columns] = FAR_OFF
+    costs[target] = ZERO
+    corners[target] = target
+    queue = [(ZERO, target)]
+    while len(queue) > 0:
+        _, here = heapq.heappop(queue)
+        if settled[here]:
+            continue
+        settled[here] = True
+        row, column = here // columns, here % columns
+        corner = np.int64(corners[here])
+        if not _sees(free, row, column, corner // columns, corner % columns):
+            # Its corner was thought to be in sight. It is not: go by the best neighbour that is settled.
+            costs[here] = np.inf
+            for r in range(max(row - 1, 0), min(row + 2, rows)):
+                for c in range(max(column - 1, 0), min(column + 2, columns)):
+                    cell = r * columns + c
+                    if settled[cell] and cell != here:
+                        dr, dc = r - row, c - column
+                        cost = costs[cell] + np.float32(math.sqrt(dr * dr + dc * dc))
+                        if cost < costs[here]:
+                            costs[here] = cost
+                            corners[here] = cell
+            corner = np.int64(corners[here])
+        corner_row, corner_column = corner // columns, corner % columns
+        for r in range(max(row - 1, 0), min(row + 2, rows)):
+            for c in range(max(column - 1, 0), min(column + 2, columns)):
+                cell = r * columns + c
+                if settled[cell] or not free[r, c]:
+                    continue
+                dr, dc = r - corner_row, c - corner_column
+                cost = costs[corner] + np.float32(math.sqrt(dr * dr + dc * dc))
+                if cost < costs[cell]:
+                    costs[cell] = cost
+                    corners[cell] = corner
+                    heapq.heappush(queue, (cost, cell))
+
+
+@kernel()
+def _middle(cell, free):
+    """X and y of a cell's middle, metres: the grid lies in the middle of its arena."""
+    rows, columns = free.shape
+    x = (cell % columns + 0.5 - 0.5 * columns) * CELL
+    y = (cell // columns + 0.5 - 0.5 * rows) * CELL
+    return x, y
+
+
+@kernel()
+def _cell_of(x, y, nearest):
+    """The free cell at a point, metres, or the nearest one, given (rows, columns) those nearest to all cells."""
+    rows, columns = nearest.shape
+    row = min(max(math.floor(y / CELL + 0.5 * rows), 0), rows - 1)
+    column = min(max(math.floor(x / CELL + 0.5 * columns), 0), columns - 1)
+    return np.int64(nearest[row, column])
+
+
+@kernel(allocates=True)
+def grid_of(index, grids):
+    """(rows, columns) free and nearest of an arena."""
+    first, rows, columns = grids.places[index, 0], grids.places[index, 1], grids.places[index, 2]
+    free = grids.free[first : first + rows * columns].reshape(rows, columns)
+    return free, grids.nearest[first : first + rows * columns].reshape(rows, columns)
+
+
+@kernel(allocates=True)
+def path_length(x, y, target_x, target_y, index, slot, grids, fields, owners):
+    """How far it is from a point to a target of an arena, metres.
+
+    Args:
+        x: of the point, metres, like the other three.
+        y: likewise.
+        target_x: of the target.
+        target_y: likewise.
+        index: of the arena.
+        slot: the row of `fields` that may hold the target's; -1 is none.
+        grids: `sim.paths.Grids`.
+        fields: (S, cells) int32, what `lead` wrote.
+        owners: (S,) int64, of which arena's cell each is, counted through all arenas.
+
+    Returns:
+        The length, below zero where the target's field is needed and is not in that row; and the target's cell.
+    """
+    free, nearest = grid_of(index, grids)
+    columns = free.shape[1]
+    cell, target = _cell_of(x, y, nearest), _cell_of(target_x, target_y, nearest)
+    straight = math.hypot(target_x - x, target_y - y)
+    if _sees(free, cell // columns, cell % columns, target // columns, target % columns):
+        return straight, target
+    if slot < 0 or owners[slot] != grids.places[index, 0] + target:
+        return -1.0, target
+    corners = fields[slot]
+    length = 0.0
+    if corners[cell] != FAR_OFF:
+        corner = np.int64(corners[cell])
+        while corner != target:
+            next_x, next_y = _middle(corner, free)
+            length += math.hypot(next_x - x, next_y - y)
+            x, y = next_x, next_y
+            corner = np.int64(corners[corner])
+    return max(straight, length + math.hypot(target_x - x, target_y - y)), target
+
+
+@kernel(allocates=True)
+def path_lengths(which, robots, slots, grids, fields, owners, lengths, missing):
+    """Write how far some robots are from their targets, metres.
+
+    Args:
+        which: (N,) bool, the robots.
+        robots: `sim.kernels.bundles.Robots`.
+        slots: (N,) int32 rows of `fields` that may hold their targets'.
+        grids: see `path_length`, like `fields` and `owners`.
+        fields: likewise.
+        owners: likewise.
+        lengths: (N,) float64, written but where a field is missing.
+        missing: (N,) int32, written: the robots for which it is.
+
+    Returns:
+        How many these are.
+    """
+    count = 0
+    for i in range(which.shape[0]):
+        if not which[i]:
+            continue
+        x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
+        target_x, target_y = np.float64(robots.targets[i, 0]), np.float64(robots.targets[i, 1])
+        length, _ = path_length(x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners)
+        if length < 0.0:
+            missing[count] = i
+            count += 1
+        else:
+            lengths[i] = length
+    return count

@@ -1,0 +1,10 @@
+"""How much of something one task may have: what configurations allow, and what the records have room for (no imports)."""
+
+MAX_PARTS = 16
+"""Parts of one observation, at most."""
+
+MAX_FRAMES = 8
+"""Moments at which a part is seen, at most."""
+
+MAX_TERMS = 16
+"""Terms of one reward, at most."""
