@@ -99,4 +99,5 @@ lock: .venv/bin/uv
 	$(LOCK) pyproject.toml --extra worker -o requirements-worker.txt -c requirements.txt
 	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["build"], sep="\n")' \
 	  | $(LOCK) - -o requirements-build.txt -c requirements.txt
+	$(LOCK) server/client/pyproject.toml --extra mcp -o server/client/requirements.txt -c requirements.txt
 	echo 'uv==0.13.8' | $(LOCK) - -o requirements-uv.txt

@@ -178,7 +178,7 @@ def test_the_models_say_what_the_api_says() -> None:
 
 def test_what_the_page_shows_runs(environment: dict[str, str], tmp_path: Path) -> None:
     text = (ROOT / "docs" / "client.md").read_text("utf-8")
-    exported, commands, _install = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    exported, commands, *_installs = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
     (program,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert set(re.findall(r"MAPLESS_\w+", exported)) == {"MAPLESS_URL", "MAPLESS_TOKEN"}
 

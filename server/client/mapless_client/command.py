@@ -146,6 +146,17 @@ def compare(
         typer.echo(f"warning: {warning}")
 
 
+@app.command()
+def mcp(url: Url = None) -> None:
+    """Serve assistants over standard input and output (Model Context Protocol), within the token's rights."""
+    try:
+        from mapless_client.assistant import assistant
+    except ModuleNotFoundError:
+        _refuse("this needs the package mcp, 2.3 or newer: pip install './server/client[mcp]'")
+    with _server(url) as client:
+        assistant(client).run("stdio")
+
+
 def _follow(client: Client, experiment_id: str, *, as_json: bool) -> None:
     said: dict[str, str] = {}
     experiment = None
