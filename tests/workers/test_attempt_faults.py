@@ -45,7 +45,7 @@ class Service:
         self._server.shutdown()
 
     def _answer(self, _: ServerConnection, request: Request) -> Response | None:
-        if "/checkpoints/" not in request.path:
+        if "/checkpoints/" not in request.path and not request.path.endswith("/start"):
             return None
         self.downloads += 1
         damaged = STORED[:-1]
@@ -94,6 +94,16 @@ def resumed(service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         yield Attempt(settings_for(service.url, tmp_path), client, "r", claim, tmp_path / "attempt", lambda: False)
 
 
+@pytest.fixture
+def begun(service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Attempt]:
+    """An attempt that is to begin with a policy that the service has."""
+    monkeypatch.setattr(attempt, "_RETRY_SECONDS", 0.05)
+    start = hashlib.sha256(STORED).hexdigest()
+    claim = Claim(attempt=1, seed=0, training=TrainingConfig(), last_seq=0, checkpoint=None, start=start, lease_seconds=15.0)
+    with ServerClient(service.url, "secret") as client:
+        yield Attempt(settings_for(service.url, tmp_path), client, "r", claim, tmp_path / "attempt", lambda: False)
+
+
 def last_word(resumed: Attempt, service: Service) -> Final:
     """What the attempt tells the server in the end, which must come soon."""
     threading.Thread(target=resumed.run, args=(NoTrainer(),), daemon=True).start()
@@ -116,6 +126,19 @@ def test_a_checkpoint_that_is_gone_is_asked_for_once(resumed: Attempt, service: 
     assert final.outcome == "damaged"
     assert "checkpoint of step 81,920 is gone" in (final.error or "")
     assert service.downloads == 1
+
+
+@pytest.mark.parametrize(
+    ("status", "words"), [(HTTPStatus.OK, "is not what was stored there"), (HTTPStatus.NOT_FOUND, "is gone")]
+)
+def test_where_the_policy_to_start_from_cannot_be_had_the_run_fails_and_says_so(
+    begun: Attempt, service: Service, status: HTTPStatus, words: str
+) -> None:
+    """There is no older one to fall back to, and fresh weights are not what was asked for."""
+    service.status = status
+    final = last_word(begun, service)
+    assert final.outcome == "failed"
+    assert f"the policy to start from {words}" in (final.error or "")
 
 
 def test_who_waits_for_a_store_that_does_not_answer_listens_to_stop(resumed: Attempt, service: Service) -> None:

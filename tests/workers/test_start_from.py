@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from sim.config import ArenaConfig, JackalConfig, ObservationConfig, OmnidirectionalDrive, RewardConfig, TaskConfig
@@ -12,6 +14,7 @@ from workers.checkpoints import copy_policy, read_checkpoint, read_manifest, sha
 from workers.cli import app
 from workers.config import DdpgConfig, GruNetwork, MlpNetwork, PpoConfig, SacConfig, Td3Config, TrainingConfig
 from workers.errors import ArchiveError, ArchiveIntegrityError, ArchiveMismatchError
+from workers.extending.learning import Inputs, Learner, Setting
 from workers.misfit import misfit
 from workers.shipped.library import shipped_policy
 from workers.start import StartFrom
@@ -215,3 +218,45 @@ def test_on_the_command_line_an_archive_or_the_name_of_a_shipped_policy(parent: 
     assert start is not None
     assert (start.source, start.name) == ("shipped", "simple")
     assert start.sha256 is not None
+
+
+class Distilled(Learner):
+    """As much of an extension's algorithm as its weights are: an actor, a critic, and one of another size if asked for."""
+
+    def __init__(self, seed: int, units: int = 16) -> None:
+        setting = Setting(4, Inputs(5), MlpNetwork(hidden_sizes=(units,)), seed, torch.device("cpu"))
+        self.actor, self.critic = setting.build_actor(0.3), setting.build_network(1, number=1)
+        modules = {"actor": self.actor, "critic": self.critic, "judge": setting.build_network(2 + seed, number=2)}
+        optimizers = {"actor": torch.optim.Adam(self.actor.parameters())}
+        generator = setting.generator()
+        super().__init__(
+            setting,
+            policy=self.actor.network,
+            modules=modules,
+            optimizers=optimizers,
+            generator=generator,
+            steps_per_update=8,
+        )
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        raise NotImplementedError
+
+    def record(self, *_: object) -> None:
+        raise NotImplementedError
+
+    def update(self, progress: float) -> dict[str, float]:
+        raise NotImplementedError
+
+
+def test_an_extensions_algorithm_takes_over_the_modules_of_the_same_shape() -> None:
+    theirs, ours = Distilled(seed=0), Distilled(seed=1)
+    with torch.no_grad():
+        theirs.actor.log_std.add_(1.0)
+    initial = ours.actor.log_std.clone()
+    assert ours.begin_with(theirs.policy_weights(), theirs.state()) == ("critic",)
+    for name, array in theirs.policy_weights().items():
+        np.testing.assert_array_equal(ours.policy_weights()[name], array)
+    for own, parent in zip(ours.critic.parameters(), theirs.critic.parameters(), strict=True):
+        torch.testing.assert_close(own, parent, rtol=0, atol=0)
+    torch.testing.assert_close(ours.actor.log_std, initial, rtol=0, atol=0)  # exploration begins as configured
+    assert Distilled(seed=1).begin_with(theirs.policy_weights(), None) == ()
