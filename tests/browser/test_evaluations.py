@@ -2,23 +2,29 @@
 
 import base64
 import re
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import BrowserContext, expect
 
 from sim.config import ArenaFile
+from workers.export.bundle import export_checkpoint
+from workers.shipped.library import shipped_policy
 
 pytestmark = pytest.mark.browser
 MEASURED = 120_000
 
 
-def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: BrowserContext) -> None:
+def wall_file(name: str) -> dict[str, str]:
+    """An arena of 6 x 6 m with a wall in its middle, as an upload has it."""
     wall = ArenaFile.model_validate(
-        {"name": "A wall", "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
+        {"name": name, "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
     )
-    content = base64.b64encode(wall.model_dump_json().encode()).decode()
-    files = [{"name": "wall.json", "content": content}]
-    imported = context.request.post("/api/arenas/imported", data={"files": files, "keep": True})
+    return {"name": "wall.json", "content": base64.b64encode(wall.model_dump_json().encode()).decode()}
+
+
+def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: BrowserContext) -> None:
+    imported = context.request.post("/api/arenas/imported", data={"files": [wall_file("A wall")], "keep": True})
     assert imported.ok, imported.text()
 
     page = context.new_page()
@@ -54,3 +60,36 @@ def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: Brow
     expect(entries).to_have_count(2)
     expect(entries.nth(0)).to_contain_text("Complex arena")
     expect(entries.nth(1)).to_contain_text("Below")
+
+
+def test_an_uploaded_onnx_policy_is_measured_in_an_imported_arena(context: BrowserContext, tmp_path: Path) -> None:
+    policy = shipped_policy("complex")
+    mine = tmp_path / "elsewhere.onnx"
+    mine.write_bytes(export_checkpoint(policy.archive).by_observation)
+    arena = context.request.post("/api/arenas/imported", data={"files": [wall_file("Another wall")], "keep": True})
+    assert arena.ok, arena.text()
+
+    page = context.new_page()
+    page.goto("/evaluations")
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Upload a policy").click()
+    chooser.value.set_files(mine)
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("combobox", name="Robot, LiDAR and observation as of").fill("complex")
+    page.get_by_role("option", name=policy.card.title, exact=True).click()
+    dialog.get_by_role("button", name="Upload").click()
+    expect(dialog).to_have_count(0)
+
+    # It is chosen already.
+    expect(page.get_by_role("button", name="Evaluate, 1 time")).to_be_enabled()
+    suites = page.get_by_role("combobox", name="On", exact=True)
+    suites.fill("another")
+    page.get_by_role("option", name="Another wall", exact=True).click()
+    suites.press("Escape")
+    page.get_by_role("button", name="Evaluate, 1 time").click()
+    row = page.get_by_test_id("evaluation").filter(has_text="elsewhere")
+    expect(row).to_have_attribute("data-state", "done", timeout=MEASURED)
+    expect(row).to_contain_text("Another wall-200")
+    # It learned to go round walls: onnxruntime drives as well as torch did.
+    page.get_by_role("link", name="elsewhere").click()
+    expect(page.get_by_text(re.compile("^Arrivals (1[5-9]|20)[0-9]"))).not_to_have_count(0)

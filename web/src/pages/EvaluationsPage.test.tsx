@@ -3,7 +3,7 @@ import { expect, test, vi } from 'vitest'
 import type { AskedEvaluation, Leaderboard } from '../api/types'
 import { policy } from '../testing/examples'
 import { open } from '../testing/render'
-import { FakeEventSource, startServer } from '../testing/server'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
 
 vi.stubGlobal('EventSource', FakeEventSource)
 
@@ -65,6 +65,11 @@ const routes = {
     suites: [{ suite: 'complex-200', suite_hash: 'abc', entries: 3, frozen: true }],
   },
   'GET /api/arenas': [],
+  'GET /api/uploads': { items: [], total: 0 },
+  'GET /api/projects': {
+    items: [{ id: 'default', name: 'Default', role: 'admin', experiments: 0 }],
+    total: 1,
+  },
   'GET /api/experiments': { items: [], total: 0 },
   'POST /api/evaluations': [running],
 }
@@ -196,4 +201,32 @@ test('a leaderboard says what is tied with the best, and by what that is known',
   expect(
     screen.getByText(/2 entries can't be told from the best, itself included\. 2 comparisons/),
   ).toBeInTheDocument()
+})
+
+test('an ONNX file is uploaded for the robot of a policy, and chosen at once; a refusal stands in the dialog', async () => {
+  const server = startServer({
+    ...routes,
+    'POST /api/uploads': refusal(422, [{ loc: ['body', 'content'], msg: 'The file is empty.' }]),
+  })
+  const { user } = open('/evaluations')
+  await screen.findByRole('button', { name: 'Upload a policy' })
+  const input = document.querySelector('input[type=file]') as HTMLInputElement
+  await user.upload(input, new File(['abc'], 'mine.onnx'))
+  const dialog = await screen.findByRole('dialog', { name: 'Upload mine.onnx' })
+  expect(within(dialog).getByRole('textbox', { name: 'Name' })).toHaveValue('mine')
+  expect(within(dialog).getByRole('button', { name: 'Upload' })).toBeDisabled()
+  await user.click(within(dialog).getByRole('combobox', { name: 'Robot, LiDAR and observation as of' }))
+  await user.click(await screen.findByRole('option', { name: 'Crowd' }))
+  await user.click(within(dialog).getByRole('button', { name: 'Upload' }))
+  expect(await within(dialog).findByText('The file is empty.')).toBeInTheDocument()
+  server.routes['POST /api/uploads'] = { id: 'up1', name: 'mine' }
+  await user.click(within(dialog).getByRole('button', { name: 'Upload' }))
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(server.changes.at(-1)?.body).toEqual({
+    name: 'mine',
+    project_id: 'default',
+    content: btoa('abc'),
+    task: policy.training.task,
+  })
+  expect(await screen.findByRole('button', { name: 'Evaluate, 1 time' })).toBeEnabled()
 })

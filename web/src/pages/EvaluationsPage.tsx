@@ -1,10 +1,11 @@
 /** Does this policy work there? Ask for it, and see what was asked before. */
-import { Anchor, Skeleton, Stack } from '@mantine/core'
+import { Button, Group, Skeleton, Stack } from '@mantine/core'
 import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { AskForm } from '../components/evaluations/AskForm'
 import { EvaluationTable, isOpen } from '../components/evaluations/EvaluationTable'
+import { PolicyUpload } from '../components/evaluations/PolicyUpload'
 import { Pager } from '../components/Pager'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import { useTitle } from '../lib/hooks'
@@ -27,9 +28,12 @@ export function EvaluationsPage() {
     <Page
       title="Evaluations"
       actions={
-        <Anchor component={Link} to="/leaderboards" size="sm">
-          Leaderboards
-        </Anchor>
+        <Group gap="sm">
+          <Button component={Link} to="/leaderboards" variant="default">
+            Leaderboards
+          </Button>
+          <PolicyUpload />
+        </Group>
       }
     >
       <Stack gap="md">

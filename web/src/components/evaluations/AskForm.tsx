@@ -69,6 +69,7 @@ export function AskForm() {
   const [typed, setTyped] = useState('')
   const [wanted] = useDebouncedValue(typed, 200)
   const shipped = $api.useQuery('get', '/api/policies', {}, FOR_GOOD)
+  const uploads = $api.useQuery('get', '/api/uploads', { params: { query: { limit: 200 } } })
   const boards = $api.useQuery('get', '/api/leaderboards')
   const arenas = $api.useQuery('get', '/api/arenas')
   const trainings = $api.useQuery(
@@ -81,6 +82,10 @@ export function AskForm() {
 
   const own: Option[] = (trainings.data?.items ?? []).map((each) => ({
     value: policyKey('training', each.id),
+    label: each.name,
+  }))
+  const sent: Option[] = (uploads.data?.items ?? []).map((each) => ({
+    value: policyKey('uploaded', each.id),
     label: each.name,
   }))
   const ready: Option[] = (shipped.data ?? []).map((each) => ({
@@ -98,7 +103,7 @@ export function AskForm() {
     (arenas.data ?? [])
       .filter((each) => each.kind === kind)
       .map((each) => ({ value: suiteInArena(each.config), label: each.title }))
-  const known = [...own, ...ready, ...untrained]
+  const known = [...own, ...sent, ...ready, ...untrained]
   const grounds = [...frozen, ...places('generated'), ...places('imported'), ...places('fixed')]
   const families = suites.some((key) => {
     const suite = suiteOf(key, difficulty)
@@ -140,6 +145,7 @@ export function AskForm() {
           data={[
             { group: 'Chosen', items: strangers(policies, known, nameOf) },
             { group: 'Your trainings', items: own },
+            { group: 'Uploaded', items: sent },
             { group: 'Shipped', items: ready },
             { group: 'Untrained', items: untrained },
           ]}

@@ -34,6 +34,8 @@ export function policyOf(key: string): PolicyChoice | null {
     case 'training':
     case 'checkpoint':
       return { source, id: name }
+    case 'uploaded':
+      return { source, id: name, task: null }
     default:
       return null
   }
