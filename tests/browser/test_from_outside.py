@@ -27,21 +27,23 @@ LAB = "outer_lab"
 UNTRAINED = """
 import json, sys
 import torch
-from pathlib import Path
+from sim.actions import action_layout
 from sim.suites import run_suite, suite_for
 from workers.algorithms import build_algorithm
-from workers.checkpoints import read_policy
+from workers.config import TrainingConfig
+from workers.networks.inputs import inputs_of
 from workers.policy import Policy, torch_policy
 
-manifest, trained = read_policy(Path(sys.argv[1]))
-training = manifest.training
-fresh = build_algorithm(training.algorithm, trained.inputs, manifest.seed, torch.device("cpu"), trained.actions)
-untrained = Policy(training.algorithm.network, fresh.policy_weights(), trained.inputs, trained.actions)
+run = json.load(sys.stdin)
+training = TrainingConfig.model_validate(run["training"])
+inputs, actions = inputs_of(training.task), action_layout(training.task.robot)
+fresh = build_algorithm(training.algorithm, inputs, run["seed"], torch.device("cpu"), actions)
+untrained = Policy(training.algorithm.network, fresh.policy_weights(), inputs, actions)
 suite = suite_for(training.task)
 table = run_suite(torch_policy(untrained), training.task, suite)
 print(json.dumps([suite.hash, int((table.outcomes == 1).sum())]))
 """
-"""What the policy of an archive did on its suite before it learned anything: the suite's hash, and arrivals."""
+"""What the policy of a run does on its suite before it learns anything: the suite's hash, and arrivals."""
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +108,9 @@ def test_all_five_are_launched_from_the_form_learn_and_leave_the_house(
     # What draws 3D in software would take the time of what learns: until that is done, another page.
     address = page.url
     page.goto("/new")
+    run = lab.request.get("/api/runs/" + address.rpartition("/")[2]).text()
+    measured = subprocess.run([python, "-c", UNTRAINED], input=run, cwd=tmp_path, check=True, capture_output=True, text=True)
+    suite_hash, before = json.loads(measured.stdout.splitlines()[-1])
     wait_for_end(lab, address)
     page.goto(address)
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "completed")
@@ -145,8 +150,6 @@ def test_all_five_are_launched_from_the_form_learn_and_leave_the_house(
     evaluation = manifest["evaluation"]
     after, episodes = evaluation["arrivals"], evaluation["episodes"]
     assert f"{100 * after / episodes:.1f}" in shown
-    run = subprocess.run([python, "-c", UNTRAINED, archive], cwd=tmp_path, check=True, capture_output=True, text=True)
-    suite_hash, before = json.loads(run.stdout.splitlines()[-1])
     assert suite_hash == evaluation["suite_hash"]
     (_, before_at_most), (after_at_least, _) = exact_interval(before, episodes), exact_interval(after, episodes)
     assert after_at_least > before_at_most, (episodes, before, after)
