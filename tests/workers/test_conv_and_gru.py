@@ -127,13 +127,13 @@ def test_a_sequence_is_its_steps_and_forgets_where_an_episode_begins() -> None:
 
 def test_the_compiled_sequence_is_that_of_the_formula() -> None:
     """Memory and every derivative, over episodes that begin on the way: as autograd has them of the lines, one by one."""
-    network, by_output = gru(), torch.randn(6, 3, 2)
+    network, grad_output = gru(), torch.randn(6, 3, 2)
     inputs, before = torch.randn(6, 3, 5, requires_grad=True), torch.randn(3, 8, requires_grad=True)
     keep = (torch.rand(6, 3, 1) < 0.8).float()
     assert 0.0 in keep
 
     def differentiate(outputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return outputs, *torch.autograd.grad(outputs, [*network.parameters(), inputs, before], by_output)
+        return outputs, *torch.autograd.grad(outputs, [*network.parameters(), inputs, before], grad_output)
 
     memory, outputs = before, []
     for step in range(6):

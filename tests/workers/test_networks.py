@@ -67,16 +67,16 @@ def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> Non
     torch.manual_seed(0)
     network = build_network(config, 16, 3)
     flat = FlatParameters(network)
-    inputs, by_output = torch.randn(rows, 16).requires_grad_(), torch.randn(rows, 3)
+    inputs, grad_output = torch.randn(rows, 16).requires_grad_(), torch.randn(rows, 3)
 
     outputs = network(inputs)
-    outputs.backward(by_output)
+    outputs.backward(grad_output)
     expected = flat.gradients.clone()
     rounding = 2e-6 * float(expected.abs().max())
 
     flat.gradients.fill_(float("nan"))  # whatever was there is overwritten
     passes = passes_of(network, 48)
-    plain, derivative = inputs.detach().numpy(), by_output.numpy()
+    plain, derivative = inputs.detach().numpy(), grad_output.numpy()
     np.testing.assert_allclose(forward(passes, plain, False), outputs.detach().numpy(), rtol=0, atol=2e-6)
     backward(passes, plain, derivative, False)
     assert torch.allclose(flat.gradients, expected, rtol=0, atol=rounding)

@@ -37,8 +37,8 @@ def test_advantages_by_hand() -> None:
 def test_nothing_flows_over_the_end_of_an_episode() -> None:
     # The same, ended in step 1:
     # A_2 = 3;  A_1 = delta_1 = 2 + 0 - 2 = 0;  A_0 = 1 + 0.5 * 2 - 1 + 0.25 * 0 = 1
-    ends = np.array([[False], [True], [False]])
-    advantages = generalized_advantages(column(1, 2, 3), column(1, 2, 2, 4), ends, 0.5, 0.5)
+    dones = np.array([[False], [True], [False]])
+    advantages = generalized_advantages(column(1, 2, 3), column(1, 2, 2, 4), dones, 0.5, 0.5)
     assert advantages[:, 0].tolist() == [1.0, 0.0, 3.0]
 
 
@@ -46,13 +46,13 @@ def test_nothing_flows_over_the_end_of_an_episode() -> None:
 def test_with_lambda_one_advantages_are_returns_less_values(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rewards, values = rng.normal(size=(6, 2)).astype(F), rng.normal(size=(7, 2)).astype(F)
-    ends = rng.random((6, 2)) < 0.3
+    dones = rng.random((6, 2)) < 0.3
     returns = np.empty((6, 2))
     following = values[-1]
     for step in range(5, -1, -1):
-        following = rewards[step] + 0.9 * np.where(ends[step], 0.0, following)
+        following = rewards[step] + 0.9 * np.where(dones[step], 0.0, following)
         returns[step] = following
-    advantages = generalized_advantages(rewards, values, ends, 0.9, 1.0)
+    advantages = generalized_advantages(rewards, values, dones, 0.9, 1.0)
     np.testing.assert_allclose(advantages, returns - values[:-1], atol=1e-5)
 
 
@@ -168,8 +168,8 @@ def test_gradients_are_clipped_for_actor_and_critic_each() -> None:
 def test_rewards_are_scaled_by_the_deviation_of_discounted_returns() -> None:
     scaler = ReturnScaler(1, gamma=0.5)
     # returns so far: 1, 0.5 * 1 + 3 = 3.5 (episode ends), 2;  mean 6.5 / 3, variance of those three
-    rewards, ends = np.array([[1], [3], [2]], F), np.array([[False], [True], [False]])
-    scaler.update(rewards, ends)
+    rewards, dones = np.array([[1], [3], [2]], F), np.array([[False], [True], [False]])
+    scaler.update(rewards, dones)
     assert scaler.scale == pytest.approx(1 / np.std([1, 3.5, 2]), rel=1e-6)
     # goes on where it was: 0.5 * 2 + 0 = 1
     scaler.update(np.array([[0]], F), np.array([[False]]))
@@ -221,12 +221,12 @@ def test_state_continues_bit_for_bit() -> None:
     def rollout(ppo: Ppo, rng: np.random.Generator) -> None:
         for _ in range(8):
             ppo.act(rng.random((16, 4)).astype(F))
-            ends = rng.random(16) < 0.1
+            dones = rng.random(16) < 0.1
             ppo.record(
                 rng.random((16, 4)).astype(F),
                 rng.random(16).astype(F),
-                ends,
-                ~ends & (rng.random(16) < 0.1),
+                dones,
+                ~dones & (rng.random(16) < 0.1),
                 rng.random((16, 4)).astype(F),
             )
         ppo.update(0.5)

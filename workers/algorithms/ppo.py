@@ -145,14 +145,14 @@ class Ppo:
         """Values (steps + 1, robots) and advantages (steps, robots) of the rollout, in scaled rewards."""
         config, storage = self.config, self.storage
         if config.scale_returns:
-            self._scaler.update(storage.rewards, storage.ends)
+            self._scaler.update(storage.rewards, storage.dones)
         scale = self._scaler.scale if config.scale_returns else 1.0
         rewards = storage.rewards * np.float32(scale)
         steps, robots, final_observations = storage.truncations()
         if steps.size:
             rewards[steps, robots] += np.float32(config.gamma) * self.final_values(final_observations).cpu().numpy()
         values = self.values()
-        advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.ends, config.gamma, config.gae_lambda)
+        advantages = generalized_advantages(rewards, values.cpu().numpy(), storage.dones, config.gamma, config.gae_lambda)
         return values, torch.from_numpy(advantages).to(storage.device)
 
     @property

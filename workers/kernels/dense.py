@@ -72,17 +72,17 @@ def dense_backward_tanh(delta, weight, below, delta_below):
 
 
 @kernel()
-def parameter_gradients(delta, inputs, add, by_weight, by_bias):
-    """Backward: by_weight (out, in) = delta (n, out)^T inputs (n, in) and by_bias (out,) = the sum of delta's rows.
+def parameter_gradients(delta, inputs, add, grad_weight, grad_bias):
+    """Backward: grad_weight (out, in) = delta (n, out)^T inputs (n, in) and grad_bias (out,) = the sum of delta's rows.
 
     With `add` both are added to what is there.
     """
-    multiply(delta, True, inputs, add, by_weight)
+    multiply(delta, True, inputs, add, grad_weight)
     if not add:
-        by_bias[:] = 0
+        grad_bias[:] = 0
     for i in range(delta.shape[0]):
         for j in range(delta.shape[1]):
-            by_bias[j] += delta[i, j]
+            grad_bias[j] += delta[i, j]
 
 
 @kernel()

@@ -61,39 +61,39 @@ def gru_forward(inputs, weight, bias, memory, keep, kept, remembered, gates, new
 
 
 @kernel(allocates=True)
-def gru_backward(by_memories, weight, keep, kept, remembered, gates, new, by_inputs, by_remembered, by_memory):
+def gru_backward(grad_memories, weight, keep, kept, remembered, gates, new, grad_inputs, grad_remembered, grad_memory):
     """The derivatives of a scalar by what went in.
 
     Args:
-        by_memories: (T, n, m), its derivative by memory after each step where that was used.
+        grad_memories: (T, n, m), its derivative by memory after each step where that was used.
         weight: as it was given to `gru_forward`, like `keep`; `kept` to `new` are what it wrote.
         keep: (T, n).
         kept: (T, n, m).
         remembered: (T, n, 3 m).
         gates: (T, n, 2 m).
         new: (T, n, m).
-        by_inputs: (T, n, 3 m), written: by what came in.
-        by_remembered: (T, n, 3 m), written: by the memory's layer's outputs.
-        by_memory: (n, m), written: by the memory from before the first step.
+        grad_inputs: (T, n, 3 m), written: by what came in.
+        grad_remembered: (T, n, 3 m), written: by the memory's layer's outputs.
+        grad_memory: (n, m), written: by the memory from before the first step.
     """
-    steps, rows, size = by_memories.shape
-    by_memory[:] = 0
+    steps, rows, size = grad_memories.shape
+    grad_memory[:] = 0
     for t in range(steps - 1, -1, -1):
         for i in range(rows):
             for j in range(size):
-                by_after = by_memories[t, i, j] + by_memory[i, j]
+                grad_after = grad_memories[t, i, j] + grad_memory[i, j]
                 reset, update, proposed = gates[t, i, j], gates[t, i, size + j], new[t, i, j]
-                by_new = by_after * (_ONE - update) * (_ONE - proposed * proposed)
-                by_update = by_after * (kept[t, i, j] - proposed) * update * (_ONE - update)
-                by_reset = by_new * remembered[t, i, 2 * size + j] * reset * (_ONE - reset)
-                by_inputs[t, i, j] = by_reset
-                by_inputs[t, i, size + j] = by_update
-                by_inputs[t, i, 2 * size + j] = by_new
-                by_remembered[t, i, j] = by_reset
-                by_remembered[t, i, size + j] = by_update
-                by_remembered[t, i, 2 * size + j] = by_new * reset
-                by_memory[i, j] = by_after * update
-        multiply(by_remembered[t], False, weight, True, by_memory)
+                grad_new = grad_after * (_ONE - update) * (_ONE - proposed * proposed)
+                grad_update = grad_after * (kept[t, i, j] - proposed) * update * (_ONE - update)
+                grad_reset = grad_new * remembered[t, i, 2 * size + j] * reset * (_ONE - reset)
+                grad_inputs[t, i, j] = grad_reset
+                grad_inputs[t, i, size + j] = grad_update
+                grad_inputs[t, i, 2 * size + j] = grad_new
+                grad_remembered[t, i, j] = grad_reset
+                grad_remembered[t, i, size + j] = grad_update
+                grad_remembered[t, i, 2 * size + j] = grad_new * reset
+                grad_memory[i, j] = grad_after * update
+        multiply(grad_remembered[t], False, weight, True, grad_memory)
         for i in range(rows):
             for j in range(size):
-                by_memory[i, j] *= keep[t, i]
+                grad_memory[i, j] *= keep[t, i]

@@ -75,32 +75,32 @@ def forward(network, inputs, same):
 
 
 @kernel(allocates=True)
-def backward(network, inputs, by_output, add):
+def backward(network, inputs, grad_output, add):
     """Overwrites the parameters' gradients, or adds to them, after `forward` of the same inputs.
 
-    `by_output` (n, outputs) is the derivative of some scalar by what came out.
+    `grad_output` (n, outputs) is the derivative of some scalar by what came out.
     """
     if network.kind == RESBLOCK:
-        _resblock_backpropagate(network, by_output)
-        _resblock_gradients(network, inputs, by_output, add)
+        _resblock_backpropagate(network, grad_output)
+        _resblock_gradients(network, inputs, grad_output, add)
     else:
-        _mlp_backpropagate(network, by_output)
-        _mlp_gradients(network, inputs, by_output, add)
+        _mlp_backpropagate(network, grad_output)
+        _mlp_gradients(network, inputs, grad_output, add)
 
 
 @kernel(allocates=True)
-def input_gradient(network, by_output):
+def input_gradient(network, grad_output):
     """The derivative (n, inputs) of that scalar by the inputs; leaves the parameters' gradients alone."""
-    rows = by_output.shape[0]
-    by_inputs = _buffer(network.deltas, network, network.buffers.shape[0] - 1, rows)
+    rows = grad_output.shape[0]
+    grad_inputs = _buffer(network.deltas, network, network.buffers.shape[0] - 1, rows)
     if network.kind == RESBLOCK:
-        _resblock_backpropagate(network, by_output)
-        by_inputs[:] = _buffer(network.deltas, network, _SHORTCUT1, rows)
+        _resblock_backpropagate(network, grad_output)
+        grad_inputs[:] = _buffer(network.deltas, network, _SHORTCUT1, rows)
         delta, add = _buffer(network.deltas, network, _LAYER1, rows), True
     else:
-        delta, add = _mlp_backpropagate(network, by_output), False
-    multiply(delta, False, _weight(network, 0), add, by_inputs)
-    return by_inputs
+        delta, add = _mlp_backpropagate(network, grad_output), False
+    multiply(delta, False, _weight(network, 0), add, grad_inputs)
+    return grad_inputs
 
 
 @kernel(allocates=True)
@@ -117,10 +117,10 @@ def _mlp_forward(network, inputs):
 
 
 @kernel(allocates=True)
-def _mlp_backpropagate(network, by_output):
-    """Fills the deltas of all layers but the head, whose delta is `by_output`; returns the first layer's."""
-    rows = by_output.shape[0]
-    above = by_output
+def _mlp_backpropagate(network, grad_output):
+    """Fills the deltas of all layers but the head, whose delta is `grad_output`; returns the first layer's."""
+    rows = grad_output.shape[0]
+    above = grad_output
     for layer in range(network.layers.shape[0] - 1, 0, -1):
         outputs, delta = _both(network, layer - 1, rows)
         if network.kind == TANH:
@@ -132,16 +132,16 @@ def _mlp_backpropagate(network, by_output):
 
 
 @kernel(allocates=True)
-def _mlp_gradients(network, inputs, by_output, add):
+def _mlp_gradients(network, inputs, grad_output, add):
     """The parameters' gradients, given the deltas."""
-    rows = by_output.shape[0]
+    rows = grad_output.shape[0]
     head = network.layers.shape[0] - 1
     below = inputs
     for layer in range(head):
         outputs, delta = _both(network, layer, rows)
         _layer_gradients(network, layer, delta, below, add)
         below = outputs
-    _layer_gradients(network, head, by_output, below, add)
+    _layer_gradients(network, head, grad_output, below, add)
 
 
 @kernel(allocates=True)
@@ -158,32 +158,32 @@ def _resblock_forward(network, inputs):
 
 
 @kernel(allocates=True)
-def _resblock_backpropagate(network, by_output):
+def _resblock_backpropagate(network, grad_output):
     """Fills the deltas of layers 1 to 4 and the derivatives by what the two shortcuts carry."""
-    rows = by_output.shape[0]
-    joined1, by_joined1 = _both(network, _JOINED1, rows)
-    joined2, by_joined2 = _both(network, _JOINED2, rows)
-    by_shortcut1 = _buffer(network.deltas, network, _SHORTCUT1, rows)
-    by_shortcut2 = _buffer(network.deltas, network, _SHORTCUT2, rows)
+    rows = grad_output.shape[0]
+    joined1, grad_joined1 = _both(network, _JOINED1, rows)
+    joined2, grad_joined2 = _both(network, _JOINED2, rows)
+    grad_shortcut1 = _buffer(network.deltas, network, _SHORTCUT1, rows)
+    grad_shortcut2 = _buffer(network.deltas, network, _SHORTCUT2, rows)
     outputs1, delta1 = _both(network, _LAYER1, rows)
     delta2 = _buffer(network.deltas, network, _LAYER2, rows)
     outputs3, delta3 = _both(network, _LAYER3, rows)
     delta4 = _buffer(network.deltas, network, _LAYER4, rows)
 
-    multiply(by_output, False, _weight(network, _HEAD), False, by_joined2)
+    multiply(grad_output, False, _weight(network, _HEAD), False, grad_joined2)
     # Layer 4 has an activation of its own under that of the joint: the slope counts twice.
-    join_backward(by_joined2, joined2, _SLOPE * _SLOPE, _SLOPE, delta4, by_shortcut2)
+    join_backward(grad_joined2, joined2, _SLOPE * _SLOPE, _SLOPE, delta4, grad_shortcut2)
     dense_backward(delta4, _weight(network, _LAYER4), outputs3, _SLOPE, delta3)
-    by_joined1[:] = by_shortcut2
-    multiply(delta3, False, _weight(network, _LAYER3), True, by_joined1)
-    join_backward(by_joined1, joined1, _SLOPE, _SLOPE, delta2, by_shortcut1)
+    grad_joined1[:] = grad_shortcut2
+    multiply(delta3, False, _weight(network, _LAYER3), True, grad_joined1)
+    join_backward(grad_joined1, joined1, _SLOPE, _SLOPE, delta2, grad_shortcut1)
     dense_backward(delta2, _weight(network, _LAYER2), outputs1, _SLOPE, delta1)
 
 
 @kernel(allocates=True)
-def _resblock_gradients(network, inputs, by_output, add):
+def _resblock_gradients(network, inputs, grad_output, add):
     """The parameters' gradients, given the deltas."""
-    rows = by_output.shape[0]
+    rows = grad_output.shape[0]
     outputs1, delta1 = _both(network, _LAYER1, rows)
     outputs3, delta3 = _both(network, _LAYER3, rows)
     joined1 = _buffer(network.outputs, network, _JOINED1, rows)
@@ -191,7 +191,7 @@ def _resblock_gradients(network, inputs, by_output, add):
     _layer_gradients(network, _LAYER2, _buffer(network.deltas, network, _LAYER2, rows), outputs1, add)
     _layer_gradients(network, _LAYER3, delta3, joined1, add)
     _layer_gradients(network, _LAYER4, _buffer(network.deltas, network, _LAYER4, rows), outputs3, add)
-    _layer_gradients(network, _HEAD, by_output, _buffer(network.outputs, network, _JOINED2, rows), add)
+    _layer_gradients(network, _HEAD, grad_output, _buffer(network.outputs, network, _JOINED2, rows), add)
 
 
 @kernel(allocates=True)
@@ -206,8 +206,8 @@ def _layer_forward(network, layer, inputs, slope):
 def _layer_gradients(network, layer, delta, inputs, add):
     """A layer's gradients."""
     start, wide, tall = network.layers[layer, WEIGHT], network.layers[layer, INPUTS], network.layers[layer, OUTPUTS]
-    by_weight = network.gradients[start : start + wide * tall].reshape(tall, wide)
-    parameter_gradients(delta, inputs, add, by_weight, _bias(network.gradients, network, layer))
+    grad_weight = network.gradients[start : start + wide * tall].reshape(tall, wide)
+    parameter_gradients(delta, inputs, add, grad_weight, _bias(network.gradients, network, layer))
 
 
 @kernel(allocates=True)

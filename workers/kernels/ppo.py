@@ -18,7 +18,7 @@ STATISTICS = 4
 
 
 @kernel(allocates=True)
-def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, clip_range, by_log_std, statistics):
+def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, clip_range, grad_log_std, statistics):
     """Overwrite the gradients of both networks' parameters.
 
     Some rows at a time are gathered, and go through both networks forward and backward while a core's cache holds them.
@@ -32,13 +32,13 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, cli
         log_std: (A,).
         lows: (A,) lowest of each component of an action, see `differentiate_policy_loss`.
         clip_range: how far the ratio may go from 1.
-        by_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
+        grad_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: `STATISTICS`.
     """
     all_observations, all_actions, all_log_probs, all_advantages, all_returns = samples
     size = minibatch.shape[0]
     share = 1.0 / size
-    by_logits, by_values = np.empty((at_once, lows.shape[0]), np.float32), np.empty((at_once, 1), np.float32)
+    grad_logits, grad_values = np.empty((at_once, lows.shape[0]), np.float32), np.empty((at_once, 1), np.float32)
     for first in range(0, size, at_once):
         some = minibatch[first : first + at_once]
         rows, again = some.shape[0], first > 0
@@ -46,17 +46,17 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, cli
         logits = forward(actor, observations, again)
         differentiate_policy_loss(
             logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, lows, clip_range,
-            share, by_logits, by_log_std, statistics,
+            share, grad_logits, grad_log_std, statistics,
         )  # fmt: skip
-        backward(actor, observations, by_logits[:rows], again)
+        backward(actor, observations, grad_logits[:rows], again)
         values = forward(critic, observations, again)
-        differentiate_value_loss(values, all_returns[some], share, by_values, statistics)
-        backward(critic, observations, by_values[:rows], again)
+        differentiate_value_loss(values, all_returns[some], share, grad_values, statistics)
+        backward(critic, observations, grad_values[:rows], again)
 
 
 @kernel(allocates=True)
 def differentiate_policy_loss(
-    logits, actions, log_probs, advantages, log_std, lows, clip_range, share, by_logits, by_log_std, statistics
+    logits, actions, log_probs, advantages, log_std, lows, clip_range, share, grad_logits, grad_log_std, statistics
 ):
     """The clipped surrogate (Schulman et al. 2017, Eq. 7) of some of a minibatch's samples.
 
@@ -69,8 +69,8 @@ def differentiate_policy_loss(
         lows: (A,) lowest of each component's range, whose highest is 1: a tanh makes those from -1, a sigmoid all others.
         clip_range: how far the ratio may go from 1.
         share: what a sample counts: one over the minibatch's size.
-        by_logits: (n or more, A), written: derivative of the loss by the logits.
-        by_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
+        grad_logits: (n or more, A), written: derivative of the loss by the logits.
+        grad_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: all of `STATISTICS` but the value loss.
     """
     rows, size = logits.shape
@@ -103,36 +103,36 @@ def differentiate_policy_loss(
         surrogate = ratio * advantages[i]
         clipped_surrogate = clipped * advantages[i]
         # min(r A, clip(r) A) is r A, whose derivative by log r is r A, unless clip(r) A is smaller: then it is constant.
-        by_log_prob = np.float32(0.0) if clipped_surrogate < surrogate else -weight * surrogate
+        grad_log_prob = np.float32(0.0) if clipped_surrogate < surrogate else -weight * surrogate
         for k in range(size):
-            sums[k] += by_log_prob * (noise[k] * noise[k] - _ONE)
+            sums[k] += grad_log_prob * (noise[k] * noise[k] - _ONE)
             # d log p / d mean = noise / std; then through the tanh, 1 - t^2, or the sigmoid, s (1 - s) of its range.
-            by_logits[i, k] = by_log_prob * noise[k] * inverse[k] * rising[k] * falling[k]
+            grad_logits[i, k] = grad_log_prob * noise[k] * inverse[k] * rising[k] * falling[k]
         loss -= min(surrogate, clipped_surrogate)
         kl += ratio - _ONE - log_ratio
         clips += ratio != clipped
     for k in range(size):
-        by_log_std[k] += sums[k]
+        grad_log_std[k] += sums[k]
     statistics[0] += share * loss
     statistics[2] += share * kl
     statistics[3] += share * clips
 
 
 @kernel()
-def differentiate_value_loss(values, returns, share, by_values, statistics):
+def differentiate_value_loss(values, returns, share, grad_values, statistics):
     """The squared error of Eq. 9 of some of a minibatch's samples.
 
     Args:
         values: (n, 1) the critic's outputs.
         returns: (n,) its targets.
         share: what a sample counts: one over the minibatch's size.
-        by_values: (n or more, 1), written: derivative of the loss by the values.
+        grad_values: (n or more, 1), written: derivative of the loss by the values.
         statistics: (4,) float64, added to: the value loss.
     """
     scale = _TWO * np.float32(share)
     loss = 0.0
     for i in range(values.shape[0]):
         error = values[i, 0] - returns[i]
-        by_values[i, 0] = scale * error
+        grad_values[i, 0] = scale * error
         loss += error * error
     statistics[1] += share * loss

@@ -79,13 +79,13 @@ class TensorPasses:
         self._inputs = _contiguous(inputs)
         return torch.from_numpy(forward(self._passes, self._inputs, False))
 
-    def backward(self, by_output: Tensor) -> None:
-        """Overwrites every parameter's `.grad`: `by_output` (n, outputs) is a scalar's derivative by the last outputs."""
-        backward(self._passes, self._inputs, _contiguous(by_output), False)
+    def backward(self, grad_output: Tensor) -> None:
+        """Overwrites every parameter's `.grad`: `grad_output` (n, outputs) is a scalar's derivative by the last outputs."""
+        backward(self._passes, self._inputs, _contiguous(grad_output), False)
 
-    def input_gradient(self, by_output: Tensor) -> Tensor:
+    def input_gradient(self, grad_output: Tensor) -> Tensor:
         """The derivative (n, inputs) of that scalar by the inputs; leaves the parameters' `.grad` alone."""
-        return torch.from_numpy(input_gradient(self._passes, _contiguous(by_output)))
+        return torch.from_numpy(input_gradient(self._passes, _contiguous(grad_output)))
 
 
 def inference(network: nn.Module, rows: int) -> Callable[[Tensor], Tensor]:

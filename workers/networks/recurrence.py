@@ -32,14 +32,14 @@ class GruSequence(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *gradients: Any) -> Any:
         """See `workers.kernels.gru.gru_backward`."""
-        (by_memories,) = gradients
+        (grad_memories,) = gradients
         weight, keep, kept, remembered, gates, new = ctx.saved_tensors
-        by_inputs, by_remembered = torch.empty_like(remembered), torch.empty_like(remembered)
-        by_memory = torch.empty_like(new[0])
+        grad_inputs, grad_remembered = torch.empty_like(remembered), torch.empty_like(remembered)
+        grad_memory = torch.empty_like(new[0])
         saved = (weight, keep, kept, remembered, gates, new)
-        gru_backward(*(_array(tensor) for tensor in (by_memories, *saved, by_inputs, by_remembered, by_memory)))
-        by_layer = by_remembered.flatten(0, 1)
-        return by_inputs, by_layer.T @ kept.flatten(0, 1), by_layer.sum(0), by_memory, None
+        gru_backward(*(_array(tensor) for tensor in (grad_memories, *saved, grad_inputs, grad_remembered, grad_memory)))
+        grad_layer = grad_remembered.flatten(0, 1)
+        return grad_inputs, grad_layer.T @ kept.flatten(0, 1), grad_layer.sum(0), grad_memory, None
 
 
 def _array(tensor: Tensor) -> Any:

@@ -23,18 +23,18 @@ def bound_actions(logits: Tensor, actions: ActionLayout = DEFAULT_ACTIONS) -> Te
 
 
 def multiply_by_slope(
-    by_actions: Tensor, actions: Tensor, layout: ActionLayout, entropy_weight: Tensor | None = None
+    grad_actions: Tensor, actions: Tensor, layout: ActionLayout, entropy_weight: Tensor | None = None
 ) -> None:
     """Turns derivatives by actions (n, A) in place into those by the logits that `bound_actions` made them of.
 
     Args:
-        by_actions: overwritten.
+        grad_actions: overwritten.
         actions: what the logits became.
         layout: what an action is.
         entropy_weight: scalar or (1,); so many times the derivative of minus `log_slope` is added.
     """
     for index, component in enumerate(layout.components):
-        column, action = by_actions[:, index], actions[:, index]
+        column, action = grad_actions[:, index], actions[:, index]
         if component.symmetric:
             # Through tanh, 1 - t^2, whose log slope has the derivative -2 t.
             column.mul_(1.0 - action.square())

@@ -56,13 +56,13 @@ def evaluation_metrics(result: EvaluationResult, arrival_distance: float) -> dic
     """
     count = len(result.episodes)
     arrivals = [episode for episode in result.episodes if episode.outcome == "arrival"]
-    total_reward = sum(episode.reward for episode in result.episodes)
+    returns = sum(episode.reward for episode in result.episodes)
     metrics = {
         "eval/success_rate": len(arrivals) / count,
         "eval/collision_rate": sum(episode.outcome == "collision" for episode in result.episodes) / count,
         "eval/timeout_rate": sum(episode.outcome == "timeout" for episode in result.episodes) / count,
-        "eval/return": total_reward / count,
-        "eval/reward": total_reward / max(1, sum(episode.steps for episode in result.episodes)),
+        "eval/return": returns / count,
+        "eval/reward": returns / max(1, sum(episode.steps for episode in result.episodes)),
     }
     if arrivals:
         metrics["eval/steps"] = sum(episode.steps for episode in arrivals) / len(arrivals)

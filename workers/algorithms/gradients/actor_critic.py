@@ -107,12 +107,12 @@ class WrittenActorCritic:
         logits = self._actor.forward(observations)
         actions = bound_actions(logits, self._layout)
         values = self._critics[0].forward(torch.cat((observations, actions), dim=1))
-        by_actions = self._critics[0].input_gradient(torch.full_like(values, -1.0 / rows))[:, size:]
-        by_logits = by_actions.contiguous()
-        multiply_by_slope(by_logits, actions, self._layout)
+        grad_actions = self._critics[0].input_gradient(torch.full_like(values, -1.0 / rows))[:, size:]
+        grad_logits = grad_actions.contiguous()
+        multiply_by_slope(grad_logits, actions, self._layout)
         if self._penalty:
-            by_logits.add_(logits, alpha=2.0 * self._penalty / rows)
-        self._actor.backward(by_logits)
+            grad_logits.add_(logits, alpha=2.0 * self._penalty / rows)
+        self._actor.backward(grad_logits)
         return -values.mean()
 
 

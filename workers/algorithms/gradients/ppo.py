@@ -84,18 +84,18 @@ class WrittenPpo:
     def __init__(self, actor: GaussianActor, critic: nn.Module, clip_range: float, entropy_coefficient: float) -> None:
         log_std = actor.log_std
         assert log_std.grad is not None, "FlatAdam gives every parameter its gradient"
-        self._log_std, self._by_log_std = log_std.detach().numpy(), log_std.grad.numpy()
+        self._log_std, self._grad_log_std = log_std.detach().numpy(), log_std.grad.numpy()
         self._lows = np.array(actor.actions.lows, np.float32)
         self._clip_range, self._entropy_coefficient = clip_range, entropy_coefficient
         self._actor, self._critic = passes_of(actor.network, ROWS_AT_ONCE), passes_of(critic, ROWS_AT_ONCE)
 
     def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
-        statistics, by_log_std = np.zeros(STATISTICS), np.full(len(self._lows), -self._entropy_coefficient)
+        statistics, grad_log_std = np.zeros(STATISTICS), np.full(len(self._lows), -self._entropy_coefficient)
         arrays = tuple(column.numpy() for column in samples)
         differentiate(
             self._actor, self._critic, arrays, rows.numpy(), ROWS_AT_ONCE,
-            self._log_std, self._lows, self._clip_range, by_log_std, statistics,
+            self._log_std, self._lows, self._clip_range, grad_log_std, statistics,
         )  # fmt: skip
-        self._by_log_std[:] = by_log_std
+        self._grad_log_std[:] = grad_log_std
         return torch.from_numpy(statistics)

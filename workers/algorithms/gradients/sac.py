@@ -108,15 +108,15 @@ class WrittenSac:
         inputs = torch.cat((observations, actions), dim=1)
         first, second = (critic.forward(inputs) for critic in self._critics)
         # Each sample's loss falls with the smaller of its two values.
-        by_first = (first <= second).float().div_(-rows)
-        by_u = torch.zeros_like(actions)
-        for critic, by_value in zip(self._critics, (by_first, -1.0 / rows - by_first), strict=True):
-            by_u += critic.input_gradient(by_value)[:, size:]
+        grad_first = (first <= second).float().div_(-rows)
+        grad_u = torch.zeros_like(actions)
+        for critic, grad_value in zip(self._critics, (grad_first, -1.0 / rows - grad_first), strict=True):
+            grad_u += critic.input_gradient(grad_value)[:, size:]
 
         weight = alpha / rows
-        multiply_by_slope(by_u, actions, self._layout, weight)
-        by_raw = (by_u * spread - weight) * (_HALF * (1.0 - bent.square()))
-        self._actor.backward(torch.cat((by_u, by_raw), dim=1))
+        multiply_by_slope(grad_u, actions, self._layout, weight)
+        grad_raw = (grad_u * spread - weight) * (_HALF * (1.0 - bent.square()))
+        self._actor.backward(torch.cat((grad_u, grad_raw), dim=1))
         return (alpha * log_probs - torch.minimum(first, second)).mean(), log_probs
 
 

@@ -27,14 +27,14 @@ class ReturnScaler:
         """What a reward is multiplied by."""
         return 1.0 / math.sqrt(self._variance + _EPSILON)
 
-    def update(self, rewards: NDArray[np.float32], ends: NDArray[np.bool_]) -> None:
-        """Takes in a rollout: rewards and ends of episodes, (steps, robots)."""
+    def update(self, rewards: NDArray[np.float32], dones: NDArray[np.bool_]) -> None:
+        """Takes in a rollout: rewards and dones, (steps, robots)."""
         returns = np.empty(rewards.shape)
         current = self._returns
         for step, reward in enumerate(rewards):
             current = current * self._gamma + reward
             returns[step] = current
-            current = np.where(ends[step], 0.0, current)
+            current = np.where(dones[step], 0.0, current)
         self._returns = current
         # Moments of two samples together (Chan et al. 1979).
         total = self._count + returns.size

@@ -33,7 +33,7 @@ class RolloutStorage:
         observations: (steps + 1, robots, size); the last one is what followed the last action.
         actions, noise: (steps, robots, A); the sampled actions and the standard normal noise in them.
         rewards: (steps, robots) float32.
-        ends: (steps, robots) bool, terminated or truncated.
+        dones: (steps, robots) bool, terminated or truncated.
     """
 
     def __init__(self, steps: int, robots: int, observation_size: int, action_size: int, device: torch.device) -> None:
@@ -42,7 +42,7 @@ class RolloutStorage:
         self.actions = torch.zeros(steps, robots, action_size, device=device)
         self.noise = torch.zeros(steps, robots, action_size, device=device)
         self.rewards = np.zeros((steps, robots), np.float32)
-        self.ends = np.zeros((steps, robots), np.bool_)
+        self.dones = np.zeros((steps, robots), np.bool_)
         self._truncations: list[tuple[int, NDArray[np.intp], NDArray[np.float32]]] = []
         self.step = 0
 
@@ -65,7 +65,7 @@ class RolloutStorage:
     ) -> None:
         """Closes the current step with what the environment answered."""
         self.rewards[self.step] = rewards
-        np.logical_or(terminations, truncations, out=self.ends[self.step])
+        np.logical_or(terminations, truncations, out=self.dones[self.step])
         truncated = np.flatnonzero(truncations & ~terminations)
         if truncated.size:
             self._truncations.append((self.step, truncated, final_observations[truncated]))
@@ -88,7 +88,7 @@ class RolloutStorage:
 
 
 def generalized_advantages(
-    rewards: NDArray[np.float32], values: NDArray[np.float32], ends: NDArray[np.bool_], gamma: float, gae_lambda: float
+    rewards: NDArray[np.float32], values: NDArray[np.float32], dones: NDArray[np.bool_], gamma: float, gae_lambda: float
 ) -> NDArray[np.float32]:
     """Generalised advantage estimation (Schulman et al. 2016, Eq. 16).
 
@@ -96,14 +96,14 @@ def generalized_advantages(
         rewards: (steps, robots); where the step limit cut an episode, gamma times the value of what would have followed
             is already added.
         values: (steps + 1, robots), the last row for what followed the last step.
-        ends: (steps, robots), whether the episode ended in that step.
+        dones: (steps, robots), whether the episode ended in that step.
         gamma: discount.
         gae_lambda: 0 is one-step temporal difference, 1 the whole return.
 
     Returns:
         (steps, robots): A_t = delta_t + gamma lambda A_{t+1} within an episode, delta_t = r_t + gamma V_{t+1} - V_t.
     """
-    discounts = np.where(ends, 0.0, gamma).astype(np.float32)
+    discounts = np.where(dones, 0.0, gamma).astype(np.float32)
     advantages: NDArray[np.float32] = rewards + discounts * values[1:] - values[:-1]
     decay = discounts * np.float32(gae_lambda)
     for step in range(len(rewards) - 2, -1, -1):

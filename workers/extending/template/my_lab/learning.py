@@ -71,13 +71,13 @@ class Reinforce(Learner):
     def estimate(self):
         """Returns and advantages of the rollout (steps * robots,), in scaled rewards."""
         rollout, gamma = self.rollout, self.config.gamma
-        self.scaler.update(rollout.rewards, rollout.ends)
+        self.scaler.update(rollout.rewards, rollout.dones)
         rewards = rollout.rewards * np.float32(self.scaler.scale)
         steps, robots, final_observations = rollout.truncations()
         if steps.size:
             rewards[steps, robots] += gamma * self.baseline(final_observations)[:, 0].cpu().numpy()
         values = self.baseline(rollout.observations.flatten(0, 1)).view(len(rewards) + 1, -1)
-        advantages = generalized_advantages(rewards, values.cpu().numpy(), rollout.ends, gamma, 1.0)
+        advantages = generalized_advantages(rewards, values.cpu().numpy(), rollout.dones, gamma, 1.0)
         advantages = torch.from_numpy(advantages).to(values.device)
         return (advantages + values[:-1]).flatten(), advantages.flatten()
 
