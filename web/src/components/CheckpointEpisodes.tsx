@@ -2,7 +2,7 @@
 import { $api } from '../api/client'
 import type { Checkpoint } from '../api/types'
 import { byInterest } from '../lib/episodes'
-import { useNumberInAddress } from '../lib/hooks'
+import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
 import { ReplayDialog } from './Replay'
 
@@ -10,7 +10,7 @@ import { ReplayDialog } from './Replay'
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
 
 export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
-  const [episode, setEpisode] = useNumberInAddress('episode')
+  const [episode, setEpisode] = useReplayInAddress()
   const path = { checkpoint_id: checkpoint.id }
   const episodes = $api.useQuery(
     'get',

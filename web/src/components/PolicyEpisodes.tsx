@@ -1,10 +1,10 @@
-/** The episodes of a shipped policy on one of its suites; which is replayed stands in the address. */
+/** The episodes of a shipped policy on one of its suites; which, and which is replayed, stand in the address. */
 import { SegmentedControl } from '@mantine/core'
-import { useState } from 'react'
+import { useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
 import { byInterest } from '../lib/episodes'
-import { useNumberInAddress } from '../lib/hooks'
+import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
 import { ReplayDialog } from './Replay'
 import { Panel } from './ui'
@@ -13,8 +13,10 @@ const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
 
 export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
   const suites = policy.results.map((result) => result.suite)
-  const [suite, setSuite] = useState(suites[0] ?? '')
-  const [episode, setEpisode] = useNumberInAddress('episode')
+  const [search, setSearch] = useSearchParams()
+  const named = search.get('suite')
+  const suite = suites.find((each) => each === named) ?? suites[0] ?? ''
+  const [episode, setEpisode] = useReplayInAddress()
   const path = { name: policy.name, suite }
   const episodes = $api.useQuery(
     'get',
@@ -28,7 +30,13 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
       flush
       actions={
         suites.length > 1 && (
-          <SegmentedControl size="xs" aria-label="Suite" value={suite} onChange={setSuite} data={suites} />
+          <SegmentedControl
+            size="xs"
+            aria-label="Suite"
+            value={suite}
+            onChange={(next) => setSearch({ suite: next }, { replace: true, preventScrollReset: true })}
+            data={suites}
+          />
         )
       }
     >

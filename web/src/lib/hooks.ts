@@ -36,5 +36,39 @@ export function useNumberInAddress(name: string): [number | null, (value: number
       ),
     [name, setSearch],
   )
-  return [text !== null && /^\d{1,9}$/.test(text) ? Number(text) : null, set]
+  return [wholeNumber(text), set]
+}
+
+/** In the address, the first episode is 1, as it is called on the pages. Links from before have another name, and count from 0. */
+const REPLAY = 'replay'
+const REPLAY_BEFORE = 'episode'
+
+/**
+ * The episode that is replayed, counted from 0, or null. Opening one is a step of its own, so that Back closes it; going from
+ * one to the next is not.
+ */
+export function useReplayInAddress(): [number | null, (episode: number | null) => void] {
+  const [search, setSearch] = useSearchParams()
+  const wanted = wholeNumber(search.get(REPLAY))
+  const episode = wanted === null ? wholeNumber(search.get(REPLAY_BEFORE)) : wanted - 1
+  const open = episode !== null && episode >= 0
+  const set = useCallback(
+    (next: number | null) =>
+      setSearch(
+        (before) => {
+          const after = new URLSearchParams(before)
+          after.delete(REPLAY_BEFORE)
+          if (next === null) after.delete(REPLAY)
+          else after.set(REPLAY, String(next + 1))
+          return after
+        },
+        { replace: open || next === null, preventScrollReset: true },
+      ),
+    [open, setSearch],
+  )
+  return [open ? episode : null, set]
+}
+
+function wholeNumber(text: string | null): number | null {
+  return text !== null && /^\d{1,9}$/.test(text) ? Number(text) : null
 }

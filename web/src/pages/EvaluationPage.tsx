@@ -12,7 +12,7 @@ import { ReplayDialog } from '../components/Replay'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import { byInterest } from '../lib/episodes'
 import { percent, significant } from '../lib/format'
-import { useNumberInAddress, useTitle } from '../lib/hooks'
+import { useReplayInAddress, useTitle } from '../lib/hooks'
 import classes from './EvaluationPage.module.css'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -80,7 +80,7 @@ function Links({ evaluation: { policy, run_id, suite_hash } }: { evaluation: Ask
 }
 
 function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
-  const [episode, setEpisode] = useNumberInAddress('episode')
+  const [episode, setEpisode] = useReplayInAddress()
   const path = { evaluation_id: evaluation.id }
   const { figures } = evaluation
   const episodes = $api.useQuery(

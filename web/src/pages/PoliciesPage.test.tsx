@@ -81,16 +81,18 @@ test('its figures stand beside the baselines, suite by suite', async () => {
   expect(rows[3]).toHaveTextContent(/95\.0\s%.*5\.0\s%0\s%0\.8592\.4/)
 })
 
+const onClutter = {
+  ...routes,
+  'GET /api/policies/crowd/suites/clutter-500/replays/1': {
+    ...replay,
+    suite: 'clutter-500',
+    page: '/replays/policies/crowd/clutter-500/1/',
+  },
+}
+
 test('every episode of every suite can be replayed', async () => {
-  startServer({
-    ...routes,
-    'GET /api/policies/crowd/suites/clutter-500/replays/1': {
-      ...replay,
-      suite: 'clutter-500',
-      page: '/replays/policies/crowd/clutter-500/1/',
-    },
-  })
-  const { user } = open('/policies/crowd')
+  startServer(onClutter)
+  const { user, router } = open('/policies/crowd')
   await screen.findByRole('heading', { name: 'Episodes on simple-200' })
   await user.click(screen.getByRole('radio', { name: 'clutter-500' }))
   await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
@@ -98,6 +100,18 @@ test('every episode of every suite can be replayed', async () => {
     'src',
     '/replays/policies/crowd/clutter-500/1/light/',
   )
+  expect(router.state.location.search).toBe('?suite=clutter-500&replay=2')
+})
+
+test('a link to a replay brings its suite along', async () => {
+  startServer(onClutter)
+  open('/policies/crowd?suite=clutter-500&replay=2')
+  expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
+    'src',
+    '/replays/policies/crowd/clutter-500/1/light/',
+  )
+  // The page behind the dialog.
+  expect(screen.getByText('Episodes on clutter-500')).toBeInTheDocument()
 })
 
 test('a policy that is not there', async () => {

@@ -11,7 +11,7 @@ import { PolicyResults } from '../components/PolicyResults'
 import { Page, Panel, QueryError } from '../components/ui'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count } from '../lib/format'
-import { useNumberInAddress, useTitle } from '../lib/hooks'
+import { useReplayInAddress, useTitle } from '../lib/hooks'
 import classes from './PolicyPage.module.css'
 
 export function PolicyPage() {
@@ -37,7 +37,7 @@ export function PolicyPage() {
 }
 
 function LoadedPolicy({ policy }: { policy: ShippedPolicy }) {
-  const [episode] = useNumberInAddress('episode')
+  const [episode] = useReplayInAddress()
   return (
     <Page
       title={policy.title}

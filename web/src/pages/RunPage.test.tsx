@@ -181,7 +181,7 @@ test('an episode is replayed; its address can be passed on', async () => {
     'src',
     '/replays/checkpoints/cp2/1/light/',
   )
-  expect(router.state.location.search).toBe('?episode=1')
+  expect(router.state.location.search).toBe('?replay=2')
   const dialog = screen.getByRole('dialog', { name: 'Episode 2' })
   expect(dialog).toHaveTextContent('12 steps, 2.4 s, on simple-200')
   expect(within(dialog).queryByRole('alert')).not.toBeInTheDocument()
@@ -197,12 +197,23 @@ test('an episode is replayed; its address can be passed on', async () => {
   expect(router.state.location.search).toBe('')
 })
 
+test('Back closes a replay that was opened here, and leaves the page where it is', async () => {
+  startServer({ ...routes, 'GET /api/checkpoints/cp2/replays/1': replay })
+  const { user, router } = open('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
+  await screen.findByRole('dialog', { name: 'Episode 2' })
+  await router.navigate(-1)
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(router.state.location.pathname + router.state.location.search).toBe('/runs/run1')
+})
+
 test('one goes on from one failure to the next without closing the replay', async () => {
   startServer({
     ...routes,
     'GET /api/checkpoints/cp2/replays/1': replay,
     'GET /api/checkpoints/cp2/replays/4': { ...replay, episode: 4, page: '/replays/checkpoints/cp2/4/' },
   })
+  // A link of before: counted from 0.
   const { user, router } = open('/runs/run1?episode=1')
   await screen.findByTestId('episodes')
   const next = await screen.findByRole('button', { name: 'Next' })
@@ -215,7 +226,7 @@ test('one goes on from one failure to the next without closing the replay', asyn
       '/replays/checkpoints/cp2/4/light/',
     ),
   )
-  expect(router.state.location.search).toBe('?episode=4')
+  expect(router.state.location.search).toBe('?replay=5')
   expect(screen.getByRole('button', { name: 'Previous' })).toBeEnabled()
 })
 
@@ -224,10 +235,10 @@ test('a replay that ended otherwise says so, and one that cannot be made says wh
     ...routes,
     'GET /api/checkpoints/cp2/replays/1': { ...replay, faithful: false },
   })
-  const { router } = open('/runs/run1?step=100000&episode=1')
+  const { router } = open('/runs/run1?step=100000&replay=2')
   expect(await screen.findByText(/ended otherwise than recorded/)).toBeInTheDocument()
   server.routes['GET /api/checkpoints/cp2/replays/2'] = refusal(500, 'The suite has changed.')
-  await router.navigate('/runs/run1?episode=2')
+  await router.navigate('/runs/run1?replay=3')
   expect(await screen.findByText('The suite has changed.')).toBeInTheDocument()
   expect(screen.getByRole('button', { name: 'Try again' })).toBeInTheDocument()
 })

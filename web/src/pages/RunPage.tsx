@@ -26,7 +26,7 @@ import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
-import { useNumberInAddress, useTitle } from '../lib/hooks'
+import { useNumberInAddress, useReplayInAddress, useTitle } from '../lib/hooks'
 import classes from './RunPage.module.css'
 
 const POINTS = 600
@@ -80,7 +80,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
     { placeholderData: keepPreviousData },
   )
   const [step, setStep] = useNumberInAddress('step')
-  const [episode] = useNumberInAddress('episode')
+  const [episode] = useReplayInAddress()
   const episodes = useRef<HTMLDivElement>(null)
   const chosen = useChosen(run.id, checkpoints.data, step)
   const choose = (checkpoint: Checkpoint) => {
