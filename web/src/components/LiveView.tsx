@@ -1,6 +1,7 @@
 /** Robots in 3D, as the server's own page in a frame, with what can be chosen about it: a run's, or a shipped policy's. */
 import {
   ActionIcon,
+  Button,
   Checkbox,
   Group,
   NumberInput,
@@ -11,11 +12,11 @@ import {
   useComputedColorScheme,
 } from '@mantine/core'
 import { type QueryClient, useQuery, useQueryClient } from '@tanstack/react-query'
-import { useEffect, useRef, useState } from 'react'
+import { type ReactNode, useEffect, useRef, useState } from 'react'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
-import { IconMaximize } from './icons'
+import { IconMaximize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
 
 const MAX_ROBOTS = 64
@@ -41,7 +42,10 @@ export function RunLiveView({ runId, state, kept, covered }: RunLiveViewProps) {
   const watching = useWatching() && !covered
   const training = state === 'running' || state === 'stopping'
   const driven = !training && state !== 'queued' && kept === true
-  const shown = training || driven
+  // Who has seen it train goes on seeing it drive; who comes later asks for it: pictures in 3D are work for any machine.
+  const [asked, setAsked] = useState(training)
+  if (training && !asked) setAsked(true)
+  const shown = training || (driven && asked)
   const { live, change } = useRunLive(runId, shown && watching)
   const { data: status } = useStatus()
   return (
@@ -49,7 +53,19 @@ export function RunLiveView({ runId, state, kept, covered }: RunLiveViewProps) {
       // After a training the frame is another one: whoever sent the pictures before is gone.
       key={`${driven}`}
       page={shown && watching ? `/live/${runId}/` : null}
-      overlay={shown ? (live ? null : 'Connecting …') : overlayOf(state, kept, status?.workers.length)}
+      overlay={
+        shown ? (
+          live ? null : (
+            'Connecting …'
+          )
+        ) : driven ? (
+          <Button leftSection={<IconPlayerPlay size={16} />} onClick={() => setAsked(true)}>
+            Watch the best policy
+          </Button>
+        ) : (
+          overlayOf(state, kept, status?.workers.length)
+        )
+      }
       live={shown ? live : undefined}
       change={change}
       driven={driven}
@@ -75,7 +91,7 @@ interface LiveViewProps extends LiveControlsProps {
   /** The page inside the frame, or null while there is none. */
   page: string | null
   /** What stands in place of the picture, or null. */
-  overlay: string | null
+  overlay: ReactNode
 }
 
 function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {

@@ -339,10 +339,13 @@ test.each([
 })
 
 test.each(['completed', 'stopped', 'failed'] as const)(
-  'the best policy of a %s run drives',
+  'the best policy of a %s run drives as soon as somebody wants to watch',
   async (state) => {
     startServer({ ...routes, 'GET /api/runs/run1': { ...runDetail, state } })
-    open('/runs/run1')
+    const { user } = open('/runs/run1')
+    const watch = await screen.findByRole('button', { name: 'Watch the best policy' })
+    expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
+    await user.click(watch)
     expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/run1/')
     const controls = screen.getByRole('group', { name: 'Live view' })
     expect(controls).toHaveTextContent('The best policy, after training')

@@ -127,6 +127,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
         <div className={classes.stage}>
           <Panel flush>
             <RunLiveView
+              key={run.id}
               runId={run.id}
               state={run.state}
               kept={checkpoints.data && checkpoints.data.total > 0}
