@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from mapless_client.models import Json
@@ -37,6 +36,7 @@ class Curve:
 
 def curve(series: Json) -> Curve:
     """A series of the API's JSON; null is nan."""
+    import numpy as np  # here, so that a command's help does not wait for it
 
     def numbers(key: str) -> NDArray[np.float64]:
         return np.array(series[key], dtype=np.float64)
