@@ -14,6 +14,7 @@ from server.audit import endpoints as audit
 from server.checkpoints import endpoints as checkpoints
 from server.checkpoints.archives import keep_swept
 from server.comparison import endpoints as comparison
+from server.data_export import endpoints as data_export
 from server.database.engine import Database
 from server.database.migrate import upgrade
 from server.diagnoses import endpoints as diagnoses
@@ -83,6 +84,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     replays.router,
     policies.router,
     comparison.router,
+    data_export.router,
     reproduction.router,
     events.router,
     live.router,

@@ -1,7 +1,5 @@
 """What an administrator may see of what was done."""
 
-import csv
-import io
 from collections.abc import Iterator
 
 from server.audit.repository import AuditFilter, AuditRepository
@@ -10,10 +8,9 @@ from server.database import tables
 from server.paging import Window
 from server.schemas import Page
 from server.services import Services
+from server.spreadsheets import csv_rows
 
 _BLOCK = 1_000
-# What a spreadsheet would take for a formula.
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 class AuditService:
@@ -30,7 +27,7 @@ class AuditService:
 
     def csv(self, wanted: AuditFilter) -> Iterator[bytes]:
         """All entries as CSV with a heading, the newest first, block by block: each is a transaction of its own."""
-        yield _csv([tuple(AuditEntry.model_fields)])
+        yield csv_rows([tuple(AuditEntry.model_fields)])
         last: int | None = None
         while True:
             with self._services.database.read() as session:
@@ -38,7 +35,7 @@ class AuditService:
             if not found:
                 return
             last = found[-1].id
-            yield _csv([tuple(_view(entry).model_dump().values()) for entry in found])
+            yield csv_rows([tuple(_view(entry).model_dump().values()) for entry in found])
 
 
 def _view(entry: tables.AuditEntry) -> AuditEntry:
@@ -53,11 +50,3 @@ def _view(entry: tables.AuditEntry) -> AuditEntry:
         project_id=entry.project_id,
         details=entry.details,
     )
-
-
-def _csv(rows: list[tuple[object, ...]]) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    for row in rows:
-        writer.writerow([f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell for cell in row])
-    return text.getvalue().encode()

@@ -1,7 +1,5 @@
 """What a person may do with checkpoints."""
 
-import re
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,11 +7,10 @@ from server.audit.repository import AuditRepository
 from server.checkpoints import views
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.checkpoints.schemas import CheckpointPage, Episodes
+from server.file_names import slug
 from server.paging import Window
 from server.runs.repository import RunRepository
 from server.services import Services
-
-_MAX_SLUG = 60
 
 
 @dataclass(frozen=True)
@@ -97,7 +94,7 @@ class CheckpointService:
         with self._services.database.read() as session:
             checkpoint = CheckpointRepository(session).get(checkpoint_id)
             run = RunRepository(session).get(checkpoint.run_id)
-            file_name = f"mapless-{_slug(run.experiment.name)}-seed{run.seed}-step{checkpoint.step}.zip"
+            file_name = f"mapless-{slug(run.experiment.name)}-seed{run.seed}-step{checkpoint.step}.zip"
         return Described(file_name, checkpoint.size, checkpoint.sha256)
 
     def take_home(self, checkpoint_id: str, rest: Rest | None = None) -> Download:
@@ -128,9 +125,3 @@ class CheckpointService:
                 "checkpoint.downloaded", target=checkpoint_id, name=archive.file_name, project_id=project_id
             )
         return archive
-
-
-def _slug(name: str) -> str:
-    """The name in characters that every file system takes."""
-    ascii_name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    return re.sub(r"[^a-z0-9]+", "-", ascii_name.lower()).strip("-")[:_MAX_SLUG] or "experiment"

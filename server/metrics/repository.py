@@ -166,6 +166,29 @@ class MetricRepository:
                         parts[run_id][name].append(points)
         return {run_id: {name: Points.joined(series[name]) for name in sorted(series)} for run_id, series in parts.items()}
 
+    def waiting(self, run_id: str) -> dict[str, Points]:
+        """The points that wait to be compacted, by series."""
+        return _series(self._rows(run_id))
+
+    def compacted(self, run_id: str) -> set[str]:
+        """The series that have chunks."""
+        query = select(tables.MetricChunk.name).where(tables.MetricChunk.run_id == run_id).distinct()
+        return set(self._session.scalars(query))
+
+    def chunks_after(self, run_id: str, name: str, first_step: int, limit: int) -> list[tuple[int, Points]]:
+        """The next chunks of a series, at most `limit`: those that begin after `first_step`, each with its own."""
+        query = (
+            select(tables.MetricChunk)
+            .where(
+                tables.MetricChunk.run_id == run_id,
+                tables.MetricChunk.name == name,
+                tables.MetricChunk.first_step > first_step,
+            )
+            .order_by(tables.MetricChunk.first_step)
+            .limit(limit)
+        )
+        return [(chunk.first_step, _decode(chunk)) for chunk in self._session.scalars(query)]
+
     def curves(self, run_ids: Collection[str], names: Collection[str] | None, limit: int) -> dict[str, dict[str, Buckets]]:
         """The series of several runs at most `limit` (at least 2) buckets wide, by run and name.
 

@@ -110,6 +110,8 @@ TABLE = {
         GET /api/evaluations/{evaluation_id}/ways
         GET /api/evaluations/{evaluation_id}/replays/{episode}
         GET /replays/evaluations/{evaluation_id}/{episode}/{theme}/
+        GET /api/runs/{run_id}/export
+        GET /api/experiments/{experiment_id}/export
         GET /api/compare
         GET /api/compare/curves
         GET /api/reproduction

@@ -196,6 +196,24 @@ def test_what_the_page_shows_runs(environment: dict[str, str], tmp_path: Path) -
     assert python.stdout.splitlines()[-1].startswith("policies/mapless-from-a-program-seed0-")
 
 
+def test_what_the_page_of_data_shows_runs(
+    environment: dict[str, str], trained: mapless_client.Experiment, tmp_path: Path
+) -> None:
+    text = (ROOT / "docs" / "data.md").read_text("utf-8")
+    _, commands = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+
+    shell = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", commands], env=environment, cwd=tmp_path, capture_output=True, text=True
+    )
+
+    assert shell.returncode == 0, shell.stderr
+    assert "train/return" in (tmp_path / "points.csv").read_text()
+    document = json.loads((tmp_path / "training.json").read_text())
+    assert document["runs"][0]["final_evaluation"]["episodes"]
+    runs = {path.parent.name for path in (tmp_path / "events").glob("*/*/events.out.tfevents.*")}
+    assert runs == {f"seed{run['seed']}" for run in document["runs"]}
+
+
 def test_the_notebook_runs(environment: dict[str, str], tmp_path: Path) -> None:
     notebook = json.loads((ROOT / "docs" / "client.ipynb").read_text("utf-8"))
     cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]

@@ -621,6 +621,26 @@ export interface paths {
         patch: operations["change_experiment_api_experiments__experiment_id__patch"];
         trace?: never;
     };
+    "/api/experiments/{experiment_id}/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Experiment
+         * @description The data of all runs of the experiment as a file.
+         */
+        get: operations["export_experiment_api_experiments__experiment_id__export_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/experiments/{experiment_id}/lineage": {
         parameters: {
             query?: never;
@@ -1413,6 +1433,26 @@ export interface paths {
          * @description The run's event log, oldest first.
          */
         get: operations["list_events_api_runs__run_id__events_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Run
+         * @description The run's data as a file.
+         */
+        get: operations["export_run_api_runs__run_id__export_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -11475,6 +11515,61 @@ export interface operations {
             };
         };
     };
+    export_experiment_api_experiments__experiment_id__export_get: {
+        parameters: {
+            query?: {
+                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
+                format?: "csv" | "json" | "tensorboard";
+            };
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": Record<string, never>;
+                    "application/octet-stream": string;
+                    "application/zip": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_experiment_lineage_api_experiments__experiment_id__lineage_get: {
         parameters: {
             query?: never;
@@ -13723,6 +13818,61 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RunEvent"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    export_run_api_runs__run_id__export_get: {
+        parameters: {
+            query?: {
+                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
+                format?: "csv" | "json" | "tensorboard";
+            };
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": Record<string, never>;
+                    "application/octet-stream": string;
+                    "application/zip": string;
+                    "text/csv": string;
                 };
             };
             /** @description No valid login */

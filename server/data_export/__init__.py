@@ -1,0 +1,1 @@
+"""What leaves for other tools: the data of runs, of experiments and of comparisons, streamed."""

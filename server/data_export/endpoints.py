@@ -1,0 +1,65 @@
+"""Routes of data that leave."""
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from fastapi.responses import StreamingResponse
+
+from server.data_export.files import OutgoingFile
+from server.data_export.service import DataExportService, DataFormat
+from server.problems import NOT_FOUND, Responses
+from server.security.permissions import view
+from server.services import Services, ServicesDep
+
+router = APIRouter(tags=["data export"])
+
+_FILES: Responses = {
+    200: {
+        "content": {
+            "text/csv": {"schema": {"type": "string"}},
+            "application/json": {"schema": {"type": "object"}},
+            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
+            "application/zip": {"schema": {"type": "string", "format": "binary"}},
+        }
+    }
+}
+
+WantedFormat = Annotated[
+    DataFormat,
+    Query(
+        alias="format",
+        description="csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, "
+        "which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. "
+        "tensorboard: an event file, or a zip of one for each run.",
+    ),
+]
+
+
+@router.get(
+    "/api/runs/{run_id}/export",
+    response_class=StreamingResponse,
+    responses=NOT_FOUND | _FILES,
+    dependencies=[view("run_id")],
+)
+async def export_run(run_id: str, services: ServicesDep, wanted: WantedFormat = "csv") -> StreamingResponse:
+    """The run's data as a file."""
+    return await _send(services, lambda: DataExportService(services).run(run_id, wanted))
+
+
+@router.get(
+    "/api/experiments/{experiment_id}/export",
+    response_class=StreamingResponse,
+    responses=NOT_FOUND | _FILES,
+    dependencies=[view("experiment_id")],
+)
+async def export_experiment(experiment_id: str, services: ServicesDep, wanted: WantedFormat = "csv") -> StreamingResponse:
+    """The data of all runs of the experiment as a file."""
+    return await _send(services, lambda: DataExportService(services).experiment(experiment_id, wanted))
+
+
+async def _send(services: Services, find: Callable[[], OutgoingFile]) -> StreamingResponse:
+    lane = services.lanes.downloads
+    file = await lane.run(find)
+    headers = {"Content-Disposition": f'attachment; filename="{file.name}"'}
+    return StreamingResponse(lane.each(file.blocks), media_type=file.media_type, headers=headers)

@@ -1,0 +1,47 @@
+"""An experiment as a document. Times are seconds since the epoch."""
+
+from typing import Any
+
+from pydantic import Field
+
+from server.database.tables import RunState
+from server.schemas import Schema
+from workers.reporting import EpisodeResult
+
+
+class ExportedEvaluation(Schema):
+    """What a checkpoint achieved on a suite."""
+
+    checkpoint: str = Field(description="Its id.")
+    step: int
+    suite: str
+    suite_hash: str
+    episodes: list[EpisodeResult] = Field(description="In the suite's order.")
+
+
+class ExportedRun(Schema):
+    """One seed's training."""
+
+    id: str
+    seed: int
+    state: RunState
+    attempt: int
+    step: int
+    worker: str | None
+    error: str | None
+    created_at: float
+    started_at: float | None
+    finished_at: float | None
+    final_evaluation: ExportedEvaluation | None = Field(description="Of its last evaluated checkpoint.")
+
+
+class ExportedExperiment(Schema):
+    """A configuration and the runs of it that are exported, one or all."""
+
+    id: str
+    name: str
+    project_id: str
+    created_at: float
+    notes: str | None
+    training: dict[str, Any] = Field(description="The configuration as it is stored.")
+    runs: list[ExportedRun]

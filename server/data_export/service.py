@@ -1,0 +1,85 @@
+"""The data of runs and experiments as files."""
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from server.data_export.document import document, exported
+from server.data_export.event_file import event_file
+from server.data_export.files import OutgoingFile
+from server.data_export.schemas import ExportedExperiment
+from server.data_export.series import read_series
+from server.data_export.table import HEADING, point_rows
+from server.data_export.zips import zipped
+from server.database import tables
+from server.experiments.repository import ExperimentRepository
+from server.file_names import slug
+from server.runs.repository import RunRepository
+from server.services import Services
+
+DataFormat = Literal["csv", "json", "tensorboard"]
+
+
+class DataExportService:
+    """Makes files, block by block: what they need of memory does not grow with what they hold."""
+
+    def __init__(self, services: Services) -> None:
+        self._database = services.database
+
+    def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
+        """The data of one run.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._database.read() as session:
+            run = RunRepository(session).get(run_id)
+            experiment, runs = exported(run.experiment), _seeds([run])
+            stem = f"mapless-{slug(experiment.name)}-seed{run.seed}-{run_id}"
+            began = run.created_at
+        if data_format == "tensorboard":
+            return OutgoingFile(_event_file_name(stem, began), "application/octet-stream", self._events(run_id, began))
+        return self._file(stem, experiment, runs, data_format)
+
+    def experiment(self, experiment_id: str, data_format: DataFormat) -> OutgoingFile:
+        """The data of all runs of an experiment.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+        """
+        with self._database.read() as session:
+            found = ExperimentRepository(session).get(experiment_id)
+            experiment, runs = exported(found), _seeds(found.runs)
+            began = {run.id: run.created_at for run in found.runs}
+        stem = f"mapless-{slug(experiment.name)}-{experiment_id}"
+        if data_format == "tensorboard":
+            files = (
+                (f"{stem}/seed{seed}/{_event_file_name(run_id, began[run_id])}", self._events(run_id, began[run_id]))
+                for run_id, seed in runs.items()
+            )
+            return OutgoingFile(f"{stem}-tensorboard.zip", "application/zip", zipped(files))
+        return self._file(stem, experiment, runs, data_format)
+
+    def _file(
+        self, stem: str, experiment: ExportedExperiment, runs: dict[str, int], data_format: Literal["csv", "json"]
+    ) -> OutgoingFile:
+        if data_format == "json":
+            return OutgoingFile(f"{stem}.json", "application/json", document(self._database, experiment, list(runs)))
+        return OutgoingFile(f"{stem}.csv", "text/csv; charset=utf-8", self._table(runs))
+
+    def _events(self, run_id: str, began: float) -> Iterator[bytes]:
+        return event_file(began, read_series(self._database, run_id))
+
+    def _table(self, runs: dict[str, int]) -> Iterator[bytes]:
+        yield HEADING
+        for run_id, seed in runs.items():
+            yield from point_rows(run_id, seed, read_series(self._database, run_id))
+
+
+def _seeds(runs: Sequence[tables.Run]) -> dict[str, int]:
+    """The seed of each run, by id and in their order."""
+    return {run.id: run.seed for run in runs}
+
+
+def _event_file_name(stem: str, began: float) -> str:
+    """TensorBoard looks for names that begin so, and reads several files of a folder in the order of their names."""
+    return f"events.out.tfevents.{int(began)}.{stem}"
