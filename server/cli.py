@@ -11,7 +11,6 @@ from pydantic import ValidationError
 import mapless_client.command
 from server.arenas.cli import app as arena_app
 from server.people.cli import app as people_app
-from sim.parts import explained, require
 from workers.extension_cli import app as extension_app
 
 if TYPE_CHECKING:
@@ -43,8 +42,13 @@ DataDir = Annotated[Path | None, typer.Option(help="Where everything is kept [MA
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; a refusal is one line on standard error and exit status 1."""
     given = sys.argv[1:] if arguments is None else arguments
-    with explained("worker" if given and given[0] in _OF_WORKERS else "server"):
+    try:
         app(arguments, prog_name="mapless")
+    except Exception as error:
+        from sim.parts import explain  # which loads Gymnasium: only where something went wrong
+
+        explain(error, "worker" if given and given[0] in _OF_WORKERS else "server")
+        raise
 
 
 @app.callback(invoke_without_command=True)
@@ -97,10 +101,12 @@ def up(
 ) -> None:
     """Start the server and its workers, and keep them running."""
     settings = _settings(host=host, port=port, data_dir=data_dir, workers=0 if no_workers else workers)
-    if settings.workers != 0:
-        require("worker")
     from server.errors import ServiceError
     from server.supervisor import Supervisor
+    from sim.parts import require
+
+    if settings.workers != 0:
+        require("worker")
 
     try:
         Supervisor(settings, say=typer.echo).run()

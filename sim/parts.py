@@ -63,10 +63,21 @@ def explained(part: Part) -> Iterator[None]:
     """
     try:
         yield
-    except MissingPartError as error:
+    except (MissingPartError, ModuleNotFoundError) as error:
+        explain(error, part)
+        raise
+
+
+def explain(error: Exception, part: Part) -> None:
+    """Ends the process with one line where an error says that a part is not installed; returns where it says something else.
+
+    Args:
+        error: that ended a command.
+        part: that the command is of, where both parts bring the module that is missing.
+    """
+    if isinstance(error, MissingPartError):
         sys.exit(f"mapless: {error}")
-    except ModuleNotFoundError as error:
+    if isinstance(error, ModuleNotFoundError):
         brought_by = _MODULES.get((error.name or "").partition(".")[0])
-        if brought_by is None:
-            raise
-        sys.exit(f"mapless: {MissingPartError('worker' if 'worker' in (brought_by, part) else 'server')}")
+        if brought_by is not None:
+            sys.exit(f"mapless: {MissingPartError('worker' if 'worker' in (brought_by, part) else 'server')}")
