@@ -16,14 +16,16 @@ ExperimentIds = Annotated[
     list[str], Query(alias="experiment", min_length=1, max_length=50, description="Ids of the experiments, in order.")
 ]
 
+Margin = Annotated[float, Query(gt=0.0, le=0.5, description="Success rates that differ by less are equivalent, 0 to 1.")]
+Metric = Annotated[str, Query(max_length=64, description="Of the metric.")]
+GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")]
+
 
 @router.get("", responses=NOT_FOUND, dependencies=[view("experiment")])
 def compare(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
-    margin: Annotated[
-        float, Query(gt=0.0, le=0.5, description="Success rates that differ by less are equivalent, 0 to 1.")
-    ] = 0.02,
+    margin: Margin = 0.02,
 ) -> Comparison:
     """Final figures side by side, with intervals and verdicts, and what differs in the configurations."""
     return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin)
@@ -33,8 +35,8 @@ def compare(
 def compare_curves(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
-    name: Annotated[str, Query(max_length=64, description="Of the metric.")] = "eval/success_rate",
-    points: Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")] = 400,
+    name: Metric = "eval/success_rate",
+    points: GridSteps = 400,
 ) -> Curves:
     """One metric of every run on one grid, and each experiment's mean and interval."""
     return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points)

@@ -6,8 +6,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from fastapi.responses import StreamingResponse
 
+from server.comparison.endpoints import ExperimentIds, GridSteps, Margin, Metric
 from server.data_export.files import OutgoingFile
-from server.data_export.service import DataExportService, DataFormat
+from server.data_export.service import DataExportService, DataFormat, TableFormat
 from server.problems import NOT_FOUND, Responses
 from server.security.permissions import view
 from server.services import Services, ServicesDep
@@ -56,6 +57,28 @@ async def export_run(run_id: str, services: ServicesDep, wanted: WantedFormat = 
 async def export_experiment(experiment_id: str, services: ServicesDep, wanted: WantedFormat = "csv") -> StreamingResponse:
     """The data of all runs of the experiment as a file."""
     return await _send(services, lambda: DataExportService(services).experiment(experiment_id, wanted))
+
+
+@router.get(
+    "/api/compare/export",
+    response_class=StreamingResponse,
+    responses=NOT_FOUND | _FILES,
+    dependencies=[view("experiment")],
+)
+async def export_comparison(
+    experiment_ids: ExperimentIds,
+    services: ServicesDep,
+    wanted: Annotated[
+        TableFormat,
+        Query(alias="format", description="csv: a zip of figures.csv, curves.csv and seeds.csv. json: all of it in one."),
+    ] = "csv",
+    margin: Margin = 0.02,
+    name: Metric = "eval/success_rate",
+    points: GridSteps = 400,
+) -> StreamingResponse:
+    """The figures of a comparison and the curves of one metric as a file."""
+    ids = list(dict.fromkeys(experiment_ids))
+    return await _send(services, lambda: DataExportService(services).comparison(ids, margin, name, points, wanted))
 
 
 async def _send(services: Services, find: Callable[[], OutgoingFile]) -> StreamingResponse:

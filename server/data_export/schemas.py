@@ -1,9 +1,10 @@
-"""An experiment as a document. Times are seconds since the epoch."""
+"""What leaves as JSON. Times are seconds since the epoch."""
 
 from typing import Any
 
 from pydantic import Field
 
+from server.comparison.schemas import Comparison, Curves
 from server.database.tables import RunState
 from server.schemas import Schema
 from workers.reporting import EpisodeResult
@@ -45,3 +46,10 @@ class ExportedExperiment(Schema):
     notes: str | None
     training: dict[str, Any] = Field(description="The configuration as it is stored.")
     runs: list[ExportedRun]
+
+
+class ExportedComparison(Schema):
+    """Experiments side by side, with the curves of one metric."""
+
+    comparison: Comparison
+    curves: Curves

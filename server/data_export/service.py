@@ -1,12 +1,14 @@
-"""The data of runs and experiments as files."""
+"""The data of runs, experiments and comparisons as files."""
 
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+from server.comparison.service import ComparisonService
+from server.data_export.comparison import figure_rows, mean_rows, seed_rows
 from server.data_export.document import document, exported
 from server.data_export.event_file import event_file
 from server.data_export.files import OutgoingFile
-from server.data_export.schemas import ExportedExperiment
+from server.data_export.schemas import ExportedComparison, ExportedExperiment
 from server.data_export.series import read_series
 from server.data_export.table import HEADING, point_rows
 from server.data_export.zips import zipped
@@ -16,6 +18,7 @@ from server.file_names import slug
 from server.runs.repository import RunRepository
 from server.services import Services
 
+TableFormat = Literal["csv", "json"]
 DataFormat = Literal["csv", "json", "tensorboard"]
 
 
@@ -23,6 +26,7 @@ class DataExportService:
     """Makes files, block by block: what they need of memory does not grow with what they hold."""
 
     def __init__(self, services: Services) -> None:
+        self._services = services
         self._database = services.database
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
@@ -59,8 +63,24 @@ class DataExportService:
             return OutgoingFile(f"{stem}-tensorboard.zip", "application/zip", zipped(files))
         return self._file(stem, experiment, runs, data_format)
 
+    def comparison(
+        self, experiment_ids: Sequence[str], margin: float, name: str, points: int, data_format: TableFormat
+    ) -> OutgoingFile:
+        """Figures and one metric's curves, as `ComparisonService` has them; as CSV, three tables in a zip.
+
+        Raises:
+            NotFoundError: one of the experiments is missing.
+        """
+        service = ComparisonService(self._services)
+        compared, curves = service.compare(experiment_ids, margin), service.curves(experiment_ids, name, points)
+        if data_format == "json":
+            whole = ExportedComparison(comparison=compared, curves=curves).model_dump_json().encode()
+            return OutgoingFile("mapless-comparison.json", "application/json", iter([whole]))
+        files = {"figures.csv": [figure_rows(compared)], "curves.csv": mean_rows(curves), "seeds.csv": seed_rows(curves)}
+        return OutgoingFile("mapless-comparison.zip", "application/zip", zipped(files.items()))
+
     def _file(
-        self, stem: str, experiment: ExportedExperiment, runs: dict[str, int], data_format: Literal["csv", "json"]
+        self, stem: str, experiment: ExportedExperiment, runs: dict[str, int], data_format: TableFormat
     ) -> OutgoingFile:
         if data_format == "json":
             return OutgoingFile(f"{stem}.json", "application/json", document(self._database, experiment, list(runs)))

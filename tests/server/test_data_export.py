@@ -265,3 +265,44 @@ def test_an_event_is_written_as_worked_out_by_hand() -> None:
     summary = b"\x2a\x0a" + b"\x0a\x08" + b"\x0a\x01a" + b"\x15" + struct.pack("<f", 2.0)
     assert record[12:-4] == b"\x09" + struct.pack("<d", 1.0) + b"\x10\xac\x02" + summary
     assert record[:8] == struct.pack("<Q", len(record) - 16)
+
+
+def test_a_comparison_leaves_as_tables(client: TestClient, reports: Reports) -> None:
+    experiment, unmeasured = reports.experiment("=Corridor", seeds=(0, 1)), reports.experiment("Later", seeds=(2,))
+    for run, arrivals, values in zip(experiment["runs"], (8, 6), ([0.25, 0.5], [0.75, 1.0]), strict=True):
+        reports.checkpoint(run, 2_000, reports.evaluation(arrivals=arrivals))
+        reports.metrics(run, "train/return", {1_000: values[0], 2_000: values[1]})
+    asked = {"experiment": [experiment["id"], unmeasured["id"]], "name": "train/return"}
+
+    response = client.get("/api/compare/export", params=asked)
+
+    assert response.headers["content-disposition"] == 'attachment; filename="mapless-comparison.zip"'
+    with ZipFile(io.BytesIO(response.content)) as archive:
+        tables_by_name = {
+            name: list(csv.DictReader(io.StringIO(archive.read(name).decode()))) for name in archive.namelist()
+        }
+    success, steps, reward = tables_by_name["figures.csv"]
+    assert [row["figure"] for row in (success, steps, reward)] == ["success", "steps_per_target", "reward"]
+    assert (success["experiment"], success["name"]) == (experiment["id"], "'=Corridor")
+    assert (success["value"], success["seeds"], success["episodes"], success["suite"]) == ("0.7", "2", "20", "simple-200")
+    assert float(success["low"]) < 0.7 < float(success["high"])
+    # Means of 60 and 20.
+    assert (float(steps["value"]), float(reward["value"])) == (80.0, 40.0)
+    of_first = [row for row in tables_by_name["curves.csv"] if row["experiment"] == experiment["id"]]
+    assert [(row["step"], row["mean"], row["seeds"]) for row in of_first] == [("1000", "0.5", "2"), ("2000", "0.75", "2")]
+    # Values that differ by 0.5 stand 0.25 either side of their mean; Student's t of one degree of freedom is 12.706.
+    assert float(of_first[0]["high"]) == pytest.approx(0.5 + 12.706 * 0.25, rel=1e-3)
+    assert [(row["seed"], row["step"], row["value"]) for row in tables_by_name["seeds.csv"]] == [
+        ("0", "1000", "0.25"),
+        ("0", "2000", "0.5"),
+        ("1", "1000", "0.75"),
+        ("1", "2000", "1.0"),
+        ("2", "1000", ""),
+        ("2", "2000", ""),
+    ]
+    whole = client.get("/api/compare/export", params=asked | {"format": "json"}).json()
+    assert whole == {
+        "comparison": client.get("/api/compare", params={"experiment": asked["experiment"]}).json(),
+        "curves": client.get("/api/compare/curves", params=asked).json(),
+    }
+    assert client.get("/api/compare/export?experiment=none").status_code == 404

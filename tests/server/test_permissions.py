@@ -112,6 +112,7 @@ TABLE = {
         GET /replays/evaluations/{evaluation_id}/{episode}/{theme}/
         GET /api/runs/{run_id}/export
         GET /api/experiments/{experiment_id}/export
+        GET /api/compare/export
         GET /api/compare
         GET /api/compare/curves
         GET /api/reproduction

@@ -200,16 +200,19 @@ def test_what_the_page_of_data_shows_runs(
     environment: dict[str, str], trained: mapless_client.Experiment, tmp_path: Path
 ) -> None:
     text = (ROOT / "docs" / "data.md").read_text("utf-8")
-    _, commands = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    _, *commands = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
 
     shell = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", commands], env=environment, cwd=tmp_path, capture_output=True, text=True
+        ["bash", "-euo", "pipefail", "-c", "".join(commands)], env=environment, cwd=tmp_path, capture_output=True, text=True
     )
 
     assert shell.returncode == 0, shell.stderr
     assert "train/return" in (tmp_path / "points.csv").read_text()
     document = json.loads((tmp_path / "training.json").read_text())
     assert document["runs"][0]["final_evaluation"]["episodes"]
+    with zipfile.ZipFile(tmp_path / "comparison.zip") as archive:
+        assert archive.namelist() == ["figures.csv", "curves.csv", "seeds.csv"]
+        assert b"train/return" in archive.read("curves.csv")
     runs = {path.parent.name for path in (tmp_path / "events").glob("*/*/events.out.tfevents.*")}
     assert runs == {f"seed{run['seed']}" for run in document["runs"]}
 

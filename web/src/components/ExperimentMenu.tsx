@@ -7,11 +7,21 @@ import { useActions } from '../api/actions'
 import type { ListedExperiment } from '../api/types'
 import { plural } from '../lib/format'
 import { DeleteDialog } from './DeleteDialog'
-import { IconCopy, IconDots, IconPencil, IconPlayerPlay, IconPlayerStop, IconTrash } from './icons'
+import {
+  IconCopy,
+  IconDots,
+  IconDownload,
+  IconPencil,
+  IconPlayerPlay,
+  IconPlayerStop,
+  IconTrash,
+} from './icons'
 import { canResume, canStop } from './states'
 
 interface ExperimentMenuProps {
   experiment: Pick<ListedExperiment, 'id' | 'name' | 'states' | 'runs'>
+  /** The run whose data are exported; those of all runs without it. */
+  runId?: string
   /** Called once the experiment is gone. */
   onDeleted?: () => void
 }
@@ -33,7 +43,7 @@ export function ExperimentMenu(props: ExperimentMenuProps) {
   )
 }
 
-function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
+function OpenedMenu({ experiment, runId, onDeleted }: ExperimentMenuProps) {
   const { id, name, states } = experiment
   const actions = useActions()
   const [renaming, rename] = useDisclosure()
@@ -41,7 +51,7 @@ function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
   const of = { params: { path: { experiment_id: id } } }
   return (
     <>
-      <Menu defaultOpened>
+      <Menu defaultOpened width={260}>
         <Menu.Target>
           <ActionIcon variant="subtle" color="gray" aria-label={`Actions for ${name}`}>
             <IconDots size={18} stroke={1.6} />
@@ -68,6 +78,8 @@ function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
           >
             Resume
           </Menu.Item>
+          <Menu.Divider />
+          <ExportItems path={runId ? `/api/runs/${runId}` : `/api/experiments/${id}`} />
           <Menu.Divider />
           <Menu.Item color="red" leftSection={<IconTrash size={16} />} onClick={remove.open}>
             Delete
@@ -101,6 +113,31 @@ function OpenedMenu({ experiment, onDeleted }: ExperimentMenuProps) {
         Its {plural(experiment.runs, 'run')}, curves and checkpoints lie in the trash for a week, from where
         they can be taken back. Runs that are going on are stopped.
       </DeleteDialog>
+    </>
+  )
+}
+
+const FORMATS = [
+  { format: 'csv', label: 'Curves, CSV' },
+  { format: 'tensorboard', label: 'Curves, TensorBoard' },
+  { format: 'json', label: 'Settings and episodes, JSON' },
+]
+
+function ExportItems({ path }: { path: string }) {
+  return (
+    <>
+      <Menu.Label>Export</Menu.Label>
+      {FORMATS.map(({ format, label }) => (
+        <Menu.Item
+          key={format}
+          leftSection={<IconDownload size={16} />}
+          component="a"
+          href={`${path}/export?format=${format}`}
+          download
+        >
+          {label}
+        </Menu.Item>
+      ))}
     </>
   )
 }

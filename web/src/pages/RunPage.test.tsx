@@ -49,6 +49,14 @@ const routes = {
   'GET /api/experiments/exp1': experiment,
 }
 
+test("the run's own data are exported on its page", async () => {
+  startServer(routes)
+  const { user } = open('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Actions for Corridor' }))
+  const item = await screen.findByRole('menuitem', { name: 'Curves, CSV' })
+  expect(item).toHaveAttribute('href', '/api/runs/run1/export?format=csv')
+})
+
 test('a running run: how far it is, its curves, its robots', async () => {
   startServer(routes)
   open('/runs/run1')

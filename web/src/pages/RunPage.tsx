@@ -268,6 +268,7 @@ function RunActions({ run }: { run: RunDetail }) {
             states: experiment.data.runs.map(({ state }) => state),
             runs: experiment.data.runs.length,
           }}
+          runId={run.id}
           onDeleted={() => navigate('/')}
         />
       )}

@@ -155,6 +155,20 @@ test('deleting asks first', async () => {
   await waitFor(() => expect(server.changes).toEqual([{ route: 'DELETE /api/experiments/exp1', body: null }]))
 })
 
+test('the data of all runs are exported', async () => {
+  startServer({ 'GET /api/experiments': two })
+  const { user } = open('/')
+  await user.click(await screen.findByRole('button', { name: 'Actions for Corridor' }))
+  for (const [name, format] of [
+    ['Curves, CSV', 'csv'],
+    ['Curves, TensorBoard', 'tensorboard'],
+    ['Settings and episodes, JSON', 'json'],
+  ] as const) {
+    const item = await screen.findByRole('menuitem', { name })
+    expect(item).toHaveAttribute('href', `/api/experiments/exp1/export?format=${format}`)
+  }
+})
+
 test('renaming', async () => {
   const server = startServer({ 'GET /api/experiments': two, 'PATCH /api/experiments/exp1': experiment })
   const { user } = open('/')
