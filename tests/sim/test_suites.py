@@ -280,10 +280,9 @@ def test_an_imported_arena_is_its_own_suite() -> None:
 
 
 def test_a_suite_that_was_tampered_with_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
     text = build_suite("simple-200").replace("1.", "2.", 1)
-    (tmp_path / "data" / "simple-200.json").write_text(text, "utf-8")
-    monkeypatch.setattr("sim.suites.suite.resources.files", lambda _: tmp_path)
+    (tmp_path / "simple-200.json").write_text(text, "utf-8")
+    monkeypatch.setattr("sim.frozen._FOLDER", tmp_path)
     load_suite.cache_clear()
     with pytest.raises(SuiteError, match="have changed"):
         load_suite("simple-200")
