@@ -151,9 +151,9 @@ def test_success_holds_its_rate_and_mirrors(arrivals: list[int]) -> None:
     assert 0.0 <= found.low <= found.value <= found.high <= 1.0
     assert found.value == pytest.approx(np.mean(arrivals) / 200)
     assert (mirrored.low, mirrored.high) == pytest.approx((1 - found.high, 1 - found.low), abs=1e-9)
-    # The episodes alone leave this much open.
+    # The episodes alone leave this much open, but for the last bit.
     low, high = exact_interval(sum(arrivals), sum(episodes))
-    assert found.low <= low <= high <= found.high
+    assert found.low <= low + 1e-12 <= high + 2e-12 <= found.high + 3e-12
 
 
 @given(counts, st.floats(0.5, 0.99))
