@@ -85,6 +85,13 @@ def test_what_cannot_be_done_says_why(client: TestClient, job_worker: None) -> N
     assert again["id"] != failed["id"]
 
 
+def test_what_takes_for_ever_is_ended(client: TestClient, job_worker: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workers.runtime.jobs.place.MAX_SECONDS", 0.0)
+    failed = ended(client, ask(client, {"source": "baseline", "name": "MPPI"}))
+    assert failed["state"] == "failed"
+    assert "It took longer than 0 minutes, and was ended." in failed["error"]
+
+
 def test_one_that_waits_can_be_taken_back_and_not_deleted(client: TestClient) -> None:
     asked = ask(client, {"source": "baseline", "name": "random"})
     assert (asked["state"], asked["progress"], asked["figures"]) == ("queued", 0.0, None)

@@ -1,6 +1,7 @@
 """A place for one job at a time: waits for one, sees it through in a process of its own, waits again."""
 
 import logging
+import math
 import multiprocessing
 import shutil
 import threading
@@ -33,6 +34,8 @@ _CLAIM_WAIT_SECONDS = 10.0
 _RETRY_SECONDS = 0.5
 _REPORT_SECONDS = 1.0
 _LOOK_SECONDS = 0.05
+# Of all but views: a policy from elsewhere may compute for ever.
+MAX_SECONDS = 3_600.0
 # Two frames in one request: half the requests, and a thirtieth of a second that nobody sees.
 _FRAMES_AT_ONCE = 2
 _ERROR_CHARACTERS = 9_000
@@ -178,6 +181,7 @@ class _Watch:
         self._frames: list[bytes] = []
         self._told: WatchRequest | None = None
         self._said = False
+        self._deadline = math.inf if isinstance(claim.spec, ViewJob) else time.monotonic() + MAX_SECONDS
 
     def until_ended(self) -> JobEnd:
         """How the process ended.
@@ -187,6 +191,10 @@ class _Watch:
         """
         due = 0.0
         while not self._ending.is_set():
+            if time.monotonic() > self._deadline:
+                return JobEnd(
+                    outcome="failed", error=f"It took longer than {MAX_SECONDS / 60.0:.0f} minutes, and was ended."
+                )
             if time.monotonic() >= due:
                 due = time.monotonic() + _REPORT_SECONDS
                 self._report()
