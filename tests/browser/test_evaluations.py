@@ -15,16 +15,16 @@ pytestmark = pytest.mark.browser
 MEASURED = 120_000
 
 
-def wall_file(name: str) -> dict[str, str]:
-    """An arena of 6 x 6 m with a wall in its middle, as an upload has it."""
+def wall_file(name: str, length: float) -> dict[str, str]:
+    """An arena of 6 x 6 m with a wall in its middle, as an upload has it; of the same walls there is one, by its first name."""
     wall = ArenaFile.model_validate(
-        {"name": name, "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
+        {"name": name, "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": length, "width": 0.2}]}
     )
     return {"name": "wall.json", "content": base64.b64encode(wall.model_dump_json().encode()).decode()}
 
 
 def test_a_policy_and_a_baseline_are_measured_in_an_imported_arena(context: BrowserContext) -> None:
-    imported = context.request.post("/api/arenas/imported", data={"files": [wall_file("A wall")], "keep": True})
+    imported = context.request.post("/api/arenas/imported", data={"files": [wall_file("A wall", 3.0)], "keep": True})
     assert imported.ok, imported.text()
 
     page = context.new_page()
@@ -66,7 +66,7 @@ def test_an_uploaded_onnx_policy_is_measured_in_an_imported_arena(context: Brows
     policy = shipped_policy("complex")
     mine = tmp_path / "elsewhere.onnx"
     mine.write_bytes(export_checkpoint(policy.archive).by_observation)
-    arena = context.request.post("/api/arenas/imported", data={"files": [wall_file("Another wall")], "keep": True})
+    arena = context.request.post("/api/arenas/imported", data={"files": [wall_file("Another wall", 2.5)], "keep": True})
     assert arena.ok, arena.text()
 
     page = context.new_page()
