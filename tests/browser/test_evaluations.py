@@ -16,7 +16,7 @@ MEASURED = 120_000
 
 
 def wall_file(name: str, length: float) -> dict[str, str]:
-    """An arena of 6 x 6 m with a wall in its middle, as an upload has it; of the same walls there is one, by its first name."""
+    """An arena of 6 x 6 m with a wall in its middle, as an upload has it; one of the same walls is kept once."""
     wall = ArenaFile.model_validate(
         {"name": name, "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": length, "width": 0.2}]}
     )

@@ -116,6 +116,7 @@ def test_all_five_are_launched_from_the_form_learn_and_leave_the_house(
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "completed")
 
     # Its robots drive, by a network that only the package knows, and it can be taken away.
+    page.get_by_role("button", name="Watch the best policy").click()
     expect(page.get_by_test_id("live-view")).to_have_attribute("data-receiving", "true", timeout=SOON)
     display = page.frame_locator("[data-testid=live-frame]").locator("#display")
     expect(display).to_contain_text("Best policy", timeout=SOON)
