@@ -153,10 +153,10 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_it_is_refused_with_its_reason_in_no_time(case: str) -> None:
     files, error, reason = REFUSED[case]
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(error, match=reason) as caught:
         read_arena(files)
-    assert time.monotonic() - begin < PATIENCE
+    assert time.process_time() - begin < PATIENCE
     assert len(str(caught.value)) < 1000
 
 
