@@ -33,7 +33,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
             <Table.Th ta="right" className={classes.step}>
               Step
             </Table.Th>
-            <Table.Th visibleFrom="sm" w={84} aria-label="Best" />
+            <Table.Th visibleFrom="sm" w={84} miw={84} aria-label="Best" />
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th visibleFrom="md" ta="right">
               Steps to target
@@ -41,7 +41,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
             <Table.Th visibleFrom="md" ta="right">
               Size
             </Table.Th>
-            <Table.Th visibleFrom="lg" ta="right">
+            <Table.Th visibleFrom="xl" ta="right">
               Saved
             </Table.Th>
             <Table.Th className={classes.actions} aria-label="Episodes and downloads" />
@@ -92,7 +92,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
               >
                 {fileSize(checkpoint.size)}
               </Table.Td>
-              <Table.Td visibleFrom="lg" ta="right" className={`${ui.number} ${ui.quiet}`}>
+              <Table.Td visibleFrom="xl" ta="right" className={`${ui.number} ${ui.quiet}`}>
                 {dateTime(checkpoint.created_at)}
               </Table.Td>
               <Table.Td>
