@@ -18,7 +18,7 @@ from workers.config import AddedAlgorithmConfig, EvaluationConfig, PpoConfig, Sa
 from workers.errors import NetworkError
 from workers.export.bundle import export_checkpoint
 from workers.extending.formulas import OPERATORS, Description, FormulaNetwork, Inputs, RecurrentNetwork
-from workers.networks import modules
+from workers.networks import expressions
 from workers.networks.config import NETWORKS, NetworkConfig, complete_network
 from workers.networks.inputs import inputs_of
 from workers.networks.modules import Described, build_network
@@ -138,4 +138,4 @@ def test_a_formula_that_can_not_be_is_refused(network: NetworkConfig, reason: st
 
 
 def test_the_operators_that_are_documented_are_those_that_there_are() -> None:
-    assert OPERATORS.keys() == modules._OPERATORS.keys()
+    assert OPERATORS.keys() == expressions._OPERATORS.keys()

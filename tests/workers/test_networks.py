@@ -1,15 +1,19 @@
 """The networks are those of the paper's tables, and their written-out backward passes equal autograd's."""
 
+import copy
+
 import numpy as np
 import pytest
 import torch
 from torch import nn
 
+from sim.config import TaskConfig
 from tests.heads import head
 from workers.algorithms.flat import FlatParameters
-from workers.config import MlpNetwork, Network, ResBlockNetwork
+from workers.config import ConvNetwork, GruNetwork, MlpNetwork, Network, ResBlockNetwork
 from workers.kernels.networks import backward, forward, input_gradient
 from workers.networks.compiled import passes_of
+from workers.networks.inputs import inputs_of
 from workers.networks.modules import GaussianActor, build_network
 
 NETWORKS: list[Network] = [
@@ -85,3 +89,15 @@ def test_written_out_gradients_equal_autograd(config: Network, rows: int) -> Non
     forward(passes, plain, True)
     backward(passes, plain, derivative, True)  # the second half of a minibatch, as it were
     assert torch.allclose(flat.gradients, 2 * expected, rtol=0, atol=2 * rounding)
+
+
+@pytest.mark.parametrize("config", [MlpNetwork(hidden_sizes=(8,)), ResBlockNetwork(), ConvNetwork(), GruNetwork()], ids=str)
+def test_a_copy_of_a_network_computes_with_its_own_weights(config: Network) -> None:
+    network = build_network(config, inputs_of(TaskConfig()), 2)
+    twin, observations = copy.deepcopy(network), torch.randn(3, inputs_of(TaskConfig()).size)
+    before = network(observations)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.add_(1.0)
+    assert torch.equal(twin(observations), before)
+    assert not torch.equal(network(observations), before)

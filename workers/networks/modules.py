@@ -1,21 +1,19 @@
 """The networks as modules, and the actors that turn any of them into bounded actions."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.nn import functional
 
 from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from workers.errors import NetworkError
-from workers.export.ros2.mapless_navigator.policy import Forward, evaluate
-from workers.kernels.constants import LEAKY_SLOPE
+from workers.export.ros2.mapless_navigator.policy import Forward
 from workers.networks.config import AddedFormulaNetworkConfig, GruNetwork, NetworkConfig
-from workers.networks.convolution import convolve
 from workers.networks.description import Description, describe
+from workers.networks.expressions import Expression, resolved, value_of
 from workers.networks.inputs import Inputs, as_inputs
 from workers.networks.recurrence import GruSequence
 from workers.networks.registry import build_of
@@ -41,11 +39,12 @@ class Described(nn.Module):
         self.config, self.memory_size = config, description.memory
         for name, shape in description.layers.items():
             self._place(name, nn.Linear(shape[1], shape[0]) if len(shape) == 2 else nn.Conv1d(shape[1], shape[0], shape[2]))
-        lines = Forward(description.lines).lines
+        parsed = Forward(description.lines).lines
         # Only what lies between goes step by step: not what comes before memory is looked at or after it is known.
-        uses = [index for index, (_, expression) in enumerate(lines) if _mentions(expression, "h")]
-        made = [index for index, (name, _) in enumerate(lines) if name == "h"]
-        first, last = (uses[0], made[-1] + 1) if made else (len(lines), len(lines))
+        uses = [index for index, (_, expression) in enumerate(parsed) if _mentions(expression, "h")]
+        made = [index for index, (name, _) in enumerate(parsed) if name == "h"]
+        first, last = (uses[0], made[-1] + 1) if made else (len(parsed), len(parsed))
+        lines = [(name, resolved(expression, self)) for name, expression in parsed]
         self._before, self._steps, self._after = lines[:first], lines[first:last], lines[last:]
 
     def forward(self, inputs: Tensor, memory: Tensor | None = None) -> Tensor | tuple[Tensor, Tensor]:
@@ -91,21 +90,10 @@ class Described(nn.Module):
             memories.append(memory)
         return torch.cat(memories)
 
-    def _run(self, lines: Sequence[tuple[str, Any]], values: dict[str, Any]) -> None:
+    @staticmethod
+    def _run(lines: Sequence[tuple[str, Expression]], values: dict[str, Any]) -> None:
         for name, expression in lines:
-            values[name] = evaluate(expression, values, self._compute)
-
-    def _compute(self, name: str, *arguments: Any) -> Tensor:
-        operator = _OPERATORS.get(name)
-        if operator is not None:
-            return operator(*arguments)
-        layer = self.get_submodule(name)
-        if isinstance(layer, nn.Conv1d):
-            values, stride, padding = arguments
-            assert layer.bias is not None
-            return convolve(values, layer.weight, layer.bias, stride, padding)
-        output: Tensor = layer(*arguments)
-        return output
+            values[name] = value_of(expression, values)
 
     def _place(self, name: str, layer: nn.Module) -> None:
         """Under 'name', or in the list 'name' of 'name.0', 'name.1'."""
@@ -123,21 +111,6 @@ def _mentions(expression: Any, name: str) -> bool:
     if isinstance(expression, tuple):
         return any(_mentions(argument, name) for argument in expression[1])
     return bool(expression == name)
-
-
-_OPERATORS: dict[str, Callable[..., Tensor]] = {
-    "relu": torch.relu,
-    "leaky_relu": lambda values: functional.leaky_relu(values, LEAKY_SLOPE),
-    "tanh": torch.tanh,
-    "sigmoid": torch.sigmoid,
-    "add": torch.add,
-    "subtract": torch.sub,
-    "multiply": torch.mul,
-    "concatenate": lambda *parts: torch.cat(parts, dim=1),
-    "columns": lambda values, start, end: values[:, start:end],
-    "channels": lambda values, count: values.reshape(len(values), count, -1),
-    "flatten": lambda values: values.flatten(1),
-}
 
 
 def build_network(config: NetworkConfig, inputs: Inputs | int, outputs: int) -> nn.Module:

@@ -38,15 +38,15 @@ def multiply_by_slope(
         if component.symmetric:
             # Through tanh, 1 - t^2, whose log slope has the derivative -2 t.
             column.mul_(1.0 - action.square())
-            falling = 2.0 * action
+            if entropy_weight is not None:
+                column.add_(entropy_weight * (2.0 * action))
         else:
             # Through the sigmoid, s (1 - s), whose log slope has the derivative 1 - 2 s.
             share = action if component.low == 0.0 else (action - component.low) / component.span
             slope = share * (1.0 - share)
             column.mul_(slope if component.low == 0.0 else component.span * slope)
-            falling = 2.0 * share - 1.0
-        if entropy_weight is not None:
-            column.add_(entropy_weight * falling)
+            if entropy_weight is not None:
+                column.add_(entropy_weight * (2.0 * share - 1.0))
 
 
 def log_slope(logits: Tensor, actions: ActionLayout = DEFAULT_ACTIONS) -> Tensor:
