@@ -52,6 +52,8 @@ from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
 from server.slow_clients import SlowClientMiddleware
+from server.studies import endpoints as studies
+from server.studies.advance import keep_studying
 from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.system.readiness import ReadinessProbe
@@ -86,6 +88,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     comparison.router,
     data_export.router,
     reproduction.router,
+    studies.router,
     events.router,
     live.router,
     worker_api.router,
@@ -105,7 +108,7 @@ _COMPRESS_LEVEL = 3
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied)
+BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied, keep_studying)
 
 
 def create_services(settings: Settings) -> Services:

@@ -27,6 +27,8 @@ RunState = Literal["queued", "running", "stopping", "stopped", "completed", "fai
 Role = Literal["viewer", "editor", "admin"]
 TokenScope = Literal["read", "launch", "admin"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+StudyState = Literal["running", "judging", "done", "stopped"]
+TrialState = Literal["running", "complete", "pruned", "failed", "stopped"]
 
 
 class Base(DeclarativeBase):
@@ -60,6 +62,8 @@ class Experiment(Base):
     # Of the paper's reproduction: experiments launched together share the first, the second names the table's row.
     campaign: Mapped[str | None] = mapped_column(String(16), index=True)
     campaign_row: Mapped[str | None] = mapped_column(String(64))
+    # Of the study that it is a trial of.
+    study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="SET NULL"), index=True)
     # Markdown.
     notes: Mapped[str | None] = mapped_column(Text)
     starred_at: Mapped[float | None] = mapped_column(Float)
@@ -76,6 +80,61 @@ class Experiment(Base):
 
 START_KEY = "start_from.name"
 """The key of what an experiment began with: a checkpoint's id, or a shipped policy's name."""
+
+
+class Study(Base):
+    """A training over ranges of settings, tried one after another.
+
+    (state, asked) is what whoever asks for the next trial compares and sets: two servers never ask for the same one.
+    """
+
+    __tablename__ = "studies"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    project_id: Mapped[str] = mapped_column(ForeignKey("projects.id"), index=True)
+    name: Mapped[str] = mapped_column(String(120))
+    # What is searched and how (`server.studies.schemas.StudySpec`).
+    spec: Mapped[dict[str, Any]] = mapped_column(JSON)
+    state: Mapped[StudyState] = mapped_column(String(12), default="running", index=True)
+    # Trials that it may have, and those that it has had.
+    budget: Mapped[int] = mapped_column(Integer)
+    asked: Mapped[int] = mapped_column(Integer, default=0)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    finished_at: Mapped[float | None] = mapped_column(Float)
+    # That its complete trials were measured on.
+    suite_hash: Mapped[str | None] = mapped_column(String(64))
+    # Share of each setting, by its path; null before there is anything to say.
+    importances: Mapped[dict[str, float] | None] = mapped_column(JSON(none_as_null=True))
+    # The trial whose settings were trained anew with fresh seeds, and that training; no foreign key: it may be deleted.
+    judged_trial: Mapped[int | None] = mapped_column(Integer)
+    judgement_id: Mapped[str | None] = mapped_column(String(16))
+
+
+class StudyTrial(Base):
+    """One choice of a study's settings, trained with every tuning seed."""
+
+    __tablename__ = "study_trials"
+
+    study_id: Mapped[str] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
+    # From 0.
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    # No foreign key: it may be deleted. Null where the settings make no training.
+    experiment_id: Mapped[str | None] = mapped_column(String(16))
+    state: Mapped[TrialState] = mapped_column(String(12), default="running")
+    # Value of each searched setting, by its path.
+    values: Mapped[dict[str, Any]] = mapped_column(JSON)
+    # Success rates at every evaluation, by seed (`server.studies.rules.SeedRungs`).
+    rungs: Mapped[dict[str, list[float | None]]] = mapped_column(JSON)
+    # Of a complete one.
+    success: Mapped[float | None] = mapped_column(Float)
+    seconds_to_target: Mapped[float | None] = mapped_column(Float)
+    score: Mapped[float | None] = mapped_column(Float)
+    # Seconds that its runs were trained for, together.
+    cost: Mapped[float | None] = mapped_column(Float)
+    # Why it was stopped early, or failed.
+    reason: Mapped[str | None] = mapped_column(Text)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+    finished_at: Mapped[float | None] = mapped_column(Float)
 
 
 class ExperimentKey(Base):

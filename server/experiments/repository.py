@@ -69,6 +69,11 @@ class ExperimentRepository:
                 raise NotFoundError.of("experiment", experiment_id)
         return [found[experiment_id] for experiment_id in experiment_ids]
 
+    def there(self, experiment_ids: Sequence[str]) -> Sequence[tables.Experiment]:
+        """Those of the experiments that are there and not in the trash."""
+        row = tables.Experiment
+        return self._session.scalars(select(row).where(row.id.in_(experiment_ids), row.deleted_at.is_(None))).all()
+
     def lock_runs(self, experiment_id: str) -> Sequence[tables.Run]:
         """The experiment's runs with the experiment itself, by seed, locked where the database has row locks.
 

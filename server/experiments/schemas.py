@@ -68,6 +68,7 @@ class Experiment(Schema):
     state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
     runs: list[Run] = Field(description="One a seed, by seed.")
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
+    study_id: str | None = Field(description="Of the study that it is a trial of; null for all others.")
     success: Estimate | None = Field(
         description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."
     )

@@ -30,8 +30,33 @@ from server.runs.views import SHOWN, run_view
 from server.security.principal import Principal
 from server.services import Services
 from workers.archive_size import refuse_too_large
+from workers.config import TrainingConfig
 from workers.errors import MemoryTooLargeError
 from workers.protocol import queues_of
+
+
+def launchable(services: Services, training: TrainingConfig, principal: Principal) -> TrainingConfig:
+    """The training as the database keeps it: with what it begins with, its extensions as they are here, without geometry.
+
+    Args:
+        services: of the application.
+        training: what is to be trained.
+        principal: who launches it, and so may begin with the policies that they may see.
+
+    Raises:
+        UnusableArenaError: it trains on an imported arena that is not here.
+        RefusedFieldError: its checkpoints would be larger than this installation takes, or the policy that it is to begin
+            with is not there, or does not fit.
+    """
+    try:
+        refuse_too_large(training, services.settings.max_checkpoint_bytes)
+    except MemoryTooLargeError as error:
+        raise RefusedFieldError(
+            ("body", "training", "algorithm", training.algorithm.name, "replay_size"), str(error)
+        ) from error
+    with services.database.read() as session:
+        started = with_start(training, session, services.files, principal)
+    return without_geometry(started.as_installed(), services.arenas)
 
 
 class ExperimentService:
@@ -50,19 +75,10 @@ class ExperimentService:
 
         Raises:
             NotFoundError: there is no such project.
-            UnusableArenaError: it trains on an imported arena that is not here.
-            RefusedFieldError: its checkpoints would be larger than this installation takes, or the policy that it is to
-                begin with is not there, or does not fit.
+            UnusableArenaError: as `launchable`.
+            RefusedFieldError: likewise.
         """
-        try:
-            refuse_too_large(request.training, self._services.settings.max_checkpoint_bytes)
-        except MemoryTooLargeError as error:
-            raise RefusedFieldError(
-                ("body", "training", "algorithm", request.training.algorithm.name, "replay_size"), str(error)
-            ) from error
-        with self._services.database.read() as session:
-            started = with_start(request.training, session, self._services.files, principal)
-        training = without_geometry(started.as_installed(), self._services.arenas)
+        training = launchable(self._services, request.training, principal)
         experiment = tables.Experiment(
             id=new_id(), project_id=request.project_id, name=request.name, training=training.model_dump(mode="json")
         )
@@ -161,6 +177,10 @@ class ExperimentService:
         """
         self._throw_away(lambda repository: repository.campaign(campaign_id))
 
+    def delete_those_of(self, experiment_ids: Sequence[str]) -> None:
+        """`delete` for all of these that are there."""
+        self._throw_away(lambda repository: repository.there(experiment_ids))
+
     def restore(self, experiment_id: str) -> None:
         """Take an experiment out of the trash; what was stopped then can be resumed.
 
@@ -246,6 +266,7 @@ def _views(session: Session, experiments: Sequence[tables.Experiment]) -> list[E
                 state=aggregate_state([run.state for run in experiment.runs]),
                 runs=[run_view(run, stored.training, latest.get(run.id, {})) for run in experiment.runs],
                 campaign=experiment.campaign,
+                study_id=experiment.study_id,
                 success=success_over_runs([final[run.id] for run in experiment.runs if run.id in final]),
             )
         )

@@ -42,7 +42,7 @@ class LeaderboardRepository:
         trained = (
             select(run.final_suite, name, func.count(run.experiment_id.distinct()))
             .join(tables.Experiment)
-            .where(run.final_suite.is_not(None), *self._seen())
+            .where(run.final_suite.is_not(None), tables.Experiment.study_id.is_(None), *self._seen())
             .group_by(run.final_suite)
         )
         found: dict[str, tuple[str, int]] = {}
@@ -63,7 +63,8 @@ class LeaderboardRepository:
     def trainings(self, suite_hash: str) -> list[Trained]:
         """The best trainings whose runs were measured on a suite, by the mean of their seeds' last success rates."""
         run, experiment = tables.Run, tables.Experiment
-        on_it = (run.final_suite == suite_hash, run.final_episodes > 0)
+        # The best of a study's trials is the luckiest too: they are left out, the training that judges it is not.
+        on_it = (run.final_suite == suite_hash, run.final_episodes > 0, experiment.study_id.is_(None))
         rate = func.avg(cast(run.final_arrivals, Float) / run.final_episodes)
         best = (
             select(experiment.id, experiment.name)
@@ -74,7 +75,11 @@ class LeaderboardRepository:
             .limit(MOST_ENTRIES)
         )
         names = {row[0]: row[1] for row in self._session.execute(best)}
-        runs = select(run.experiment_id, run.final_arrivals, run.final_episodes).where(run.experiment_id.in_(names), *on_it)
+        runs = (
+            select(run.experiment_id, run.final_arrivals, run.final_episodes)
+            .join(experiment)
+            .where(run.experiment_id.in_(names), *on_it)
+        )
         seeds: dict[str, list[tuple[int, int]]] = defaultdict(list)
         for experiment_id, arrivals, episodes in self._session.execute(runs.order_by(run.seed)):
             seeds[experiment_id].append((arrivals or 0, episodes or 0))

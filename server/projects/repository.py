@@ -91,6 +91,11 @@ class ProjectRepository:
         row = tables.UploadedPolicy
         return self._grouped(select(row.id, row.project_id).where(row.id.in_(upload_ids)))
 
+    def of_studies(self, study_ids: Collection[str]) -> dict[str, set[str]]:
+        """The project of each of the studies that there are, as a set."""
+        row = tables.Study
+        return self._grouped(select(row.id, row.project_id).where(row.id.in_(study_ids)))
+
     def of_evaluations(self, evaluation_ids: Collection[str]) -> dict[str, set[str]]:
         """The project of each of the evaluations that there are; none where its policy is everybody's.
 

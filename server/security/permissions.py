@@ -124,6 +124,7 @@ _OF: dict[str, tuple[str, _Find]] = {
     "campaign": ("campaign", ProjectRepository.of_campaigns),
     "upload_id": ("uploaded policy", ProjectRepository.of_uploads),
     "evaluation_id": ("evaluation", ProjectRepository.of_evaluations),
+    "study_id": ("study", ProjectRepository.of_studies),
 }
 
 

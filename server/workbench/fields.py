@@ -65,6 +65,7 @@ ATTRIBUTES: Mapping[str, Attribute] = {
     "success": Attribute("number", "Mean success rate of its runs' last evaluations, 0 to 1"),
     "worker": Attribute("text", "A worker that trains it now"),
     "campaign": Attribute("text", "Of the paper's reproduction"),
+    "study": Attribute("text", "The study that it is a trial of; a query lists trials only if it asks for this"),
 }
 
 
@@ -111,6 +112,19 @@ def condition(session: Session, node: Node) -> ColumnElement[bool]:
             return _comparison(session, node)
 
 
+def asks_for(node: Node, key: str) -> bool:
+    """Whether a query compares a key with anything."""
+    match node:
+        case Word():
+            return False
+        case Not(part):
+            return asks_for(part, key)
+        case All(parts) | AnyOf(parts):
+            return any(asks_for(part, key) for part in parts)
+        case Comparison(compared):
+            return compared.text == key
+
+
 def _comparison(session: Session, node: Comparison) -> ColumnElement[bool]:
     key = resolve(session, node.key)
     if node.operator == "!=":
@@ -135,7 +149,13 @@ def _condition_of(key: str) -> Callable[[Operator, Text], ColumnElement[bool]]:
         "seeds": lambda operator, value: _Experiment.id.in_(_having(_SEEDS, operator, value)),
         "success": lambda operator, value: _Experiment.id.in_(_having(_SUCCESS, operator, value)),
     }
-    columns = {"name": _Experiment.name, "id": _Experiment.id, "notes": _Experiment.notes, "campaign": _Experiment.campaign}
+    columns = {
+        "name": _Experiment.name,
+        "id": _Experiment.id,
+        "notes": _Experiment.notes,
+        "campaign": _Experiment.campaign,
+        "study": _Experiment.study_id,
+    }
     if key in columns:
         return lambda operator, value: _text(columns[key], operator, value)
     return special[key]
@@ -304,6 +324,7 @@ def values_of(session: Session, key: str) -> Select[str, Any]:
         "notes": _Experiment.notes,
         "created": _Experiment.created_at,
         "campaign": _Experiment.campaign,
+        "study": _Experiment.study_id,
         "starred": _Experiment.starred_at,
     }
     if key in columns:

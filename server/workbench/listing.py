@@ -100,6 +100,7 @@ def _row(
         progress=min(1.0, sum(run.step for run in runs) / max(1, total * len(runs))),
         seconds_left=seconds_left(paced),
         campaign=experiment.campaign,
+        study_id=experiment.study_id,
         success=success_over_runs([run.evaluation for run in runs if run.evaluation]),
         tags=tags,
         starred=experiment.starred_at is not None,

@@ -14,7 +14,7 @@ from server.database import tables
 from server.database.tables import RunState
 from server.errors import InvalidRequestError
 from server.experiments.schemas import ExperimentState
-from server.workbench.fields import condition, in_state, resolve, values_of
+from server.workbench.fields import asks_for, condition, in_state, resolve, values_of
 from server.workbench.language import Text, parse
 from server.workbench.schemas import Place
 
@@ -84,7 +84,11 @@ class WorkbenchRepository:
         Raises:
             QueryError: the query makes no sense.
         """
-        parts = [_in_place(wanted.place), condition(self._session, parse(wanted.query))]
+        query = parse(wanted.query)
+        parts = [_in_place(wanted.place), condition(self._session, query)]
+        if wanted.place == "live" and not asks_for(query, "study"):
+            # A study has hundreds of trials, and a page of its own.
+            parts.append(_Experiment.study_id.is_(None))
         if wanted.state is not None:
             parts.append(in_state(wanted.state))
         if wanted.project_id is not None:

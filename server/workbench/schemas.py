@@ -42,6 +42,7 @@ class ListedExperiment(Schema):
         description="Until its last run is through, those that wait included; null where that is not known."
     )
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
+    study_id: str | None = Field(description="Of the study that it is a trial of; null for all others.")
     success: Estimate | None = Field(
         description="Success rate of its runs' last evaluated checkpoints; null before the first evaluation."
     )

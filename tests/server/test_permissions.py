@@ -44,6 +44,7 @@ TABLE = {
         GET /api/training/form
         GET /api/training/starts
         GET /api/experiments
+        GET /api/studies
         GET /api/workbench/groups
         GET /api/queue
         GET /api/workers
@@ -78,6 +79,7 @@ TABLE = {
         POST /api/evaluations
         POST /api/uploads
         POST /api/reproduction
+        POST /api/studies
         POST /api/arenas/imported
     """,
     "invite": """
@@ -116,6 +118,7 @@ TABLE = {
         GET /api/compare
         GET /api/compare/curves
         GET /api/reproduction
+        GET /api/studies/{study_id}
         GET /live/{run_id}/
         GET /live/{run_id}/{theme}/
         SOCKET /live/{run_id}
@@ -139,6 +142,10 @@ TABLE = {
         DELETE /api/reproduction/{campaign_id}
         POST /api/reproduction/{campaign_id}/stop
         POST /api/reproduction/{campaign_id}/resume
+        POST /api/studies/{study_id}/stop
+        POST /api/studies/{study_id}/resume
+        POST /api/studies/{study_id}/extend
+        DELETE /api/studies/{study_id}
     """,
     "manage": """
         PATCH /api/projects/{project_id}
@@ -333,6 +340,9 @@ def everybody(
             Reports(client, services).measured(evaluation)
             onnx = {"name": "Mine", "project_id": here, "content": "AAAA", "task": {}}
             upload = client.post("/api/uploads", json=onnx).json()
+            searched = {"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}
+            wanted = {"name": "Search", "project_id": here, "training": {}, "settings": [searched]}
+            study = client.post("/api/studies", json=wanted).json()
             del client.headers["Authorization"]
             people = {role: lab.person(role, {here: role}) for role in get_args(Role)}
             people["foreigner"] = lab.person("foreigner", {elsewhere: "admin"})
@@ -360,6 +370,7 @@ def everybody(
                 "checkpoint_id": checkpoint,
                 "upload_id": upload["id"],
                 "evaluation_id": evaluation["id"],
+                "study_id": study["id"],
                 "campaign_id": campaign.json()["campaign"]["id"],
                 "theme": "light",
                 "step": "1",

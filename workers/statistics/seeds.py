@@ -161,6 +161,18 @@ def rates_band(rates: Floats, episodes: Floats | None = None, confidence: float 
     return mean, low, high
 
 
+def interquartile_mean(values: Sequence[float]) -> float:
+    """Mean without the lowest and the highest quarter, rounded down (Agarwal et al. 2021): of three values, of all.
+
+    Raises:
+        ValueError: there are no values.
+    """
+    if not values:
+        raise ValueError("there is no mean of nothing")
+    cut = len(values) // 4
+    return float(np.mean(sorted(values)[cut : len(values) - cut]))
+
+
 def _spread(values: Floats) -> Band:
     """How many seeds have a value, their mean, and its standard error, at each point."""
     present = np.isfinite(values)

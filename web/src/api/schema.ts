@@ -1729,6 +1729,114 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/studies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Studies
+         * @description Some of the studies, the newest first.
+         */
+        get: operations["list_studies_api_studies_get"];
+        put?: never;
+        /**
+         * Launch Study
+         * @description Search settings of a training, in a project.
+         */
+        post: operations["launch_study_api_studies_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/studies/{study_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Study
+         * @description A study with its trials.
+         */
+        get: operations["get_study_api_studies__study_id__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Study
+         * @description Forget a study; its trials go into the trash, the training that judged the best stays.
+         */
+        delete: operations["delete_study_api_studies__study_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/studies/{study_id}/extend": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Extend Study
+         * @description Give a study more trials; one that was done goes on.
+         */
+        post: operations["extend_study_api_studies__study_id__extend_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/studies/{study_id}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume Study
+         * @description Go on with a study that was stopped, and with its trials where they were.
+         */
+        post: operations["resume_study_api_studies__study_id__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/studies/{study_id}/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop Study
+         * @description Ask for no more trials, and stop those that go on.
+         */
+        post: operations["stop_study_api_studies__study_id__stop_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/training/form": {
         parameters: {
             query?: never;
@@ -4375,6 +4483,11 @@ export interface components {
              * @description Of its runs together; mixed where they ended differently.
              */
             state: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed";
+            /**
+             * Study Id
+             * @description Of the study that it is a trial of; null for all others.
+             */
+            study_id: string | null;
             /** @description Success rate of its runs' last evaluated checkpoints; null before the first evaluation. */
             success: components["schemas"]["Estimate"] | null;
             training: components["schemas"]["TrainingConfig-Output"];
@@ -5160,6 +5273,25 @@ export interface components {
             workers: number;
         };
         /**
+         * Judgement
+         * @description The best trial's settings, trained with seeds that the search never saw.
+         */
+        Judgement: {
+            /** Experiment Id */
+            experiment_id: string;
+            /** Seeds */
+            seeds: number[];
+            /** State */
+            state: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed";
+            /** @description Null before the first evaluation. */
+            success: components["schemas"]["Estimate"] | null;
+            /**
+             * Trial
+             * @description Whose settings were judged.
+             */
+            trial: number;
+        };
+        /**
          * Keyframe
          * @description Where a timed mover is at a time.
          */
@@ -5435,6 +5567,11 @@ export interface components {
              * @description That its runs are in, each once.
              */
             states: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed")[];
+            /**
+             * Study Id
+             * @description Of the study that it is a trial of; null for all others.
+             */
+            study_id: string | null;
             /** @description Success rate of its runs' last evaluated checkpoints; null before the first evaluation. */
             success: components["schemas"]["Estimate"] | null;
             /** Tags */
@@ -5462,6 +5599,75 @@ export interface components {
              * @description How many there are on all pages.
              */
             total: number;
+        };
+        /**
+         * ListedSetting
+         * @description A setting that takes one of a few values.
+         */
+        ListedSetting: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "list";
+            /**
+             * Path
+             * @description Of the setting in the training, dotted: "algorithm.learning_rate", "task.reward.terms.0.weight".
+             */
+            path: string;
+            /** Values */
+            values: (boolean | number | string)[];
+        };
+        /**
+         * ListedStudy
+         * @description A study as a list shows it.
+         */
+        ListedStudy: {
+            /**
+             * Asked
+             * @description That it has had, with those that go on.
+             */
+            asked: number;
+            /**
+             * Best Success
+             * @description Of the best trial, by its tuning seeds; null before one is complete.
+             */
+            best_success: number | null;
+            /** Complete */
+            complete: number;
+            /** Created At */
+            created_at: number;
+            /** Failed */
+            failed: number;
+            /** Finished At */
+            finished_at: number | null;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Project Id */
+            project_id: string;
+            /**
+             * Pruned
+             * @description Trials that were stopped early.
+             */
+            pruned: number;
+            /**
+             * Sampler
+             * @enum {string}
+             */
+            sampler: "tpe" | "random" | "quasi" | "grid";
+            /**
+             * State
+             * @description judging: all trials are through, and the best is trained with fresh seeds.
+             * @enum {string}
+             */
+            state: "running" | "judging" | "done" | "stopped";
+            /**
+             * Trials
+             * @description That it may have.
+             */
+            trials: number;
         };
         /**
          * ListedSuite
@@ -7110,6 +7316,70 @@ export interface components {
             rate: number[];
         };
         /**
+         * RangedSetting
+         * @description A number that may be anything between two others; whole where the setting is.
+         */
+        "RangedSetting-Input": {
+            /** High */
+            high: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "range";
+            /**
+             * Log
+             * @description Whether what counts is how many times as large, as with step sizes.
+             * @default false
+             */
+            log: boolean;
+            /** Low */
+            low: number;
+            /**
+             * Path
+             * @description Of the setting in the training, dotted: "algorithm.learning_rate", "task.reward.terms.0.weight".
+             */
+            path: string;
+            /**
+             * Points
+             * @description Values of it in a grid.
+             * @default 5
+             */
+            points: number;
+        };
+        /**
+         * RangedSetting
+         * @description A number that may be anything between two others; whole where the setting is.
+         */
+        "RangedSetting-Output": {
+            /** High */
+            high: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "range";
+            /**
+             * Log
+             * @description Whether what counts is how many times as large, as with step sizes.
+             * @default false
+             */
+            log: boolean;
+            /** Low */
+            low: number;
+            /**
+             * Path
+             * @description Of the setting in the training, dotted: "algorithm.learning_rate", "task.reward.terms.0.weight".
+             */
+            path: string;
+            /**
+             * Points
+             * @description Values of it in a grid.
+             * @default 5
+             */
+            points: number;
+        };
+        /**
          * RangesPart
          * @description What the LiDAR sees, from right to left: the nearest ray of each batch of neighbours.
          */
@@ -8512,6 +8782,225 @@ export interface components {
             workers: components["schemas"]["WorkerStatus"][];
         };
         /**
+         * Study
+         * @description A study with its trials.
+         */
+        Study: {
+            /**
+             * Asked
+             * @description That it has had, with those that go on.
+             */
+            asked: number;
+            /**
+             * Best
+             * @description Number of the best trial: success, then time to target.
+             */
+            best: number | null;
+            /**
+             * Best Success
+             * @description Of the best trial, by its tuning seeds; null before one is complete.
+             */
+            best_success: number | null;
+            /** Complete */
+            complete: number;
+            /** Created At */
+            created_at: number;
+            /** Failed */
+            failed: number;
+            /** Finished At */
+            finished_at: number | null;
+            /**
+             * Front
+             * @description Complete trials that no other one beats in both cost and success, by cost.
+             */
+            front: number[];
+            /** Id */
+            id: string;
+            /**
+             * Importances
+             * @description How much each setting had to do with being among the best (PED-ANOVA), together 1; null before that can be said.
+             */
+            importances: {
+                [key: string]: number;
+            } | null;
+            /** @description Null before all trials are through. */
+            judgement: components["schemas"]["Judgement"] | null;
+            /** Name */
+            name: string;
+            /**
+             * Progress
+             * @description Share of the trials that is through, those that go on by their steps; 0 to 1.
+             */
+            progress: number;
+            /** Project Id */
+            project_id: string;
+            /**
+             * Pruned
+             * @description Trials that were stopped early.
+             */
+            pruned: number;
+            /**
+             * Results
+             * @description By number.
+             */
+            results: components["schemas"]["Trial"][];
+            /**
+             * Rule
+             * @description By which trials are stopped early; null where none are.
+             */
+            rule: string | null;
+            /**
+             * Sampler
+             * @enum {string}
+             */
+            sampler: "tpe" | "random" | "quasi" | "grid";
+            /**
+             * Seconds Left
+             * @description Until the last trial is through; null where that is not known.
+             */
+            seconds_left: number | null;
+            spec: components["schemas"]["StudySpec"];
+            /**
+             * State
+             * @description judging: all trials are through, and the best is trained with fresh seeds.
+             * @enum {string}
+             */
+            state: "running" | "judging" | "done" | "stopped";
+            /**
+             * Trials
+             * @description That it may have.
+             */
+            trials: number;
+        };
+        /**
+         * StudyExtension
+         * @description More trials for a study.
+         */
+        StudyExtension: {
+            /**
+             * Trials
+             * @description To add.
+             */
+            trials: number;
+        };
+        /**
+         * StudyLaunch
+         * @description A study, and where it belongs.
+         */
+        StudyLaunch: {
+            /**
+             * At Once
+             * @description Trials that go on at the same time.
+             * @default 2
+             */
+            at_once: number;
+            /** Name */
+            name: string;
+            /**
+             * Project Id
+             * @description Of the project that it is launched into.
+             * @default default
+             */
+            project_id: string;
+            /**
+             * Sampler
+             * @description tpe goes on where trials did well (Bergstra et al. 2011); random, and quasi, which fills the space evenly, look at no results; grid takes each combination once.
+             * @default tpe
+             * @enum {string}
+             */
+            sampler: "tpe" | "random" | "quasi" | "grid";
+            /**
+             * Seed
+             * @description Of the sampler: the same trials with the same results lead to the same next one.
+             * @default 0
+             */
+            seed: number;
+            /**
+             * Seeds
+             * @description Of every trial, which count by their interquartile mean; the best is judged on 5 others.
+             * @default [
+             *       0,
+             *       1,
+             *       2
+             *     ]
+             */
+            seeds: number[];
+            /** Settings */
+            settings: (components["schemas"]["RangedSetting-Input"] | components["schemas"]["ListedSetting"])[];
+            /**
+             * Stop Early
+             * @description Whether trials that do worse than the median are stopped on their way.
+             * @default true
+             */
+            stop_early: boolean;
+            /** @description Whose other settings all trials share. */
+            training: components["schemas"]["TrainingConfig-Input"];
+            /**
+             * Trials
+             * @description That it may have.
+             * @default 30
+             */
+            trials: number;
+        };
+        /**
+         * StudyPage
+         * @description Some of the studies, the newest first.
+         */
+        StudyPage: {
+            /** Items */
+            items: components["schemas"]["ListedStudy"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
+         * StudySpec
+         * @description What is searched, and how.
+         */
+        StudySpec: {
+            /**
+             * At Once
+             * @description Trials that go on at the same time.
+             * @default 2
+             */
+            at_once: number;
+            /**
+             * Sampler
+             * @description tpe goes on where trials did well (Bergstra et al. 2011); random, and quasi, which fills the space evenly, look at no results; grid takes each combination once.
+             * @default tpe
+             * @enum {string}
+             */
+            sampler: "tpe" | "random" | "quasi" | "grid";
+            /**
+             * Seed
+             * @description Of the sampler: the same trials with the same results lead to the same next one.
+             * @default 0
+             */
+            seed: number;
+            /**
+             * Seeds
+             * @description Of every trial, which count by their interquartile mean; the best is judged on 5 others.
+             * @default [
+             *       0,
+             *       1,
+             *       2
+             *     ]
+             */
+            seeds: number[];
+            /** Settings */
+            settings: (components["schemas"]["RangedSetting-Output"] | components["schemas"]["ListedSetting"])[];
+            /**
+             * Stop Early
+             * @description Whether trials that do worse than the median are stopped on their way.
+             * @default true
+             */
+            stop_early: boolean;
+            /** @description Whose other settings all trials share. */
+            training: components["schemas"]["TrainingConfig-Output"];
+        };
+        /**
          * SuiteResult
          * @description A policy on a suite, beside what needs no training.
          */
@@ -9150,6 +9639,64 @@ export interface components {
              * @constant
              */
             source: "training";
+        };
+        /**
+         * Trial
+         * @description One choice of the settings, trained with every tuning seed.
+         */
+        Trial: {
+            /**
+             * Cost
+             * @description Seconds that its runs were trained for, together; null while it goes on.
+             */
+            cost: number | null;
+            /**
+             * Experiment Id
+             * @description Its training; null where the settings make none, or it was deleted.
+             */
+            experiment_id: string | null;
+            /**
+             * Number
+             * @description From 1, in the order of their launch.
+             */
+            number: number;
+            /**
+             * Progress
+             * @description Steps done by its runs over those that they were given, 0 to 1.
+             */
+            progress: number;
+            /**
+             * Reason
+             * @description Why it was stopped early or failed; null otherwise.
+             */
+            reason: string | null;
+            /**
+             * Rungs
+             * @description Success on the way over the seeds that had got there, by steps.
+             */
+            rungs: {
+                [key: string]: number;
+            };
+            /**
+             * Seconds To Target
+             * @description Of simulated time, likewise, of what arrived; null where none did.
+             */
+            seconds_to_target: number | null;
+            /**
+             * State
+             * @description pruned: stopped early; stopped: with the study, and resumed with it.
+             * @enum {string}
+             */
+            state: "running" | "complete" | "pruned" | "failed" | "stopped";
+            /**
+             * Success
+             * @description Interquartile mean over the seeds, 0 to 1; null unless it is complete.
+             */
+            success: number | null;
+            /** Values */
+            values: {
+                [key: string]: boolean | number | string;
+            };
         };
         /**
          * UploadedPolicy
@@ -14673,6 +15220,374 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_studies_api_studies_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    launch_study_api_studies_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StudyLaunch"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Study"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_study_api_studies__study_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Study"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_study_api_studies__study_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    extend_study_api_studies__study_id__extend_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StudyExtension"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Study"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    resume_study_api_studies__study_id__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Study"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    stop_study_api_studies__study_id__stop_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Study"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -109,6 +109,7 @@ export const experiment: Experiment = {
   lacking: [],
   state: 'running',
   campaign: null,
+  study_id: null,
   runs: [
     run,
     {
@@ -143,6 +144,7 @@ export const listed: ListedExperiment = {
   progress: 0.7,
   seconds_left: 12.9,
   campaign: null,
+  study_id: null,
   success: experiment.success,
   tags: [],
   starred: false,

@@ -1,0 +1,171 @@
+"""What a study searches: settings with the values that they may take, and the training that a choice of them makes."""
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from server.schemas import Schema
+from workers.config import TrainingConfig
+
+Value = bool | int | float | str
+Values = dict[str, Value]
+"""Of every searched setting, by its path."""
+
+MAX_SETTINGS = 20
+MAX_VALUES = 50
+
+_Path = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=160,
+        description='Of the setting in the training, dotted: "algorithm.learning_rate", "task.reward.terms.0.weight".',
+    ),
+]
+
+
+class RangedSetting(Schema):
+    """A number that may be anything between two others; whole where the setting is."""
+
+    kind: Literal["range"]
+    path: _Path
+    low: float
+    high: float
+    log: bool = Field(False, description="Whether what counts is how many times as large, as with step sizes.")
+    points: int = Field(5, ge=2, le=MAX_VALUES, description="Values of it in a grid.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(f"the range of {self.path} has to begin below its end")
+        if self.log and self.low <= 0:
+            raise ValueError(f"the range of {self.path} has to begin above 0 for a logarithmic scale")
+        return self
+
+
+class ListedSetting(Schema):
+    """A setting that takes one of a few values."""
+
+    kind: Literal["list"]
+    path: _Path
+    values: list[Value] = Field(min_length=2, max_length=MAX_VALUES)
+
+    @model_validator(mode="after")
+    def _differ(self) -> Self:
+        if len({(type(value), value) for value in self.values}) < len(self.values):
+            raise ValueError(f"the values of {self.path} have to differ")
+        return self
+
+
+SearchedSetting = Annotated[RangedSetting | ListedSetting, Field(discriminator="kind")]
+
+
+class UnusableSettingError(ValueError):
+    """A setting can't be searched.
+
+    Args:
+        path: of the setting.
+        message: why, and what would do.
+    """
+
+    def __init__(self, path: str, message: str) -> None:
+        super().__init__(message)
+        self.path = path
+        self.message = message
+
+
+@dataclass(frozen=True)
+class Space:
+    """The settings of a study over a training.
+
+    Attributes:
+        base: the training, in JSON, whose other settings all trials share.
+        settings: that are searched.
+    """
+
+    base: Mapping[str, Any]
+    settings: Sequence[RangedSetting | ListedSetting]
+
+    def is_whole(self, setting: RangedSetting) -> bool:
+        """Whether the setting takes whole numbers only."""
+        return isinstance(_value_at(self.base, setting.path), int)
+
+    def training(self, values: Values) -> TrainingConfig:
+        """The training with these values.
+
+        Raises:
+            ValidationError: they don't go together.
+        """
+        document = deepcopy(dict(self.base))
+        for path, value in values.items():
+            *outer, last = path.split(".")
+            place: Any = document
+            for key in outer:
+                place = _inside(place, key)
+            place[int(last) if isinstance(place, list) else last] = value
+        return TrainingConfig.model_validate(document)
+
+    def check(self) -> None:
+        """That every setting is there, and takes the values that it is to take.
+
+        Raises:
+            UnusableSettingError: one does not.
+        """
+        seen: set[str] = set()
+        for setting in self.settings:
+            if setting.path in seen:
+                raise UnusableSettingError(setting.path, "it can be searched only once")
+            seen.add(setting.path)
+            self._check_kind(setting)
+            values = [setting.low, setting.high] if isinstance(setting, RangedSetting) else setting.values
+            for value in values:
+                whole = isinstance(setting, RangedSetting) and self.is_whole(setting)
+                self._check_value(setting.path, int(value) if whole else value)
+
+    def _check_kind(self, setting: RangedSetting | ListedSetting) -> None:
+        path = setting.path
+        if path.startswith("task.arena."):
+            raise UnusableSettingError(path, "another arena is another measure: trials would not be comparable")
+        try:
+            value = _value_at(self.base, path)
+        except (KeyError, IndexError, TypeError, ValueError):
+            raise UnusableSettingError(path, "this training has no such setting") from None
+        if isinstance(value, dict | list) or path.rpartition(".")[2] == "name":
+            raise UnusableSettingError(path, "only numbers and choices can be searched")
+        if isinstance(setting, ListedSetting):
+            return
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UnusableSettingError(path, "a range is for numbers: list its values instead")
+        if isinstance(value, int) and not (setting.low.is_integer() and setting.high.is_integer()):
+            raise UnusableSettingError(path, "its range has to begin and end at whole numbers")
+
+    def _check_value(self, path: str, value: Value) -> None:
+        try:
+            self.training({path: value})
+        except ValidationError as error:
+            own = [problem for problem in error.errors() if _names(problem["loc"]) & {path.rpartition(".")[2]}]
+            # What others do not go with may go with others: such a trial fails, and says so.
+            if own:
+                raise UnusableSettingError(path, f"{value!r} is refused: {wording(error)}") from error
+
+
+def wording(error: ValidationError) -> str:
+    """What a training is refused for, in a line."""
+    return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.errors())[:500]
+
+
+def _names(location: tuple[int | str, ...]) -> set[str]:
+    return {str(part) for part in location[-1:]}
+
+
+def _value_at(document: Any, path: str) -> Any:
+    for key in path.split("."):
+        document = _inside(document, key)
+    return document
+
+
+def _inside(document: Any, key: str) -> Any:
+    return document[int(key) if isinstance(document, list) else key]
