@@ -22,8 +22,8 @@ from server.errors import ServiceError
 from server.listening import listen, local_url, login_url
 from server.security.secrets import load_secrets
 from server.settings import PROJECT_ROOT, Settings
+from workers.processes import usable_cores
 from workers.runtime.supervised import SUPERVISED
-from workers.runtime.worker import usable_cores
 
 # The whole of a stop takes less than 10 s: the trainings' checkpoints first, then the server, which takes them in.
 _WORKER_STOP_SECONDS = 7.5

@@ -16,6 +16,9 @@ from workers.networks.config import RecurrentNetworkConfig as RecurrentNetworkCo
 from workers.networks.config import ResBlockNetwork as ResBlockNetwork
 from workers.start import StartFrom
 
+Threads = Literal["auto", "1", "2"]
+"""Of one training; `workers.training.threads` says how many 'auto' is."""
+
 
 class PpoConfig(Frozen):
     """Proximal Policy Optimization (Schulman et al. 2017) with a Gaussian policy of bounded mean."""
@@ -284,6 +287,13 @@ class TrainingConfig(Frozen):
     evaluation: EvaluationConfig = Field(default_factory=EvaluationConfig, title="Evaluation")
     device: Literal["auto", "cpu", "cuda"] = Field(
         "cpu", title="Device", description="Small networks train fastest on a CPU core.", json_schema_extra=ADVANCED
+    )
+    threads: Threads = Field(
+        "auto",
+        title="Threads",
+        description="With 2, PPO's actor learns beside its critic; auto takes what other programs leave free. Results are "
+        "the same.",
+        json_schema_extra=ADVANCED,
     )
     start_from: StartFrom | None = Field(
         None,

@@ -1,7 +1,7 @@
 """What every algorithm offers the training loop."""
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,17 @@ class Algorithm(Protocol):
 
     def load_state(self, state: Arrays) -> None:
         """Continues where `state` was taken."""
+
+
+@runtime_checkable
+class Threaded(Protocol):
+    """An algorithm that can use several threads, with the same result bit for bit.
+
+    Attributes:
+        threads: of the next update.
+    """
+
+    threads: int
 
 
 def with_prefix(prefix: str, arrays: Arrays) -> dict[str, NDArray[np.generic]]:

@@ -1,7 +1,8 @@
 """The parameters of several modules as one vector: one kernel instead of one per layer, for Adam, clipping and averages."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from itertools import accumulate
 
 import numpy as np
 import torch
@@ -30,7 +31,7 @@ class FlatParameters:
             parameter.grad = self.gradients[span].view_as(parameter)
             offset = span.stop
         sizes = [sum(parameter.numel() for parameter in module.parameters()) for module in modules]
-        self._module_gradients: Sequence[Tensor] = torch.split(self.gradients, sizes)
+        self._modules = [slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)]
 
     def differentiate(self, loss: Tensor) -> None:
         """Overwrites `gradients` with those of a scalar, by autograd; other parameters get none."""
@@ -49,10 +50,15 @@ class FlatParameters:
 
     def clip_gradients(self, max_norm: float) -> None:
         """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
-        for gradient in self._module_gradients:
-            if gradient.device.type == "cpu":
-                clip_norm(gradient.numpy(), max_norm)
-                continue
+        for module in range(len(self._modules)):
+            self.clip_gradient(module, max_norm)
+
+    def clip_gradient(self, module: int, max_norm: float) -> None:
+        """The same for one module, by its place."""
+        gradient = self.gradients[self._modules[module]]
+        if gradient.device.type == "cpu":
+            clip_norm(gradient.numpy(), max_norm)
+        else:
             gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
 
 
@@ -65,27 +71,37 @@ class FlatAdam(FlatParameters):
     def __init__(self, *modules: nn.Module, learning_rate: float) -> None:
         super().__init__(*modules)
         self.learning_rate = learning_rate
-        self._steps = 0
+        self._steps = [0] * len(modules)
         self._mean = torch.zeros_like(self.values)
         self._square = torch.zeros_like(self.values)
 
     @torch.no_grad()
     def step(self) -> None:
         """One step against `gradients`."""
-        self._steps += 1
-        # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
-        correction = math.sqrt(1.0 - BETA2**self._steps)
-        rate, epsilon = self.learning_rate * correction / (1.0 - BETA1**self._steps), correction * EPSILON
-        if self.values.device.type == "cpu":
-            values, gradients = self.values.numpy(), self.gradients.numpy()
-            adam_step(values, gradients, self._mean.numpy(), self._square.numpy(), rate, epsilon)
-        else:
-            self._step_in_tensors(rate, epsilon)
+        self._steps = [steps + 1 for steps in self._steps]
+        self._move(slice(None), self._steps[0])
 
-    def _step_in_tensors(self, rate: float, epsilon: float) -> None:
-        self._mean.lerp_(self.gradients, 1.0 - BETA1)
-        self._square.mul_(BETA2).addcmul_(self.gradients, self.gradients, value=1.0 - BETA2)
-        self.values.addcdiv_(self._mean, torch.sqrt(self._square).add_(epsilon), value=-rate)
+    @torch.no_grad()
+    def step_of(self, module: int) -> None:
+        """The same for one module, by its place; all must have come as far before `step` or `state`."""
+        self._steps[module] += 1
+        self._move(self._modules[module], self._steps[module])
+
+    def _move(self, part: slice, steps: int) -> None:
+        # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
+        correction = math.sqrt(1.0 - BETA2**steps)
+        rate, epsilon = self.learning_rate * correction / (1.0 - BETA1**steps), correction * EPSILON
+        if self.values.device.type == "cpu":
+            vectors = (self.values, self.gradients, self._mean, self._square)
+            adam_step(*(vector.numpy()[part] for vector in vectors), rate, epsilon)
+        else:
+            self._step_in_tensors(part, rate, epsilon)
+
+    def _step_in_tensors(self, part: slice, rate: float, epsilon: float) -> None:
+        values, gradients, mean, square = self.values[part], self.gradients[part], self._mean[part], self._square[part]
+        mean.lerp_(gradients, 1.0 - BETA1)
+        square.mul_(BETA2).addcmul_(gradients, gradients, value=1.0 - BETA2)
+        values.addcdiv_(mean, torch.sqrt(square).add_(epsilon), value=-rate)
 
     def descend(self, loss: Tensor) -> None:
         """One step against the gradient of a scalar, by autograd."""
@@ -95,11 +111,11 @@ class FlatAdam(FlatParameters):
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Parameters and moments, for `load_state`."""
         tensors = {"values": self.values, "mean": self._mean, "square": self._square}
-        return {name: tensor.cpu().numpy().copy() for name, tensor in tensors.items()} | {"steps": np.array(self._steps)}
+        return {name: tensor.cpu().numpy().copy() for name, tensor in tensors.items()} | {"steps": np.array(self._steps[0])}
 
     @torch.no_grad()
     def load_state(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Continues where `state` was taken."""
         for name, tensor in (("values", self.values), ("mean", self._mean), ("square", self._square)):
             tensor.copy_(torch.from_numpy(np.array(state[name], np.float32)))
-        self._steps = int(state["steps"])
+        self._steps = [int(state["steps"])] * len(self._steps)

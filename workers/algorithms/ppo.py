@@ -9,7 +9,8 @@ layers (14), orthogonal initialisation (2).
 Read `workers.algorithms.plain_ppo` first: the same on one page.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import torch
@@ -22,8 +23,9 @@ from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
 from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
 from workers.algorithms.storage.return_scaler import ReturnScaler
-from workers.algorithms.storage.rollout import RolloutStorage, generalized_advantages
+from workers.algorithms.storage.rollout import RolloutStorage, Samples, generalized_advantages
 from workers.config import PpoConfig, RecurrentNetworkConfig
+from workers.kernels.ppo import ACTOR, CRITIC
 from workers.networks.compiled import inference, is_compiled
 from workers.networks.inputs import Inputs, as_inputs
 from workers.networks.modules import Described, GaussianActor, build_network, take_weights
@@ -45,6 +47,9 @@ class Ppo:
         storage: for one rollout of `config.rollout_steps` steps of `config.robots` robots.
         generator: of exploration and of the order of minibatches, on the same device.
         gradients: how a minibatch's gradients are computed; None is the fastest way that there is.
+
+    Attributes:
+        threads: of an update; with 2 the actor learns beside the critic where compiled passes are known, bit for bit alike.
     """
 
     def __init__(
@@ -64,6 +69,7 @@ class Ppo:
         self._gradients = gradients or fastest_gradients(config, actor, critic)
         self._logits, self._values = inference(actor.network, config.robots), inference(critic, config.robots)
         self._scaler = ReturnScaler(config.robots, config.gamma)
+        self.threads = 1
 
     @torch.no_grad()
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -102,17 +108,14 @@ class Ppo:
         normalised = (advantages - advantages.mean()) / (advantages.std() + _EPSILON)
         samples = storage.samples(log_prob(storage.noise, self.actor.log_std), normalised, returns)
 
-        totals, minibatches = torch.zeros(4, dtype=torch.float64, device=storage.device), 0
-        for _ in range(config.epochs):
-            for minibatch in self.minibatches():
-                totals += self._gradients(samples, minibatch)
-                self._optimizer.clip_gradients(config.max_grad_norm)
-                self._optimizer.step()
-                self.actor.log_std.clamp_(*LOG_STD_RANGE)
-                minibatches += 1
+        minibatches = [minibatch for _ in range(config.epochs) for minibatch in self.minibatches()]
+        if self.threads > 1 and isinstance(self._gradients, WrittenPpo):
+            totals = self._learn_side_by_side(self._gradients, samples, minibatches)
+        else:
+            totals = self._learn(samples, minibatches)
         storage.clear()
 
-        policy_loss, value_loss, kl, clip_fraction = (totals / minibatches).tolist()
+        policy_loss, value_loss, kl, clip_fraction = (totals / len(minibatches)).tolist()
         deviations = zip(self.actor.actions.names, self.actor.log_std.exp().tolist(), strict=True)
         return {
             "loss/policy": policy_loss,
@@ -124,6 +127,37 @@ class Ppo:
             "value/explained_variance": explained_variance,
             "optim/learning_rate": self._optimizer.learning_rate,
         }
+
+    def _learn(self, samples: Samples, minibatches: Iterable[torch.Tensor]) -> torch.Tensor:
+        """One step of both networks for each minibatch; the sums (4,) of what `PpoGradients` returns."""
+        totals = torch.zeros(4, dtype=torch.float64, device=self.storage.device)
+        for minibatch in minibatches:
+            totals += self._gradients(samples, minibatch)
+            self._optimizer.clip_gradients(self.config.max_grad_norm)
+            self._optimizer.step()
+            self.actor.log_std.clamp_(*LOG_STD_RANGE)
+        return totals
+
+    def _learn_side_by_side(
+        self, gradients: WrittenPpo, samples: Samples, minibatches: Iterable[torch.Tensor]
+    ) -> torch.Tensor:
+        """The same bit for bit on two threads: neither network's gradients, clipping or steps look at the other's."""
+
+        @torch.no_grad()  # of this thread alone
+        def learn(whose: int, module: int) -> torch.Tensor:
+            totals = torch.zeros(4, dtype=torch.float64)
+            for minibatch in minibatches:
+                totals += gradients.of(whose, samples, minibatch)
+                self._optimizer.clip_gradient(module, self.config.max_grad_norm)
+                self._optimizer.step_of(module)
+                if whose == ACTOR:
+                    self.actor.log_std.clamp_(*LOG_STD_RANGE)
+            return totals
+
+        # Made anew each time: a thread flushes denormal numbers as the one did that started it.
+        with ThreadPoolExecutor(1, "critic") as another:
+            critic = another.submit(learn, CRITIC, 1)
+            return learn(ACTOR, 0) + critic.result()
 
     def minibatches(self) -> Iterator[torch.Tensor]:
         """The rows of the rollout's samples once, in a new order."""

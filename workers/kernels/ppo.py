@@ -16,16 +16,20 @@ _ONE, _TWO = np.float32(1.0), np.float32(2.0)
 STATISTICS = 4
 """Numbers that are added up: policy loss, value loss, estimate of KL(old, new), clipped fraction."""
 
+ACTOR, CRITIC, BOTH = 1, 2, 3
+"""Whose gradients: they share nothing, so two threads may take one each."""
+
 
 @kernel(allocates=True)
-def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, clip_range, grad_log_std, statistics):
-    """Overwrite the gradients of both networks' parameters.
+def differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lows, clip_range, grad_log_std, statistics):
+    """Overwrite the gradients of both networks' parameters, or of one's.
 
     Some rows at a time are gathered, and go through both networks forward and backward while a core's cache holds them.
 
     Args:
         actor: `workers.kernels.networks.Passes`.
         critic: likewise.
+        whose: `ACTOR`, `CRITIC` or `BOTH`; of another one nothing is read or written.
         samples: the arrays of `workers.algorithms.storage.rollout.Samples`, in their order.
         minibatch: (n,) rows of the samples.
         at_once: rows, at most as many as both networks have buffers for.
@@ -43,15 +47,17 @@ def differentiate(actor, critic, samples, minibatch, at_once, log_std, lows, cli
         some = minibatch[first : first + at_once]
         rows, again = some.shape[0], first > 0
         observations = all_observations[some]
-        logits = forward(actor, observations, again)
-        differentiate_policy_loss(
-            logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, lows, clip_range,
-            share, grad_logits, grad_log_std, statistics,
-        )  # fmt: skip
-        backward(actor, observations, grad_logits[:rows], again)
-        values = forward(critic, observations, again)
-        differentiate_value_loss(values, all_returns[some], share, grad_values, statistics)
-        backward(critic, observations, grad_values[:rows], again)
+        if whose & ACTOR:
+            logits = forward(actor, observations, again)
+            differentiate_policy_loss(
+                logits, all_actions[some], all_log_probs[some], all_advantages[some], log_std, lows, clip_range,
+                share, grad_logits, grad_log_std, statistics,
+            )  # fmt: skip
+            backward(actor, observations, grad_logits[:rows], again)
+        if whose & CRITIC:
+            values = forward(critic, observations, again)
+            differentiate_value_loss(values, all_returns[some], share, grad_values, statistics)
+            backward(critic, observations, grad_values[:rows], again)
 
 
 @kernel(allocates=True)

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from sim.parts import require
 from workers.errors import UnfitError
 from workers.logs import configure
+from workers.processes import usable_cores
 from workers.protocol import Queue
 from workers.runtime.companion import Companion
 from workers.runtime.fitness import make_private
@@ -133,11 +134,6 @@ def _jobs_command(count: int) -> list[str]:
 
 def _log_json(**_: Any) -> None:
     configure("json")
-
-
-def usable_cores() -> int:
-    """The processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _environment(settings: WorkerSettings) -> dict[str, str]:

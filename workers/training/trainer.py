@@ -19,7 +19,7 @@ from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout
 from sim.suites import suite_for
 from workers.algorithms import build_algorithm
-from workers.algorithms.base import with_prefix, without_prefix
+from workers.algorithms.base import Threaded, with_prefix, without_prefix
 from workers.archive_size import refuse_too_large
 from workers.checkpoints import (
     Checkpoint,
@@ -42,6 +42,7 @@ from workers.start import StartFrom
 from workers.training.drives import drive
 from workers.training.evaluation import evaluate, evaluation_metrics
 from workers.training.metrics import TrainingMetrics
+from workers.training.threads import ThreadCount
 
 TrainingOutcome = Literal["completed", "stopped"]
 
@@ -123,6 +124,7 @@ class Training:
         self.actions = action_layout(config.task.robot)
         device = torch.device(config.device)
         self.algorithm = build_algorithm(config.algorithm, self.inputs, seed, device, self.actions)
+        self.threads = ThreadCount(config.threads)
         self.task = with_maps_of(config.task, seed)
         self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
         self.observations, _ = self.env.reset(seed=seed)
@@ -175,6 +177,8 @@ class Training:
 
     def update(self) -> None:
         """One update of the algorithm."""
+        if isinstance(self.algorithm, Threaded):
+            self.algorithm.threads = self.threads.now()
         with self.metrics.phase("update"):
             diagnostics = self.algorithm.update(self.updates / self.total_updates)
             self.updates += 1

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from workers.algorithms.storage.rollout import Samples
-from workers.kernels.ppo import LOG_SQRT_2PI, STATISTICS, differentiate
+from workers.kernels.ppo import ACTOR, BOTH, LOG_SQRT_2PI, STATISTICS, differentiate
 from workers.networks.compiled import ROWS_AT_ONCE, passes_of
 from workers.networks.modules import GaussianActor
 
@@ -91,11 +91,16 @@ class WrittenPpo:
 
     def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
+        return self.of(BOTH, samples, rows)
+
+    def of(self, whose: int, samples: Samples, rows: Tensor) -> Tensor:
+        """The same for the `ACTOR` or the `CRITIC` alone, perhaps while another thread does the other; its numbers are 0."""
         statistics, grad_log_std = np.zeros(STATISTICS), np.full(len(self._lows), -self._entropy_coefficient)
         arrays = tuple(column.numpy() for column in samples)
         differentiate(
-            self._actor, self._critic, arrays, rows.numpy(), ROWS_AT_ONCE,
+            self._actor, self._critic, whose, arrays, rows.numpy(), ROWS_AT_ONCE,
             self._log_std, self._lows, self._clip_range, grad_log_std, statistics,
         )  # fmt: skip
-        self._grad_log_std[:] = grad_log_std
+        if whose & ACTOR:
+            self._grad_log_std[:] = grad_log_std
         return torch.from_numpy(statistics)
