@@ -34,7 +34,9 @@ def main() -> None:
         trainings = {}
         for name, network in CASES.items():
             algorithm = PpoConfig(network=network)
-            config = TrainingConfig(algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER))
+            config = TrainingConfig(
+                algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER), threads="1"
+            )
             trainings[name] = Training(config, 0, Silent(), Path(directory), Unwatched(), REPORT_INTERVAL)
         # The first segment warms caches, allocators and optimisers up.
         segments = [

@@ -19,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from benchmarks.report import finish, parser
 
@@ -40,6 +41,7 @@ def measure() -> dict[str, float]:
 
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
+    one_thread: dict[str, Any] = {"threads": "1"} if "threads" in TrainingConfig.model_fields else {}
     rates: dict[str, float] = {}
     for robots in _ROBOTS:
         step, _ = sim_throughput.ours(robots)
@@ -50,12 +52,13 @@ def measure() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         for case in _CASES:
             algorithm = training_throughput.CASES[case]
-            config = TrainingConfig(algorithm=algorithm, steps=never, evaluation=EvaluationConfig(every_steps=never))
+            evaluation = EvaluationConfig(every_steps=never)
+            config = TrainingConfig(algorithm=algorithm, steps=never, evaluation=evaluation, **one_thread)
             training = training_of(config, 0, silent(), Path(folder) / case, unwatched(), interval)
             steps = training_throughput.SEGMENT_STEPS[algorithm.name]
             rate(training, steps)
             rates[f"training_throughput, {case}"] = rate(training, steps)
-        config = time_to_success.configuration("ppo")
+        config = time_to_success.configuration("ppo").model_copy(update=one_thread)
         training = training_of(config, 0, silent(), Path(folder) / "success", unwatched(), interval)
         started = time.process_time()
         while training.step < _SUCCESS_STEPS:

@@ -52,6 +52,7 @@ def configuration(algorithm: str) -> TrainingConfig:
             "algorithm": {"name": algorithm},
             "steps": STEPS[algorithm],
             "evaluation": EvaluationConfig(every_steps=NEVER),
+            "threads": "1",
         }
     )
 

@@ -63,7 +63,9 @@ def main() -> None:
         algorithm = CASES[case]
         if isinstance(algorithm, PpoConfig):
             algorithm = PpoConfig.model_validate(algorithm.model_dump() | arguments.ppo)
-        config = TrainingConfig(algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER))
+        config = TrainingConfig(
+            algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER), threads="1"
+        )
         steps = SEGMENT_STEPS[algorithm.name]
         with tempfile.TemporaryDirectory() as directory:
             training = Training(config, 0, Silent(), Path(directory), Unwatched(), REPORT_INTERVAL)

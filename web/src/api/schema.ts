@@ -9574,6 +9574,13 @@ export interface components {
             steps: number;
             /** Task */
             task?: components["schemas"]["TaskConfig-Input"];
+            /**
+             * Threads
+             * @description With 2, PPO's actor learns beside its critic; auto takes what other programs leave free. Results are the same.
+             * @default auto
+             * @enum {string}
+             */
+            threads: "auto" | "1" | "2";
         };
         /**
          * TrainingConfig
@@ -9610,6 +9617,13 @@ export interface components {
             steps: number;
             /** Task */
             task: components["schemas"]["TaskConfig-Output"];
+            /**
+             * Threads
+             * @description With 2, PPO's actor learns beside its critic; auto takes what other programs leave free. Results are the same.
+             * @default auto
+             * @enum {string}
+             */
+            threads: "auto" | "1" | "2";
         };
         /**
          * TrainingForm
