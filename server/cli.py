@@ -2,6 +2,8 @@
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -129,6 +131,46 @@ def doctor(
         raise typer.Exit(1)
 
 
+@app.command()
+def backup(file: Annotated[Path, typer.Argument(help="To be written.")], data_dir: DataDir = None) -> None:
+    """Write everything that can't be made again into one file, while the service runs."""
+    settings = _settings(data_dir=data_dir)
+    from server.keeping.backup import back_up
+
+    with _refusals():
+        back_up(settings, file.absolute(), typer.echo)
+
+
+@app.command()
+def restore(
+    file: Annotated[Path, typer.Argument(help="That `mapless backup` wrote.")],
+    replace: Annotated[bool, typer.Option("--replace", help="Give up what is there.")] = False,
+    data_dir: DataDir = None,
+) -> None:
+    """Bring back what a backup holds; the service must not run."""
+    settings = _settings(data_dir=data_dir)
+    from server.keeping.restore import restore as bring_back
+
+    with _refusals():
+        bring_back(settings, file, typer.echo, replace=replace)
+
+
+@app.command()
+def move(
+    source: Annotated[str, typer.Argument(metavar="FROM", help="URL of the database to read: sqlite:///data/mapless.db")],
+    target: Annotated[str, typer.Argument(metavar="TO", help="URL of an empty one: postgresql+psycopg://...")],
+    while_running: Annotated[
+        bool, typer.Option("--while-running", help="Leave out what a server writes from now on.")
+    ] = False,
+) -> None:
+    """Take every row from one database to another, and compare them."""
+    os.umask(0o077)
+    from server.keeping.move import move as take_over
+
+    with _refusals():
+        take_over(source, target, typer.echo, while_running=while_running)
+
+
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
 def train(context: typer.Context) -> None:
     """Train without the service, with a progress bar."""
@@ -184,6 +226,21 @@ def _settings(**given: Any) -> "Settings":
             name = f"MAPLESS_{problem['loc'][0]}: ".upper() if problem["loc"] else ""
             sys.stderr.write(f"mapless: {name}{problem['msg'].removeprefix('Value error, ')}\n")
         raise typer.Exit(1) from None
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """What stands in the way of a database's or a store's work is said in a line."""
+    from sqlalchemy.exc import ArgumentError, OperationalError
+
+    from server.errors import ServiceError
+
+    try:
+        yield
+    except OperationalError as error:
+        _refuse(str(error.orig).splitlines()[0])
+    except (ArgumentError, OSError, ServiceError) as error:
+        _refuse(str(error))
 
 
 def _refuse(message: str) -> NoReturn:

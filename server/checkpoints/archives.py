@@ -15,6 +15,7 @@ from sqlalchemy import Select, delete, select, update
 from sqlalchemy.orm import Session
 
 from server.background import kept_up
+from server.checkpoints.hold import removing
 from server.database import tables
 from server.services import Services
 
@@ -69,20 +70,23 @@ def _begun_with() -> Select[str | None]:
     return select(key.text).where(key.key == tables.START_KEY, key.text.is_not(None))
 
 
-def remove_archives(services: Services, archive_ids: Collection[str]) -> None:
-    """Remove what is doomed from the store, then forget it; blocks."""
-    for archive_id in archive_ids:
-        services.files.delete(archive_id)
+def remove_archives(services: Services, archive_ids: Collection[str]) -> int:
+    """Remove what is doomed from the store, then forget it; none while a backup needs it. How many; blocks."""
+    with removing(services.settings.data_dir) as allowed:
+        if not allowed:
+            return 0
+        for archive_id in archive_ids:
+            services.files.delete(archive_id)
     with services.database.write() as session:
         LooseArchives(session).forget(archive_ids)
+    return len(archive_ids)
 
 
 def sweep_archives(services: Services, now: float) -> int:
-    """Remove what has been loose for too long; how many there were. Blocks."""
+    """Remove what has been loose for too long; how many were removed. Blocks."""
     with services.database.write() as session:
         doomed = LooseArchives(session).doom_older(now - GRACE_SECONDS)
-    remove_archives(services, doomed)
-    return len(doomed)
+    return remove_archives(services, doomed)
 
 
 @asynccontextmanager

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sqlalchemy import inspect, text
+from sqlalchemy import Connection, inspect, text
 from sqlalchemy.exc import OperationalError
 
 from server.database.engine import Database
@@ -30,7 +30,7 @@ class UnreachableDatabaseError(ServiceError):
 
 def head() -> str:
     """The newest revision: migrations are numbered, and their files begin with their number."""
-    return max(path.name.partition("_")[0] for path in (_SCRIPTS / "versions").glob("[0-9]*.py"))
+    return known_revisions()[-1]
 
 
 def upgrade(database: Database, wait_seconds: float = 0.0) -> None:
@@ -68,12 +68,26 @@ def upgrade(database: Database, wait_seconds: float = 0.0) -> None:
 
 def migration_config(database: Database) -> "Config":
     """Alembic's configuration for this database; there is no alembic.ini that could disagree with the settings."""
-    from alembic.config import Config
+    return _config(database=database)
 
-    config = Config()
-    config.set_main_option("script_location", str(_SCRIPTS))
-    config.attributes["database"] = database
-    return config
+
+def known_revisions() -> list[str]:
+    """The revisions that lead to this version's tables, the oldest first."""
+    return sorted(path.name.partition("_")[0] for path in (_SCRIPTS / "versions").glob("[0-9]*.py"))
+
+
+def bring(connection: Connection, to: str) -> None:
+    """Bring the tables to a revision that they have not seen, within the caller's transaction (`rebuilding`)."""
+    from alembic import command
+
+    command.upgrade(_config(connection=connection), to)
+
+
+def tear_down(connection: Connection) -> None:
+    """Take every migration back, and with it every table and row, within the caller's transaction (`rebuilding`)."""
+    from alembic import command
+
+    command.downgrade(_config(connection=connection), "base")
 
 
 def revision(database: Database) -> str | None:
@@ -83,6 +97,15 @@ def revision(database: Database) -> str | None:
             return None
         revision: str | None = session.scalar(text("SELECT version_num FROM alembic_version"))
         return revision
+
+
+def _config(**attributes: object) -> "Config":
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(_SCRIPTS))
+    config.attributes.update(attributes)
+    return config
 
 
 def _run_migrations(database: Database) -> None:

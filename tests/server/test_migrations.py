@@ -9,11 +9,13 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import JSON, Column, MetaData, func, inspect, select, text
+from sqlalchemy import inspect, text
 
 from server.database.engine import Database
 from server.database.migrate import IncompatibleDatabaseError, head, migration_config, upgrade
+from server.database.rebuilding import HangingRowsError
 from server.database.tables import Base
+from tests.server.filling import fill, rows
 
 
 @pytest.fixture
@@ -66,42 +68,6 @@ def revisions(database: Database) -> list[str]:
     return [script.revision for script in scripts.walk_revisions()][::-1]
 
 
-def fill(database: Database) -> None:
-    """Two rows in every table that has fewer, each hanging on the row of the same number in the tables above it."""
-    metadata = MetaData()
-    with database.engine.begin() as connection:
-        metadata.reflect(connection)
-        for table in metadata.sorted_tables:
-            if table.name == "alembic_version" or (connection.scalar(select(func.count()).select_from(table)) or 0) > 1:
-                continue
-            for number in (1, 2):
-                connection.execute(table.insert().values({c.name: some_value(c, number) for c in table.columns}))
-
-
-def some_value(column: Column[Any], number: int) -> object:
-    if column.foreign_keys:
-        (key,) = column.foreign_keys
-        column = key.column
-    if isinstance(column.type, JSON):
-        return {}
-    kind = column.type.python_type
-    if kind is str:
-        return f"{number}-{column.table.name}"[: getattr(column.type, "length", None) or 1_000]
-    return {int: number, float: number / 4, bool: True, bytes: bytes([number])}[kind]
-
-
-def rows(database: Database) -> dict[str, list[dict[str, Any]]]:
-    """All rows of all tables, by the table's name, in the order of their first column."""
-    metadata = MetaData()
-    with database.engine.begin() as connection:
-        metadata.reflect(connection)
-        return {
-            table.name: [dict(row) for row in connection.execute(table.select().order_by(*table.primary_key)).mappings()]
-            for table in metadata.sorted_tables
-            if table.name != "alembic_version"
-        }
-
-
 def kept(before: dict[str, list[dict[str, Any]]], after: dict[str, list[dict[str, Any]]]) -> None:
     """Every row of a table that is in both is there, with what its columns held."""
     for name in before.keys() & after.keys():
@@ -147,7 +113,7 @@ def test_a_migration_that_leaves_rows_hanging_on_nothing_is_taken_back(tmp_path:
         connection.commit()
         connection.connection.dbapi_connection.execute("PRAGMA foreign_keys=ON")
 
-    with pytest.raises(IncompatibleDatabaseError, match="runs"):
+    with pytest.raises(HangingRowsError, match="runs"):
         command.downgrade(migration_config(database), "-1")
     assert len(rows(database)["runs"]) == 2
     with database.read() as session:
