@@ -130,8 +130,13 @@ class CheckpointRepository:
             raise NotFoundError(f"Checkpoint {checkpoint_id} has not been evaluated.")
         return evaluation
 
-    def final_evaluations(self, run_ids: Collection[str]) -> dict[str, tables.Evaluation]:
-        """The evaluation of each run's last evaluated checkpoint, by run (their episodes are left in the database)."""
+    def final_evaluations(self, run_ids: Collection[str], *, with_episodes: bool = False) -> dict[str, tables.Evaluation]:
+        """The evaluation of each run's last evaluated checkpoint, by run.
+
+        Args:
+            run_ids: of the runs.
+            with_episodes: whether to read their episodes at once; else they are left in the database.
+        """
         last = (
             select(tables.Checkpoint.run_id, func.max(tables.Checkpoint.step).label("step"))
             .join(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
@@ -143,7 +148,7 @@ class CheckpointRepository:
             select(tables.Checkpoint.run_id, tables.Evaluation)
             .join(tables.Evaluation, tables.Evaluation.checkpoint_id == tables.Checkpoint.id)
             .join(last, (last.c.run_id == tables.Checkpoint.run_id) & (last.c.step == tables.Checkpoint.step))
-            .options(defer(tables.Evaluation.episodes))
+            .options(*(() if with_episodes else (defer(tables.Evaluation.episodes),)))
             .order_by(tables.Evaluation.created_at)
         )
         return {row[0]: row[1] for row in self._session.execute(query)}

@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server.comparison.schemas import Comparison, Curves
+from server.comparison.schemas import Comparison, Curves, Profiles
 from server.comparison.service import ComparisonService
-from server.problems import NOT_FOUND
+from server.problems import INVALID, NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 
@@ -17,18 +17,30 @@ ExperimentIds = Annotated[
 ]
 
 Margin = Annotated[float, Query(gt=0.0, le=0.5, description="Success rates that differ by less are equivalent, 0 to 1.")]
+Base = Annotated[
+    str | None, Query(max_length=64, description="Id of the one that the others are held against; the first without it.")
+]
+EveryPair = Annotated[bool, Query(alias="pairs", description="Judge every pair, of 12 experiments at most.")]
 Metric = Annotated[str, Query(max_length=64, description="Of the metric.")]
 GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")]
 
 
-@router.get("", responses=NOT_FOUND, dependencies=[view("experiment")])
+@router.get("", responses=INVALID | NOT_FOUND, dependencies=[view("experiment")])
 def compare(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
     margin: Margin = 0.02,
+    base: Base = None,
+    every_pair: EveryPair = False,
 ) -> Comparison:
     """Final figures side by side, with intervals and verdicts, and what differs in the configurations."""
-    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin)
+    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin, base, every_pair=every_pair)
+
+
+@router.get("/profiles", responses=NOT_FOUND, dependencies=[view("experiment")])
+def compare_profiles(experiment_ids: ExperimentIds, services: ServicesDep) -> Profiles:
+    """How many attempts of the final evaluations reach each score."""
+    return ComparisonService(services).profiles(list(dict.fromkeys(experiment_ids)))
 
 
 @router.get("/curves", responses=NOT_FOUND, dependencies=[view("experiment")])

@@ -35,11 +35,25 @@ Measure = Literal["success", "steps_per_target"]
 ComparisonWord = Literal["better", "worse", "equivalent", "not told", "refused"]
 
 
+class PairedTest(Schema):
+    """Two experiments' policies on the same scenarios: speaks of these policies, not of further seeds."""
+
+    test: Literal["randomisation", "signed rank"] = Field(
+        description="Exact paired randomisation test of the share of seeds that arrived (with one seed each McNemar's), or "
+        "Wilcoxon's signed-rank test of the seeds' mean steps."
+    )
+    scenarios: int = Field(description="In which both have something to show.")
+    better: int = Field(description="Scenarios in which the other one is better than the base.")
+    worse: int
+    p: float = Field(description="Two-sided, over scenarios; 1e-9 stands for anything less.")
+    p_holm: float = Field(description="The same after as many paired tests as there are here (Holm 1979).")
+
+
 class ComparisonVerdict(Schema):
-    """What may be said of an experiment beside the first one, in one measure."""
+    """What may be said of an experiment beside another one, the base, in one measure."""
 
     measure: Measure
-    base: str = Field(description="Id of the first experiment.")
+    base: str = Field(description="Id of the experiment that it is held against.")
     other: str = Field(description="Id of the one that is judged.")
     word: ComparisonWord = Field(
         description="Of the other: direction by the 95 % interval, equivalence by two one-sided tests at 5 %, or neither; "
@@ -49,14 +63,35 @@ class ComparisonVerdict(Schema):
     low: float | None = Field(description="Lower end of its 95 % interval.")
     high: float | None = Field(description="Upper end of its 95 % interval.")
     margin: float = Field(description="Differences up to this do not matter.")
+    p: float | None = Field(
+        description="Two-sided, over seeds: at the confidence 1 - p the interval just touches zero; 1e-9 stands for what is "
+        "less. Null where refused."
+    )
+    p_holm: float | None = Field(description="The same after as many comparisons as there are here (Holm 1979).")
+    paired: PairedTest | None = Field(description="Null where refused, or where there is no scenario to pair.")
     reason: str = Field(description="As a sentence, with figures.")
+
+
+class Improvement(Schema):
+    """How likely a seed of one experiment scores higher than a seed of another in a scenario (Agarwal et al. 2021).
+
+    The score is that of the SPL: path efficiency of an arrival, else 0. Equal scores count half.
+    """
+
+    base: str
+    other: str
+    value: float = Field(description="That the other one improves on the base, 0 to 1; 0.5 where they are alike.")
+    low: float = Field(description="Lower end of the 95 % interval over seeds.")
+    high: float = Field(description="Upper end.")
 
 
 class Comparison(Schema):
     """Experiments side by side, in the order asked for."""
 
     experiments: list[ComparedExperiment]
-    verdicts: list[ComparisonVerdict] = Field(description="Every experiment against the first.")
+    verdicts: list[ComparisonVerdict] = Field(description="Every experiment against the base, or every pair.")
+    comparisons: int = Field(description="Verdicts that were not refused: of so many at 95 %, about one in twenty misses.")
+    improvements: list[Improvement] = Field(description="Of every pair with verdicts on one suite.")
     differences: list[Difference]
     warnings: list[str] = Field(description="What speaks against reading too much into the figures.")
 
@@ -90,3 +125,24 @@ class Curves(Schema):
     name: str
     steps: list[int]
     experiments: list[ExperimentCurves]
+
+
+class Profile(Schema):
+    """Share of an experiment's attempts that score more than each threshold; `low` and `high` are null for one seed."""
+
+    id: str
+    name: str
+    seeds: int
+    mean: list[float | None]
+    low: list[float | None]
+    high: list[float | None]
+
+
+class Profiles(Schema):
+    """Performance profiles (Agarwal et al. 2021) of final evaluations.
+
+    The score is that of the SPL: path efficiency of an arrival, else 0. At the threshold 0 stands the success rate.
+    """
+
+    thresholds: list[float]
+    experiments: list[Profile] = Field(description="In the order asked for; empty lists before the first evaluation.")

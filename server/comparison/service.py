@@ -1,16 +1,19 @@
 """Experiments side by side: final figures, differences, and curves on a common grid."""
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from sqlalchemy.orm import Session
 
 from server.checkpoints.repository import CheckpointRepository
 from server.comparison.differences import differences
 from server.comparison.figures import FinalFigures, final_figures
-from server.comparison.schemas import Comparison, Curves, ExperimentCurves, SeedCurve
-from server.comparison.verdicts import verdicts
+from server.comparison.schemas import Comparison, Curves, ExperimentCurves, Profile, Profiles, SeedCurve
+from server.comparison.verdicts import improvements, verdicts
 from server.database import tables
+from server.errors import InvalidRequestError
 from server.estimates import is_rate
 from server.experiments.repository import ExperimentRepository
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
@@ -18,10 +21,16 @@ from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
 from server.services import Services
+from workers.statistics.improvement import performance_profile
 from workers.statistics.seeds import means_band, rates_band
 
-# Metrics between 0 and 1, and those among them that every evaluation counts over its suite's episodes.
+# Of metrics that every evaluation counts over its suite's episodes.
 _EVALUATION = "eval/"
+
+MOST_IN_PAIRS = 12
+"""Experiments whose every pair is judged: 66 pairs."""
+
+_THRESHOLDS = np.linspace(0.0, 1.0, 51)
 
 
 class ComparisonService:
@@ -30,31 +39,47 @@ class ComparisonService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def compare(self, experiment_ids: Sequence[str], margin: float) -> Comparison:
+    def compare(
+        self, experiment_ids: Sequence[str], margin: float, base: str | None = None, *, every_pair: bool = False
+    ) -> Comparison:
         """Final figures, verdicts and differences, in the order asked for.
 
         Args:
-            experiment_ids: of those to compare; the first is what the others are held against.
+            experiment_ids: of those to compare.
             margin: success rates that differ by less are equivalent, 0 to 1.
+            base: what the others are held against; the first without it.
+            every_pair: hold each against all before it instead.
+
+        Raises:
+            NotFoundError: one of the experiments is missing.
+            InvalidRequestError: the base is none of them, or there are too many for every pair.
+        """
+        held = _held(experiment_ids, base, every_pair=every_pair)
+        with self._services.database.read() as session:
+            experiments, figures = _final(session, experiment_ids)
+            warnings = _warnings(experiments, figures)
+            settings = [experiment.training for experiment in experiments]
+        by_id = {one.id: one for one in figures}
+        pairs = [(by_id[one], by_id[other]) for one, other in held]
+        told = verdicts(pairs, margin)
+        return Comparison(
+            experiments=[one.view() for one in figures],
+            verdicts=told,
+            comparisons=sum(verdict.word != "refused" for verdict in told),
+            improvements=improvements(pairs),
+            differences=differences(settings),
+            warnings=warnings,
+        )
+
+    def profiles(self, experiment_ids: Sequence[str]) -> Profiles:
+        """How many attempts reach each score, of every experiment.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
         with self._services.database.read() as session:
-            experiments = ExperimentRepository(session).get_many(experiment_ids)
-            repository = CheckpointRepository(session)
-            figures = [
-                final_figures(experiment, repository.final_evaluations([run.id for run in experiment.runs]))
-                for experiment in experiments
-            ]
-            warnings = _warnings(experiments, figures)
-        settings = [experiment.training for experiment in experiments]
-        return Comparison(
-            experiments=[one.view() for one in figures],
-            verdicts=verdicts(figures, margin),
-            differences=differences(settings),
-            warnings=warnings,
-        )
+            _, figures = _final(session, experiment_ids)
+        return Profiles(thresholds=_THRESHOLDS.tolist(), experiments=[_profile(one) for one in figures])
 
     def curves(self, experiment_ids: Sequence[str], name: str, points: int) -> Curves:
         """One metric of all runs on one grid of at most `points` steps.
@@ -76,6 +101,39 @@ class ComparisonService:
             steps=grid.tolist(),
             experiments=[_curves(experiment, series, grid, name, episodes) for experiment in experiments],
         )
+
+
+def _held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) -> list[tuple[str, str]]:
+    """What is held against what: pairs of a base and another."""
+    if base is not None and base not in experiment_ids:
+        raise InvalidRequestError("The base is none of the experiments that are compared.")
+    if every_pair:
+        if len(experiment_ids) > MOST_IN_PAIRS:
+            raise InvalidRequestError(f"Every pair is judged of {MOST_IN_PAIRS} experiments at most: choose a base.")
+        return list(combinations(experiment_ids, 2))
+    first = base or experiment_ids[0]
+    return [(first, other) for other in experiment_ids if other != first]
+
+
+def _final(session: Session, experiment_ids: Sequence[str]) -> tuple[list[tables.Experiment], list[FinalFigures]]:
+    experiments = ExperimentRepository(session).get_many(experiment_ids)
+    run_ids = [run.id for experiment in experiments for run in experiment.runs]
+    final = CheckpointRepository(session).final_evaluations(run_ids, with_episodes=True)
+    return experiments, [final_figures(experiment, final) for experiment in experiments]
+
+
+def _profile(figures: FinalFigures) -> Profile:
+    if not figures.driven:
+        return Profile(id=figures.id, name=figures.name, seeds=0, mean=[], low=[], high=[])
+    mean, low, high = performance_profile([seed.score for seed in figures.driven], _THRESHOLDS)
+    return Profile(
+        id=figures.id,
+        name=figures.name,
+        seeds=figures.seeds,
+        mean=json_numbers(mean),
+        low=json_numbers(low),
+        high=json_numbers(high),
+    )
 
 
 def common_grid(series: Sequence[Buckets], limit: int) -> NDArray[np.int64]:

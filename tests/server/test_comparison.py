@@ -15,6 +15,7 @@ from server.comparison.service import common_grid, resample
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from tests.server.harness import Reports
+from workers.reporting import EvaluationResult
 from workers.statistics.seeds import success_rate
 
 
@@ -151,6 +152,98 @@ def test_a_verdict_of_equivalence_is_within_the_margin_that_is_asked_for(client:
     narrow = compare_within(client, 0.001, one, other)["verdicts"][0]
     assert narrow["word"] == "not told"
     assert narrow["reason"].endswith("5 seeds show neither a direction nor equivalence within 0.1 points.")
+
+
+def alternating(reports: Reports, name: str, hits: Sequence[str], steps: int = 80) -> dict[str, Any]:
+    """An experiment whose every seed arrives where its text has a 1, in 10 scenarios."""
+    experiment = reports.experiment(name, seeds=range(len(hits)))
+    arrived, collided = reports.evaluation(1, 2, steps=steps).episodes
+    for run, text in zip(experiment["runs"], hits, strict=True):
+        rows = tuple(arrived if hit == "1" else collided for hit in text)
+        reports.checkpoint(run, 1_000, EvaluationResult(suite="simple-200", suite_hash="hash-a", episodes=rows))
+    return experiment
+
+
+def test_the_same_scenarios_are_paired(client: TestClient, reports: Reports) -> None:
+    """One arrives in five scenarios in which the other does not, and never the other way: 2 / 2 ** 5 = 0.0625."""
+    base = alternating(reports, "base", ["1110000000"] * 5, steps=90)
+    other = alternating(reports, "other", ["1111111100"] * 5, steps=80)
+
+    success, steps = compare(client, base, other)["verdicts"]
+    told = {"test": "randomisation", "scenarios": 10, "better": 5, "worse": 0, "p": pytest.approx(0.0625)}
+    # Of two paired tests, 0.0625 is the smaller.
+    assert success["paired"] == told | {"p_holm": pytest.approx(0.125)}
+    # Both arrive in three scenarios, in all of them ten steps sooner: 2 / 2 ** 3.
+    quicker = {"test": "signed rank", "scenarios": 3, "better": 3, "worse": 0, "p": pytest.approx(0.25)}
+    assert steps["paired"] == quicker | {"p_holm": pytest.approx(0.25)}
+
+    back, _ = compare(client, other, base)["verdicts"]
+    assert (back["paired"]["better"], back["paired"]["worse"], back["p"]) == (0, 5, success["p"])
+
+
+def test_many_comparisons_are_counted_and_their_p_adjusted(client: TestClient, reports: Reports) -> None:
+    base = measured(reports, "base", (900, 880, 910, 890, 905))
+    close = measured(reports, "close", (915, 912, 921, 910, 918))
+    far = measured(reports, "far", (990, 985, 988, 991, 987))
+    few = measured(reports, "few", (990,))
+
+    comparison = compare(client, base, close, far, few)
+    verdicts = comparison["verdicts"]
+    ps = sorted(one["p"] for one in verdicts if one["word"] != "refused")
+    assert comparison["comparisons"] == len(ps) == 4
+    held = next(one for one in verdicts if one["other"] == close["id"] and one["measure"] == "success")
+    assert held["p"] < held["p_holm"] == pytest.approx(held["p"] * (4 - ps.index(held["p"])))
+    assert [(one["p"], one["p_holm"], one["paired"]) for one in verdicts if one["word"] == "refused"] == [(None,) * 3] * 2
+    # A direction that so many comparisons may bring by chance says so.
+    said = [one["reason"].endswith(f"(Holm: p = {one['p_holm']:.2g}).") for one in verdicts if one["word"] == "better"]
+    assert said == [one["p_holm"] >= 0.05 for one in verdicts if one["word"] == "better"]
+
+
+def test_another_base_and_every_pair(client: TestClient, reports: Reports) -> None:
+    ids = [measured(reports, name, (900,) * 5)["id"] for name in "abc"]
+
+    def held(**query: Any) -> set[tuple[int, int]]:
+        response = client.get("/api/compare", params={"experiment": ids} | query)
+        assert response.status_code == 200, response.text
+        return {(ids.index(one["base"]), ids.index(one["other"])) for one in response.json()["verdicts"]}
+
+    assert held() == {(0, 1), (0, 2)}
+    assert held(base=ids[2]) == {(2, 0), (2, 1)}
+    assert held(pairs=True) == {(0, 1), (0, 2), (1, 2)}
+
+    refused = client.get("/api/compare", params={"experiment": ids, "base": "nobody"})
+    assert (refused.status_code, refused.json()["detail"]) == (
+        400,
+        "The base is none of the experiments that are compared.",
+    )
+    many = [reports.experiment()["id"] for _ in range(13)]
+    assert client.get("/api/compare", params={"experiment": many, "pairs": True}).status_code == 400
+
+
+def test_how_likely_one_improves_on_the_other(client: TestClient, reports: Reports) -> None:
+    """Better in five scenarios of ten, alike in five: 0.5 + 0.5 * 0.5."""
+    base = alternating(reports, "base", ["1110000000"] * 5)
+    other = alternating(reports, "other", ["1111111100"] * 5)
+
+    (improvement,) = compare(client, base, other)["improvements"]
+    assert (improvement["base"], improvement["other"], improvement["value"]) == (base["id"], other["id"], 0.75)
+    assert compare(client, base, alternating(reports, "few", ["1"] * 4))["improvements"] == []
+
+
+def test_a_profile_falls_from_the_success_rate_to_nothing(client: TestClient, reports: Reports) -> None:
+    """Arrivals drove 4 m where 3.5 m less the arrival distance is the shortest."""
+    one, empty = alternating(reports, "one", ["1110000000", "1111100000"]), reports.experiment("empty")
+    shortest = 3.5 - one["training"]["task"]["arrival_distance"]
+
+    response = client.get("/api/compare/profiles", params={"experiment": [one["id"], empty["id"]]})
+    assert response.status_code == 200, response.text
+    profiles = response.json()
+    filled, unfilled = profiles["experiments"]
+    assert (profiles["thresholds"][0], profiles["thresholds"][-1]) == (0.0, 1.0)
+    for threshold, mean in zip(profiles["thresholds"], filled["mean"], strict=True):
+        assert mean == (pytest.approx(0.4) if threshold < shortest / 4.0 else 0.0)
+    assert filled["low"][0] < 0.4 < filled["high"][0]
+    assert (unfilled["seeds"], unfilled["mean"]) == (0, [])
 
 
 def test_below_five_seeds_a_verdict_is_refused(client: TestClient, reports: Reports) -> None:
@@ -304,7 +397,7 @@ def test_resampling_stays_within_each_curve(curves: list[list[tuple[int, float]]
         assert (values[inside] <= curve.mean.max() + 1e-3).all()
 
 
-@pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves"])
+@pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves", "/api/compare/profiles"])
 def test_what_cannot_be_compared(client: TestClient, reports: Reports, path: str) -> None:
     assert client.get(path).status_code == 422
     assert client.get(path, params={"experiment": [reports.experiment()["id"], "nobody"]}).status_code == 404

@@ -117,6 +117,7 @@ TABLE = {
         GET /api/compare/export
         GET /api/compare
         GET /api/compare/curves
+        GET /api/compare/profiles
         GET /api/reproduction
         GET /api/studies/{study_id}
         GET /live/{run_id}/

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workers.statistics.differences import Difference, Rates, difference_of_means, difference_of_rates, fisher_exact
+from workers.statistics.differences import (
+    Difference,
+    Rates,
+    arrival_rates,
+    difference_of_means,
+    difference_of_rates,
+    fisher_exact,
+    rates_difference,
+)
+from workers.statistics.improvement import performance_profile, probability_of_improvement
 from workers.statistics.intervals import exact_interval, student_t, upper_bound
 from workers.statistics.seeds import (
     failed_seeds,
@@ -17,6 +26,7 @@ from workers.statistics.seeds import (
     rates_band,
     success_rate,
 )
+from workers.statistics.significance import LEAST_P, holm, p_of_means, p_of_rates, paired_rates, paired_values
 
 # --- of one policy ---
 
@@ -297,3 +307,98 @@ def test_a_verdict_mirrors(first: list[float], second: list[float], margin: floa
 def test_fisher_exact(first: tuple[int, int], second: tuple[int, int], p: float) -> None:
     assert fisher_exact(first, second) == pytest.approx(p, abs=5e-5)
     assert fisher_exact(second, first) == pytest.approx(p, abs=5e-5)
+
+
+# --- tests beside the intervals ---
+
+
+def test_p_is_where_the_interval_touches_zero() -> None:
+    """Means 3 and 6.3 of five, deviations 1.5811 and 1.8908: t = 2.9938 with 7.757 degrees of freedom (R's t.test)."""
+    first, second = [1.0, 2.0, 3.0, 4.0, 5.0], [4.0, 5.5, 6.0, 7.0, 9.0]
+    assert p_of_means(first, second) == pytest.approx(0.01692, abs=1e-4)
+    assert p_of_means(second, first) == p_of_means(first, second)
+    assert p_of_means([1.0, 1.0], [2.0, 2.0]) == LEAST_P
+    assert p_of_means([1.0, 3.0], [2.0, 2.0]) == 1.0
+
+    better, worse = Rates([990, 980, 970, 990, 980], [1_000] * 5), Rates([900, 920, 960, 950, 930], [1_000] * 5)
+    p = p_of_rates(better, worse)
+    one, driven = arrival_rates(better)
+    other, other_driven = arrival_rates(worse)
+    _, low, _ = rates_difference(one, driven, other, other_driven, 1.0 - p)
+    assert 0.0 < p < 0.05
+    assert float(low[0]) == pytest.approx(0.0, abs=1e-4)
+    assert difference_of_rates(better, worse).low > 0.0
+
+
+def test_holm_as_worked_in_his_paper() -> None:
+    """The smallest times four, the next times three, and none below the one before it."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.9]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_paired_success_of_single_seeds_is_mcnemars_exact_test() -> None:
+    """10 to 2 of discordant scenarios: 2 * (1 + 12 + 66) / 2 ** 12."""
+    first = np.array([[1.0] * 10 + [0.0] * 2 + [1.0] * 8])
+    second = np.array([[0.0] * 10 + [1.0] * 2 + [1.0] * 8])
+    found = paired_rates(first, second)
+    assert (found.scenarios, found.more, found.less) == (20, 10, 2)
+    assert found.p == pytest.approx(2 * (1 + 12 + 66) / 2**12)
+
+
+def test_shares_of_seeds_are_paired_whatever_their_number() -> None:
+    """Of 2 and 3 seeds: +1, +1/2 and -1/3, in sixths +6, +3 and -2; sums of at least 7 are 7 and 11, of eight."""
+    first = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    second = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    found = paired_rates(first, second)
+    assert (found.more, found.less) == (2, 1)
+    assert found.p == pytest.approx(2 * 2 / 8)
+    assert paired_rates(first, first).p == 1.0
+
+
+def test_paired_steps_have_wilcoxons_ranks() -> None:
+    """Differences 1, 2, 3, 4 and -1.5 rank 1, 3, 4, 5 and -2: sums 13 and 2; at most 2 are 0, 1 and 2, of 32."""
+    first = np.array([[11.0, 12.0, 13.0, 14.0, 8.5, np.nan, 10.0]])
+    second = np.array([[10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0]])
+    found = paired_values(first, second)
+    assert found is not None
+    assert (found.scenarios, found.more, found.less) == (6, 4, 1)
+    assert found.p == pytest.approx(2 * 3 / 32)
+    assert paired_values(first[:, 5:6], second[:, :1]) is None
+
+
+def test_many_scenarios_have_the_normal_distribution_of_signs() -> None:
+    """The exact test of 500 and the approximation for 5,000 go one way: 275 to 225, and 2,750 to 2,250."""
+    few, many = (np.sign(np.arange(n) % 20 - 8.5) for n in (500, 5_000))
+    zeros = np.zeros((1, 500))
+    exact = paired_values(10 + few[None], 10 + zeros)
+    assert exact is not None
+    assert exact.p == pytest.approx(math.erfc(50 / math.sqrt(500) / math.sqrt(2)), rel=0.2)
+    rough = paired_values(10 + many[None], 10 + np.zeros((1, 5_000)))
+    assert rough is not None
+    assert rough.p == LEAST_P
+
+
+# --- whole distributions ---
+
+
+def test_probability_of_improvement_counts_pairs_of_seeds_and_halves_ties() -> None:
+    """Scenario 1: 2 beats 1 and 1, 1 ties twice; scenario 2: all tie: (1 + 0.5) / 2 and 0.5."""
+    first, second = np.array([[2.0, 0.0], [1.0, 0.0]]), np.array([[1.0, 0.0], [1.0, 0.0]])
+    found = probability_of_improvement(first, second)
+    assert found.value == pytest.approx((0.75 + 0.5) / 2)
+    assert found.low < found.value < found.high
+    mirrored = probability_of_improvement(second, first)
+    assert (mirrored.low, mirrored.high) == pytest.approx((1 - found.high, 1 - found.low))
+    # Always better, five pairs that are independent: 0.025 ** (1 / 5).
+    sure = probability_of_improvement(np.ones((5, 3)), np.zeros((7, 3)))
+    assert (sure.value, sure.low, sure.high) == pytest.approx((1.0, 0.025**0.2, 1.0))
+    with pytest.raises(ValueError, match="two seeds"):
+        probability_of_improvement(first[:1], second)
+
+
+def test_a_profile_is_the_mean_share_of_attempts_above_each_threshold() -> None:
+    mean, low, high = performance_profile([np.array([0.0, 0.4, 0.8]), np.array([0.9, 0.9, 0.0])], np.array([0.0, 0.5, 1.0]))
+    assert mean == pytest.approx([2 / 3, 1 / 2, 0.0])
+    assert (low <= mean).all()
+    assert (mean <= high).all()

@@ -84,7 +84,7 @@ def difference_of_rates(first: Rates, second: Rates) -> Difference:
     if min(len(first.arrivals), len(second.arrivals)) < 2:
         raise ValueError(_TWO_SEEDS)
 
-    (one, driven), (other, other_driven) = (_rates(side) for side in (first, second))
+    (one, driven), (other, other_driven) = (arrival_rates(side) for side in (first, second))
     return _difference(*(rates_difference(one, driven, other, other_driven, level) for level in (CONFIDENCE, ONE_SIDED)))
 
 
@@ -163,7 +163,7 @@ def fisher_exact(first: tuple[int, int], second: tuple[int, int]) -> float:
     return float(test(table).pvalue)
 
 
-def _rates(side: Rates) -> tuple[Floats, Floats]:
+def arrival_rates(side: Rates) -> tuple[Floats, Floats]:
     """Rates and episodes, (seeds, 1) both."""
     episodes = np.asarray(side.episodes, np.float64)[:, None]
     return np.asarray(side.arrivals, np.float64)[:, None] / episodes, episodes

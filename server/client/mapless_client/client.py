@@ -197,14 +197,20 @@ class Client:
         """
         return pull(self._transport, checkpoint_id, Path(to), form)
 
-    def compare(self, experiment_ids: Sequence[str], margin: float = 0.02) -> Comparison:
-        """Final figures side by side, verdicts of each against the first, and the settings that differ.
+    def compare(
+        self, experiment_ids: Sequence[str], margin: float = 0.02, *, base: str | None = None, pairs: bool = False
+    ) -> Comparison:
+        """Final figures side by side, verdicts, and the settings that differ.
 
         Args:
             experiment_ids: in order, 50 at most.
             margin: success rates that differ by less are equivalent, 0 to 1.
+            base: what the others are held against; the first without it.
+            pairs: judge every pair instead, of 12 experiments at most.
         """
-        answer = self._transport.get("/api/compare", {"experiment": list(experiment_ids), "margin": margin})
+        answer = self._transport.get(
+            "/api/compare", {"experiment": list(experiment_ids), "margin": margin, "base": base, "pairs": pairs}
+        )
         return Comparison.model_validate(answer)
 
     def _checkpoint_page(self, run_id: str, *, limit: int, offset: int) -> Json:

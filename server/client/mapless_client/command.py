@@ -125,12 +125,14 @@ def pull(
 def compare(
     trainings: Annotated[list[str], typer.Argument(help="Their ids; the first is what the others are judged by.")],
     margin: Annotated[float, typer.Option(help="Success rates that differ by less are equivalent.")] = 0.02,
+    base: Annotated[str | None, typer.Option(help="Id of the one to judge by, in place of the first.")] = None,
+    pairs: Annotated[bool, typer.Option("--pairs", help="Judge every pair.")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Final figures side by side, with intervals, verdicts and the settings that differ."""
     with _server(url) as client:
-        comparison = client.compare(trainings, margin)
+        comparison = client.compare(trainings, margin, base=base, pairs=pairs)
     if as_json:
         _json(comparison)
         return
@@ -139,7 +141,8 @@ def compare(
             "  ".join([f"{experiment.id:16}", f"{_estimate(experiment.success):20}", _seeds_of(experiment), experiment.name])
         )
     for verdict in comparison.verdicts:
-        typer.echo(f"{verdict.other} {verdict.measure}: {verdict.word}. {verdict.reason}")
+        beside = f" beside {verdict.base}" if pairs else ""
+        typer.echo(f"{verdict.other}{beside} {verdict.measure}: {verdict.word}. {verdict.reason}")
     for difference in comparison.differences:
         typer.echo(f"{difference.path}: {', '.join(json.dumps(value) for value in difference.values)}")
     for warning in comparison.warnings:

@@ -190,8 +190,22 @@ class Difference(Model):
     values: list[Any]
 
 
+class PairedTest(Model):
+    """Two trainings' policies on the same scenarios: speaks of these policies, not of further seeds."""
+
+    test: str
+    scenarios: int
+    better: int
+    worse: int
+    p: float
+    p_holm: float
+
+
 class ComparisonVerdict(Model):
-    """What may be said of a training beside the first one; `difference` is other less base."""
+    """What may be said of a training beside another, the base; `difference` is other less base.
+
+    `p_holm` and that of `paired` are Holm's, after as many comparisons as there are.
+    """
 
     measure: str
     base: str
@@ -201,7 +215,20 @@ class ComparisonVerdict(Model):
     low: float | None
     high: float | None
     margin: float
+    p: float | None
+    p_holm: float | None
+    paired: PairedTest | None
     reason: str
+
+
+class Improvement(Model):
+    """How likely a seed of `other` scores higher than one of `base` in a scenario, with a 95 % interval over seeds."""
+
+    base: str
+    other: str
+    value: float
+    low: float
+    high: float
 
 
 class Comparison(Model):
@@ -209,5 +236,7 @@ class Comparison(Model):
 
     experiments: list[ComparedExperiment]
     verdicts: list[ComparisonVerdict]
+    comparisons: int
+    improvements: list[Improvement]
     differences: list[Difference]
     warnings: list[str]

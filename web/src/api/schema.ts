@@ -436,6 +436,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/compare/profiles": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Profiles
+         * @description How many attempts of the final evaluations reach each score.
+         */
+        get: operations["compare_profiles_api_compare_profiles_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/evaluations": {
         parameters: {
             query?: never;
@@ -3420,13 +3440,23 @@ export interface components {
          * @description Experiments side by side, in the order asked for.
          */
         Comparison: {
+            /**
+             * Comparisons
+             * @description Verdicts that were not refused: of so many at 95 %, about one in twenty misses.
+             */
+            comparisons: number;
             /** Differences */
             differences: components["schemas"]["Difference"][];
             /** Experiments */
             experiments: components["schemas"]["ComparedExperiment"][];
             /**
+             * Improvements
+             * @description Of every pair with verdicts on one suite.
+             */
+            improvements: components["schemas"]["Improvement"][];
+            /**
              * Verdicts
-             * @description Every experiment against the first.
+             * @description Every experiment against the base, or every pair.
              */
             verdicts: components["schemas"]["ComparisonVerdict"][];
             /**
@@ -3437,12 +3467,12 @@ export interface components {
         };
         /**
          * ComparisonVerdict
-         * @description What may be said of an experiment beside the first one, in one measure.
+         * @description What may be said of an experiment beside another one, the base, in one measure.
          */
         ComparisonVerdict: {
             /**
              * Base
-             * @description Id of the first experiment.
+             * @description Id of the experiment that it is held against.
              */
             base: string;
             /**
@@ -3475,6 +3505,18 @@ export interface components {
              * @description Id of the one that is judged.
              */
             other: string;
+            /**
+             * P
+             * @description Two-sided, over seeds: at the confidence 1 - p the interval just touches zero; 1e-9 stands for what is less. Null where refused.
+             */
+            p: number | null;
+            /**
+             * P Holm
+             * @description The same after as many comparisons as there are here (Holm 1979).
+             */
+            p_holm: number | null;
+            /** @description Null where refused, or where there is no scenario to pair. */
+            paired: components["schemas"]["PairedTest"] | null;
             /**
              * Reason
              * @description As a sentence, with figures.
@@ -4987,6 +5029,33 @@ export interface components {
             sha256: string;
         };
         /**
+         * Improvement
+         * @description How likely a seed of one experiment scores higher than a seed of another in a scenario (Agarwal et al. 2021).
+         *
+         *     The score is that of the SPL: path efficiency of an arrival, else 0. Equal scores count half.
+         */
+        Improvement: {
+            /** Base */
+            base: string;
+            /**
+             * High
+             * @description Upper end.
+             */
+            high: number;
+            /**
+             * Low
+             * @description Lower end of the 95 % interval over seeds.
+             */
+            low: number;
+            /** Other */
+            other: string;
+            /**
+             * Value
+             * @description That the other one improves on the base, 0 to 1; 0.5 where they are alike.
+             */
+            value: number;
+        };
+        /**
          * Invitation
          * @description A link that lets somebody join once.
          */
@@ -6320,6 +6389,40 @@ export interface components {
             total: number;
         };
         /**
+         * PairedTest
+         * @description Two experiments' policies on the same scenarios: speaks of these policies, not of further seeds.
+         */
+        PairedTest: {
+            /**
+             * Better
+             * @description Scenarios in which the other one is better than the base.
+             */
+            better: number;
+            /**
+             * P
+             * @description Two-sided, over scenarios; 1e-9 stands for anything less.
+             */
+            p: number;
+            /**
+             * P Holm
+             * @description The same after as many paired tests as there are here (Holm 1979).
+             */
+            p_holm: number;
+            /**
+             * Scenarios
+             * @description In which both have something to show.
+             */
+            scenarios: number;
+            /**
+             * Test
+             * @description Exact paired randomisation test of the share of seeds that arrived (with one seed each McNemar's), or Wilcoxon's signed-rank test of the seeds' mean steps.
+             * @enum {string}
+             */
+            test: "randomisation" | "signed rank";
+            /** Worse */
+            worse: number;
+        };
+        /**
          * PaperFigure
          * @description Learning curves that the paper draws into one picture: ids of rows.
          */
@@ -6920,6 +7023,39 @@ export interface components {
         Priority: {
             /** Priority */
             priority: number;
+        };
+        /**
+         * Profile
+         * @description Share of an experiment's attempts that score more than each threshold; `low` and `high` are null for one seed.
+         */
+        Profile: {
+            /** High */
+            high: (number | null)[];
+            /** Id */
+            id: string;
+            /** Low */
+            low: (number | null)[];
+            /** Mean */
+            mean: (number | null)[];
+            /** Name */
+            name: string;
+            /** Seeds */
+            seeds: number;
+        };
+        /**
+         * Profiles
+         * @description Performance profiles (Agarwal et al. 2021) of final evaluations.
+         *
+         *     The score is that of the SPL: path efficiency of an arrival, else 0. At the threshold 0 stands the success rate.
+         */
+        Profiles: {
+            /**
+             * Experiments
+             * @description In the order asked for; empty lists before the first evaluation.
+             */
+            experiments: components["schemas"]["Profile"][];
+            /** Thresholds */
+            thresholds: number[];
         };
         /**
          * ProgressTerm
@@ -11254,10 +11390,14 @@ export interface operations {
     compare_api_compare_get: {
         parameters: {
             query: {
+                /** @description Id of the one that the others are held against; the first without it. */
+                base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
                 /** @description Success rates that differ by less are equivalent, 0 to 1. */
                 margin?: number;
+                /** @description Judge every pair, of 12 experiments at most. */
+                pairs?: boolean;
             };
             header?: never;
             path?: never;
@@ -11272,6 +11412,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Comparison"];
+                };
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description No valid login */
@@ -11387,6 +11536,56 @@ export interface operations {
                     "application/octet-stream": string;
                     "application/zip": string;
                     "text/csv": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    compare_profiles_api_compare_profiles_get: {
+        parameters: {
+            query: {
+                /** @description Ids of the experiments, in order. */
+                experiment: string[];
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Profiles"];
                 };
             };
             /** @description No valid login */

@@ -22,9 +22,12 @@ interface ChartProps {
   yRange?: readonly [number, number]
   logarithmic?: boolean
   height?: number
+  /** What x is, and how it is written. */
+  xTitle?: string
+  xFormat?: (value: number) => string
 }
 
-/** Draws `data`; x is environment steps. Drag to zoom in, double-click to zoom out. */
+/** Draws `data`. Drag to zoom in, double-click to zoom out. */
 export function Chart({
   data,
   label,
@@ -32,6 +35,8 @@ export function Chart({
   yRange,
   logarithmic = false,
   height = HEIGHT,
+  xTitle = 'Steps',
+  xFormat = count,
 }: ChartProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const frame = useRef<HTMLDivElement>(null)
@@ -54,7 +59,7 @@ export function Chart({
     if (!element) return
     const made = new uPlot(
       {
-        ...appearance(dark, format),
+        ...appearance(dark, format, xTitle, xFormat === count ? compact : xFormat),
         ...seriesOf(lines.current, dark),
         width: element.clientWidth,
         height,
@@ -78,7 +83,7 @@ export function Chart({
       made.destroy()
       plot.current = null
     }
-  }, [structure, dark, low, high, logarithmic, height, format])
+  }, [structure, dark, low, high, logarithmic, height, format, xTitle, xFormat])
 
   useEffect(() => {
     plot.current?.setData(columns)
@@ -94,7 +99,7 @@ export function Chart({
       if (cell) cell.textContent = value === null ? '–' : format(value)
     })
     const step = legend.current?.querySelector('[data-step]')
-    if (step) step.textContent = index === null ? '' : `step ${count(data.x[index] ?? 0)}`
+    if (step) step.textContent = index === null ? '' : `${xTitle} ${xFormat(data.x[index] ?? 0)}`
   }
 
   return (
@@ -164,6 +169,8 @@ const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
 function appearance(
   dark: boolean,
   format: (value: number) => string,
+  xTitle: string,
+  xFormat: (value: number) => string,
 ): Pick<uPlot.Options, 'axes' | 'padding'> {
   const ink = dark ? '#97a1a9' : '#5d6870'
   const grid = { stroke: dark ? '#252b31' : '#eceff0', width: 1 }
@@ -175,8 +182,12 @@ function appearance(
         ...axis,
         size: 26,
         gap: 6,
+        label: xTitle,
+        labelFont: AXIS_FONT,
+        labelSize: 16,
+        labelGap: 0,
         grid: { show: false },
-        values: (_, ticks) => ticks.map(compact),
+        values: (_, ticks) => ticks.map((tick: number | null) => (tick === null ? '' : xFormat(tick))),
         space: 64,
       },
       {

@@ -18,6 +18,9 @@ interface MetricChartProps {
   /** Whether a logarithmic axis is offered. */
   scalable?: boolean
   height?: number
+  /** What x is, and how it is written; steps of the environment without them. */
+  xTitle?: string
+  xFormat?: (value: number) => string
   /** What stands in place of the curve while it has no point. */
   empty?: ReactNode
 }

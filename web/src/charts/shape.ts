@@ -1,5 +1,5 @@
 /** From the API's answers to the charts' lines. */
-import type { Curves, Series } from '../api/types'
+import type { Curves, Profiles, Series } from '../api/types'
 import { plural } from '../lib/format'
 import type { ChartSpec } from './metrics'
 import { alignSeries, type ChartData, type Line } from './series'
@@ -73,4 +73,22 @@ export function chartOfCurves(
     return [...thin, mean]
   })
   return { x: lines.length > 0 ? curves.steps : [], lines }
+}
+
+/** Performance profiles: the mean over seeds of each training with its interval; x is the score. */
+export function chartOfProfiles({ thresholds, experiments }: Profiles): ChartData {
+  const lines = experiments.flatMap(({ id, name, seeds, mean, low, high }, color): Line[] =>
+    seeds === 0
+      ? []
+      : [
+          {
+            key: id,
+            label: `${name}, ${plural(seeds, 'seed')}`,
+            color,
+            values: mean,
+            ...(seeds > 1 ? { band: { low, high } } : {}),
+          },
+        ],
+  )
+  return { x: lines.length > 0 ? thresholds : [], lines }
 }

@@ -1,10 +1,12 @@
-/** What may be said of each training beside the first: better, worse, equivalent, not told, or refused, and why. */
-import { Group, NumberInput, Table, Text } from '@mantine/core'
+/** What may be said of each training beside another: better, worse, equivalent, not told, or refused, and why. */
+import { Group, NativeSelect, NumberInput, Table, Text } from '@mantine/core'
 import type { Comparison, ComparisonVerdict } from '../api/types'
-import { plural } from '../lib/format'
+import { MOST_IN_PAIRS } from '../lib/comparison'
+import { pIs, plural, pValue } from '../lib/format'
 import classes from './ComparisonVerdicts.module.css'
 import table from './ExperimentTable.module.css'
 import { Panel, Swatch } from './ui'
+import ui from './ui.module.css'
 
 const MEASURES: Record<ComparisonVerdict['measure'], string> = {
   success: 'Success',
@@ -13,77 +15,118 @@ const MEASURES: Record<ComparisonVerdict['measure'], string> = {
 const LEAST_POINTS = 0.1
 const MOST_POINTS = 50
 
+/** What trainings are held against: one of them by its id, or every other. */
+export const EVERY_PAIR = 'pairs'
+
 interface ComparisonVerdictsProps {
   comparison: Comparison
   /** Success rates that differ by less are equivalent, 0 to 1. */
   margin: number
   onMargin: (margin: number) => void
+  /** An id, or `EVERY_PAIR`. */
+  base: string
+  onBase: (base: string) => void
 }
 
-export function ComparisonVerdicts({ comparison, margin, onMargin }: ComparisonVerdictsProps) {
-  const { experiments, verdicts } = comparison
-  const [base] = experiments
-  const judged = verdicts.filter((verdict) => verdict.word !== 'refused').length
+export function ComparisonVerdicts({ comparison, margin, onMargin, base, onBase }: ComparisonVerdictsProps) {
+  const { experiments, verdicts, comparisons } = comparison
+  const named = (id: string) => <NamedTraining comparison={comparison} id={id} />
   return (
     <Panel
-      title={`Beside ${base?.name}`}
+      title="Verdicts"
       flush
       actions={
-        <NumberInput
-          label="Success is equivalent within (points)"
-          size="xs"
-          min={LEAST_POINTS}
-          max={MOST_POINTS}
-          step={1}
-          decimalScale={1}
-          value={margin * 100}
-          onChange={(points) => {
-            if (typeof points === 'number' && points >= LEAST_POINTS && points <= MOST_POINTS)
-              onMargin(points / 100)
-          }}
-          className={classes.margin}
-        />
+        <Group gap="md" align="end">
+          <NativeSelect
+            label="Held against"
+            size="xs"
+            value={base}
+            onChange={(event) => onBase(event.currentTarget.value)}
+            data={[
+              ...experiments.map((one) => ({ value: one.id, label: one.name })),
+              ...(experiments.length > 2 && experiments.length <= MOST_IN_PAIRS
+                ? [{ value: EVERY_PAIR, label: 'each other (every pair)' }]
+                : []),
+            ]}
+          />
+          <NumberInput
+            label="Success is equivalent within (points)"
+            size="xs"
+            min={LEAST_POINTS}
+            max={MOST_POINTS}
+            step={1}
+            decimalScale={1}
+            value={margin * 100}
+            onChange={(points) => {
+              if (typeof points === 'number' && points >= LEAST_POINTS && points <= MOST_POINTS)
+                onMargin(points / 100)
+            }}
+            className={classes.margin}
+          />
+        </Group>
       }
     >
-      <Table.ScrollContainer type="native" minWidth={620}>
-        <Table className={table.table} data-testid="verdicts">
+      <Table.ScrollContainer type="native" minWidth={980}>
+        <Table className={table.table} data-testid="verdicts" aria-label="Verdicts">
           <Table.Thead>
             <Table.Tr>
               <Table.Th>Training</Table.Th>
+              <Table.Th>Beside</Table.Th>
               <Table.Th>Measure</Table.Th>
               <Table.Th>Verdict</Table.Th>
               <Table.Th>Why</Table.Th>
+              <Table.Th>p (Holm)</Table.Th>
+              <Table.Th>On the same scenarios</Table.Th>
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
-            {verdicts.map((verdict) => {
-              const color = experiments.findIndex((one) => one.id === verdict.other)
-              return (
-                <Table.Tr key={`${verdict.other} ${verdict.measure}`} data-word={verdict.word}>
-                  <Table.Td className={table.name}>
-                    <Group gap={8} wrap="nowrap">
-                      <Swatch color={color} />
-                      {experiments[color]?.name}
-                    </Group>
-                  </Table.Td>
-                  <Table.Td>{MEASURES[verdict.measure]}</Table.Td>
-                  <Table.Td>
-                    <span className={classes.word} data-word={verdict.word}>
-                      {verdict.word}
-                    </span>
-                  </Table.Td>
-                  <Table.Td className={classes.why}>{verdict.reason}</Table.Td>
-                </Table.Tr>
-              )
-            })}
+            {verdicts.map((verdict) => (
+              <Table.Tr key={`${verdict.base} ${verdict.other} ${verdict.measure}`} data-word={verdict.word}>
+                <Table.Td className={table.name}>{named(verdict.other)}</Table.Td>
+                <Table.Td className={table.name}>{named(verdict.base)}</Table.Td>
+                <Table.Td>{MEASURES[verdict.measure]}</Table.Td>
+                <Table.Td>
+                  <span className={classes.word} data-word={verdict.word}>
+                    {verdict.word}
+                  </span>
+                </Table.Td>
+                <Table.Td className={classes.why}>{verdict.reason}</Table.Td>
+                <Table.Td className={ui.number}>
+                  {verdict.p_holm === null ? '–' : pValue(verdict.p_holm)}
+                </Table.Td>
+                <Table.Td className={classes.paired}>
+                  {verdict.paired ? (
+                    <>
+                      {`better in ${verdict.paired.better}, worse in ${verdict.paired.worse} of ${verdict.paired.scenarios}`}
+                      <span className={ui.behind}>{`p ${pIs(verdict.paired.p_holm)} (Holm)`}</span>
+                    </>
+                  ) : (
+                    '–'
+                  )}
+                </Table.Td>
+              </Table.Tr>
+            ))}
           </Table.Tbody>
         </Table>
       </Table.ScrollContainer>
       <Text size="xs" c="dimmed" px="md" py="sm">
-        {plural(judged, 'comparison')}, seeds against seeds: a direction where the 95 % interval of the
+        {plural(comparisons, 'comparison')}, seeds against seeds: a direction where the 95 % interval of the
         difference leaves out zero, equivalence where the 90 % interval lies within the margin (two one-sided
-        tests). With twenty comparisons about one interval misses the truth.
+        tests). With twenty comparisons about one interval misses the truth; p (Holm) is adjusted for all of
+        them. On the same scenarios the very policies that were trained are paired (exact randomisation test
+        of success, signed ranks of steps): that says nothing of further seeds.
       </Text>
     </Panel>
+  )
+}
+
+/** A training's name behind its colour. */
+export function NamedTraining({ comparison, id }: { comparison: Comparison; id: string }) {
+  const color = comparison.experiments.findIndex((one) => one.id === id)
+  return (
+    <Group gap={8} wrap="nowrap">
+      <Swatch color={color} />
+      {comparison.experiments[color]?.name}
+    </Group>
   )
 }

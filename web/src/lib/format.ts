@@ -115,3 +115,13 @@ export function words(identifier: string): string {
   const text = identifier.replaceAll('_', ' ')
   return SPELLED[text] ?? text.charAt(0).toUpperCase() + text.slice(1)
 }
+
+/** "0.034", "below 0.001": a probability that chance alone is as lopsided. */
+export function pValue(p: number): string {
+  return p < 0.001 ? 'below 0.001' : significant(p, 2)
+}
+
+/** "= 0.034", "below 0.001": as it stands behind a p. */
+export function pIs(p: number): string {
+  return p < 0.001 ? pValue(p) : `= ${pValue(p)}`
+}

@@ -1,6 +1,6 @@
 import { screen, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { comparison, curves, form, listed } from '../testing/examples'
+import { comparison, curves, form, listed, profiles } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, startServer } from '../testing/server'
 
@@ -9,6 +9,7 @@ vi.stubGlobal('EventSource', FakeEventSource)
 const routes = {
   'GET /api/compare': comparison,
   'GET /api/compare/curves': curves,
+  'GET /api/compare/profiles': profiles,
   'GET /api/training/form': form,
   'GET /api/experiments': { items: [listed], total: 1, next: null },
 }
@@ -41,8 +42,12 @@ test('a verdict in a word, with its reason, and refused where seeds are few', as
   const server = startServer(routes)
   const { router, user } = open('/compare?experiment=exp1&experiment=exp2')
   const [, refused, better] = within(await screen.findByTestId('verdicts')).getAllByRole('row')
-  expect(refused).toHaveTextContent('AloneSuccessrefusedNo verdict below 5 seeds: Corridor has 2 to show.')
-  expect(better).toHaveTextContent('AloneSteps to the targetbetter8.1 steps to the target fewer')
+  expect(refused).toHaveTextContent(
+    'AloneCorridorSuccessrefusedNo verdict below 5 seeds: Corridor has 2 to show.',
+  )
+  expect(better).toHaveTextContent('AloneCorridorSteps to the targetbetter8.1 steps to the target fewer')
+  expect(better).toHaveTextContent('below 0.001')
+  expect(better).toHaveTextContent('better in 120, worse in 41 of 180p = 0.012 (Holm)')
   expect(screen.getByText(/^1 comparison, seeds against seeds/)).toBeInTheDocument()
 
   const margin = screen.getByRole('textbox', { name: 'Success is equivalent within (points)' })
@@ -50,6 +55,24 @@ test('a verdict in a word, with its reason, and refused where seeds are few', as
   await user.type(margin, '5')
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2&margin=0.05')
   await vi.waitFor(() => expect(server.asked.at(-1)).toContain('margin=0.05'))
+})
+
+test('another base is kept in the address, and beside it what else is there', async () => {
+  const server = startServer(routes)
+  const { router, user } = open('/compare?experiment=exp1&experiment=exp2&margin=0.05')
+  await user.selectOptions(await screen.findByRole('combobox', { name: 'Held against' }), 'Alone')
+  expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2&margin=0.05&base=exp2')
+  await vi.waitFor(() => expect(server.asked.some((path) => path.includes('base=exp2'))).toBe(true))
+})
+
+test('whole distributions: a profile, and how likely one improves on the other', async () => {
+  startServer(routes)
+  open('/compare?experiment=exp1&experiment=exp2')
+  const table = await screen.findByRole('table', { name: 'Probability of improvement' })
+  expect(table).toHaveTextContent(/AloneCorridor62\.0\s%\s*55\.0–69\.0\s%/)
+  const profile = await screen.findByRole('figure', { name: 'Performance profile' })
+  expect(profile).toHaveTextContent('Corridor, 2 seeds')
+  expect(profile).not.toHaveTextContent('Alone')
 })
 
 test('with none chosen there is a list to choose from', async () => {

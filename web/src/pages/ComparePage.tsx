@@ -6,7 +6,8 @@ import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
-import { ComparisonVerdicts } from '../components/ComparisonVerdicts'
+import { ComparisonDistributions } from '../components/ComparisonDistributions'
+import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
@@ -49,16 +50,26 @@ export function ComparePage() {
     )
   }
   const margin = Number(search.get('margin')) || MARGIN
+  const wanted = search.get('base')
+  const base = wanted === EVERY_PAIR || (wanted && chosen.includes(wanted)) ? wanted : (chosen[0] ?? '')
+  /** Keeps a choice in the address; what is chosen anyway does not stand there. */
+  const keep = (name: string, value: string, usual: string) =>
+    setSearch(
+      (before) => {
+        const after = new URLSearchParams(before)
+        if (value === usual) after.delete(name)
+        else after.set(name, value)
+        return after
+      },
+      { replace: true },
+    )
   return (
     <Chosen
       chosen={chosen}
       margin={margin}
-      onMargin={(next) =>
-        setSearch(
-          { experiment: chosen, ...(next === MARGIN ? {} : { margin: String(next) }) },
-          { replace: true },
-        )
-      }
+      onMargin={(next) => keep('margin', String(next), String(MARGIN))}
+      base={base}
+      onBase={(next) => keep('base', next, chosen[0] ?? '')}
       onChange={() => setPicking(true)}
     />
   )
@@ -121,14 +132,18 @@ interface ChosenProps {
   chosen: readonly string[]
   margin: number
   onMargin: (margin: number) => void
+  /** What the others are held against: an id, or `EVERY_PAIR`. */
+  base: string
+  onBase: (base: string) => void
   onChange: () => void
 }
 
-function Chosen({ chosen, margin, onMargin, onChange }: ChosenProps) {
+function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
+  const held = base === EVERY_PAIR ? { pairs: true } : base === chosen[0] ? {} : { base }
   const { data, error, refetch } = $api.useQuery(
     'get',
     '/api/compare',
-    { params: { query: { experiment: [...chosen], margin } } },
+    { params: { query: { experiment: [...chosen], margin, ...held } } },
     { placeholderData: keepPreviousData },
   )
   return (
@@ -164,8 +179,15 @@ function Chosen({ chosen, margin, onMargin, onChange }: ChosenProps) {
             {data ? <Figures comparison={data} /> : <Skeleton height={120} m="md" w="auto" />}
           </Panel>
           {data && data.verdicts.length > 0 && (
-            <ComparisonVerdicts comparison={data} margin={margin} onMargin={onMargin} />
+            <ComparisonVerdicts
+              comparison={data}
+              margin={margin}
+              onMargin={onMargin}
+              base={base}
+              onBase={onBase}
+            />
           )}
+          {data && data.verdicts.length > 0 && <ComparisonDistributions comparison={data} />}
           <Panel
             title="Curves"
             actions={

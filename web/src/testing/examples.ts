@@ -10,6 +10,7 @@ import type {
   Experiment,
   ListedExperiment,
   LiveState,
+  Profiles,
   Replay,
   Reproduction,
   Run,
@@ -352,6 +353,9 @@ export const comparison: Comparison = {
       low: null,
       high: null,
       margin: 0.02,
+      p: null,
+      p_holm: null,
+      paired: null,
       reason: 'No verdict below 5 seeds: Corridor has 2 to show.',
     },
     {
@@ -363,11 +367,24 @@ export const comparison: Comparison = {
       low: -12.3,
       high: -3.9,
       margin: 5.2,
+      p: 0.0004,
+      p_holm: 0.0004,
+      paired: { test: 'signed rank', scenarios: 180, better: 120, worse: 41, p: 0.012, p_holm: 0.012 },
       reason: '8.1 steps to the target fewer, 95 % interval [-12.3, -3.9].',
     },
   ],
+  comparisons: 1,
+  improvements: [{ base: 'exp1', other: 'exp2', value: 0.62, low: 0.55, high: 0.69 }],
   warnings: ['Alone has not been evaluated yet.'],
 } as Comparison
+
+export const profiles: Profiles = {
+  thresholds: [0, 0.5, 1],
+  experiments: [
+    { id: 'exp1', name: 'Corridor', seeds: 2, mean: [0.9, 0.8, 0], low: [0.8, 0.6, 0], high: [1, 0.9, 0.1] },
+    { id: 'exp2', name: 'Alone', seeds: 0, mean: [], low: [], high: [] },
+  ],
+}
 
 const ADVANCED = { 'x-advanced': true }
 

@@ -1,0 +1,78 @@
+/** Whole distributions side by side (Agarwal et al. 2021): how many attempts reach a score, how likely one improves. */
+
+import { Table, Text } from '@mantine/core'
+import { keepPreviousData } from '@tanstack/react-query'
+import { useMemo } from 'react'
+import { $api } from '../api/client'
+import type { Comparison } from '../api/types'
+import { MetricChart } from '../charts/MetricChart'
+import { chartOfProfiles } from '../charts/shape'
+import { percent, percentRange, significant } from '../lib/format'
+import classes from './ComparisonDistributions.module.css'
+import { NamedTraining } from './ComparisonVerdicts'
+import table from './ExperimentTable.module.css'
+import { Panel } from './ui'
+import ui from './ui.module.css'
+
+const score = (value: number) => significant(value, 2)
+
+export function ComparisonDistributions({ comparison }: { comparison: Comparison }) {
+  const experiment = comparison.experiments.map((one) => one.id)
+  const { data, error } = $api.useQuery(
+    'get',
+    '/api/compare/profiles',
+    { params: { query: { experiment } } },
+    { placeholderData: keepPreviousData },
+  )
+  const chart = useMemo(() => (data ? chartOfProfiles(data) : { x: [], lines: [] }), [data])
+  return (
+    <Panel title="Whole distributions">
+      <div className={classes.columns}>
+        <MetricChart
+          title="Performance profile"
+          note="share of attempts that score more"
+          data={chart}
+          format={percent}
+          yRange={[0, 1.02]}
+          xTitle="Score: path efficiency of an arrival, else 0"
+          xFormat={score}
+          empty={error && !data ? 'Could not be loaded' : data ? 'Nothing evaluated yet' : ''}
+        />
+        <div className={classes.column}>
+          <Table.ScrollContainer type="native" minWidth={380}>
+            <Table className={table.table} aria-label="Probability of improvement" data-testid="improvements">
+              <Table.Thead>
+                <Table.Tr>
+                  <Table.Th>Training</Table.Th>
+                  <Table.Th>Beside</Table.Th>
+                  <Table.Th>Probability of improvement</Table.Th>
+                </Table.Tr>
+              </Table.Thead>
+              <Table.Tbody>
+                {comparison.improvements.map(({ base, other, value, low, high }) => (
+                  <Table.Tr key={`${base} ${other}`}>
+                    <Table.Td className={table.name}>
+                      <NamedTraining comparison={comparison} id={other} />
+                    </Table.Td>
+                    <Table.Td className={table.name}>
+                      <NamedTraining comparison={comparison} id={base} />
+                    </Table.Td>
+                    <Table.Td className={ui.number}>
+                      <strong>{percent(value)}</strong>{' '}
+                      <span className={ui.quiet}>{percentRange(low, high)}</span>
+                    </Table.Td>
+                  </Table.Tr>
+                ))}
+              </Table.Tbody>
+            </Table>
+          </Table.ScrollContainer>
+          <Text size="xs" c="dimmed" mt="sm">
+            {comparison.improvements.length === 0
+              ? 'How likely a seed of one scores higher than a seed of the other in a scenario: told of five seeds on either side, on one suite.'
+              : 'How likely a seed of one scores higher than a seed of the other in a scenario; equal scores count half, so 50 % is no difference. 95 % interval over seeds (Student’s t on the logit).'}
+          </Text>
+        </div>
+      </div>
+    </Panel>
+  )
+}
