@@ -8,6 +8,8 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from server import pages
 from server.abandoned import AbandonedRequestsMiddleware
+from server.alerts import endpoints as alerts
+from server.alerts.sending import keep_alerting
 from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
 from server.audit import endpoints as audit
@@ -71,6 +73,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     login.router,
     people.router,
     audit.router,
+    alerts.router,
     projects.router,
     queueing.router,
     experiments.router,
@@ -108,7 +111,7 @@ _COMPRESS_LEVEL = 3
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied, keep_studying)
+BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied, keep_studying, keep_alerting)
 
 
 def create_services(settings: Settings) -> Services:

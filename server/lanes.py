@@ -91,6 +91,8 @@ class Lanes:
     # Each takes 64 MiB and a core for some 50 ms.
     passwords: Lane = field(default_factory=lambda: Lane("sign-ins", threads=2, queue=16))
     sweeper: Lane = field(default_factory=lambda: Lane("sweeps", threads=1))
+    # Of alerts: names are looked up and mail is sent there, each of which may take its time.
+    alerts: Lane = field(default_factory=lambda: Lane("alerts", threads=4))
 
     def all(self) -> tuple[Lane, ...]:
         """Every lane, for whoever counts."""
@@ -103,4 +105,5 @@ class Lanes:
             self.accounts,
             self.passwords,
             self.sweeper,
+            self.alerts,
         )

@@ -2,7 +2,7 @@
 
 import ipaddress
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -84,6 +84,21 @@ class Settings(BaseSettings):
         le=64,
         description="Replays, exports and evaluations side by side in the workers of `mapless up`; 2 if not given.",
     )
+    public_url: str | None = Field(
+        None, description="How people reach the pages, for links in alerts; the server's own URL if not given."
+    )
+    alerts_private_addresses: bool = Field(
+        False, description="Whether webhooks may go to addresses of this machine and of private networks."
+    )
+    smtp_host: str | None = Field(None, description="Mail server of alerts; without one there is no mail.")
+    smtp_port: int = Field(587, ge=1, le=65_535, description="Its port.")
+    smtp_security: Literal["starttls", "tls", "none"] = Field(
+        "starttls", description="`starttls`, `tls` from the first byte (port 465), or `none`."
+    )
+    smtp_user: str | None = Field(None, description="Who logs in there; nobody if not given.")
+    smtp_password: SecretStr | None = Field(None, description="And with what.")
+    smtp_from: str | None = Field(None, description="Sender of the mail; `mapless@` the mail server's name if not given.")
+
     lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run or job.")
     extensions: str = Field("", description=EXTENSIONS_SETTING)
     log_format: LogFormat = Field("text", description="Of the log on standard error: `text`, or `json`, an object a line.")
@@ -160,3 +175,8 @@ class Settings(BaseSettings):
             return self.server_url.rstrip("/")
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}"
+
+    @property
+    def resolved_public_url(self) -> str:
+        """Base URL of the pages, without a trailing slash."""
+        return self.public_url.rstrip("/") if self.public_url else self.resolved_server_url

@@ -29,6 +29,10 @@ TokenScope = Literal["read", "launch", "admin"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 StudyState = Literal["running", "judging", "done", "stopped"]
 TrialState = Literal["running", "complete", "pruned", "failed", "stopped"]
+AlertEvent = Literal["ended", "failed", "diagnosis", "success", "stuck", "disk"]
+AlertChannel = Literal["browser", "webhook", "mail"]
+AlertFormat = Literal["json", "slack", "discord", "teams"]
+AlertState = Literal["waiting", "sending", "sent", "failed", "unclear", "withheld"]
 
 
 class Base(DeclarativeBase):
@@ -179,7 +183,7 @@ class Run(Base):
     """
 
     __tablename__ = "runs"
-    __table_args__ = (Index("runs_by_state", "state"),)
+    __table_args__ = (Index("runs_by_state", "state"), Index("runs_by_end", "finished_at"))
 
     id: Mapped[str] = mapped_column(String(16), primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), index=True)
@@ -563,3 +567,53 @@ class PolicyEvaluation(Base):
     # Zlib-compressed JSON, as of `Evaluation`; and of where the robots drove (`workers.job_protocol.Measurement`).
     episodes: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     ways: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+
+
+class AlertRule(Base):
+    """Of what somebody wants to hear, and how."""
+
+    __tablename__ = "alert_rules"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    # Whose it is; null for who holds the token of the installation.
+    user_id: Mapped[str | None] = mapped_column(ForeignKey("users.id", ondelete="CASCADE"), index=True)
+    # Null for every project that its person may see.
+    project_id: Mapped[str | None] = mapped_column(ForeignKey("projects.id", ondelete="CASCADE"))
+    event: Mapped[AlertEvent] = mapped_column(String(12))
+    # Success rate, minutes in the queue, or GiB that are free; null for the other events.
+    threshold: Mapped[float | None] = mapped_column(Float)
+    channel: Mapped[AlertChannel] = mapped_column(String(8))
+    # A URL or an address; null for the browser.
+    target: Mapped[str | None] = mapped_column(Text)
+    format: Mapped[AlertFormat] = mapped_column(String(8))
+    # Signs what a webhook is sent: it is kept as it is, for a signature takes it whole.
+    secret: Mapped[str | None] = mapped_column(String(64))
+    enabled: Mapped[bool] = mapped_column(Boolean, default=True)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+
+
+class Alert(Base):
+    """What a rule has had to say. `key` names the rule and what happened: nothing is said twice.
+
+    Who sends one says so first (`sending`), until `next_at`; where that has passed, it ended in between, and whether the
+    message arrived is unclear. Of one that waits, `next_at` is when it is due.
+    """
+
+    __tablename__ = "alerts"
+    __table_args__ = (Index("alerts_by_state", "state", "next_at"), Index("alerts_by_rule", "rule_id", "created_at"))
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    rule_id: Mapped[str] = mapped_column(ForeignKey("alert_rules.id", ondelete="CASCADE"))
+    key: Mapped[str] = mapped_column(String(120), unique=True)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    title: Mapped[str] = mapped_column(String(200))
+    text: Mapped[str] = mapped_column(Text)
+    project_id: Mapped[str | None] = mapped_column(String(16))
+    experiment_id: Mapped[str | None] = mapped_column(String(16))
+    run_id: Mapped[str | None] = mapped_column(String(16))
+    state: Mapped[AlertState] = mapped_column(String(8))
+    tries: Mapped[int] = mapped_column(Integer, default=0)
+    next_at: Mapped[float | None] = mapped_column(Float)
+    sent_at: Mapped[float | None] = mapped_column(Float)
+    # What went wrong, in a sentence; null where nothing did.
+    outcome: Mapped[str | None] = mapped_column(Text)

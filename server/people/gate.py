@@ -122,7 +122,7 @@ class Gate:
             row = CredentialRepository(session).session(hashed=hashed, session_id=session_id)
             if row is None or row.expires_at <= now or (hashed == row.previous_hash and _too_old(row, now)):
                 return _known(None)
-            principal = _principal("person", session, row.user_id, row.id, "admin", None)
+            principal = principal_of_account("person", session, row.user_id, row.id, "admin", None)
         if principal is not None and row.seen_at < now - _SEEN_SECONDS:
             self._seen(tables.LoginSession, row.id, now)
         # Who brings the secret before has been given the new one by another answer.
@@ -135,7 +135,7 @@ class Gate:
             row = CredentialRepository(session).api_token(hashed=hashed, token_id=token_id)
             if row is None or (row.expires_at is not None and row.expires_at <= now):
                 return _known(None)
-            principal = _principal("token", session, row.user_id, row.id, row.scope, row.projects)
+            principal = principal_of_account("token", session, row.user_id, row.id, row.scope, row.projects)
         if principal is not None and (row.seen_at is None or row.seen_at < now - _SEEN_SECONDS):
             self._seen(tables.ApiToken, row.id, now)
         return _known(principal)
@@ -173,7 +173,7 @@ def _known(principal: Principal | None, rotate_after: float = float("inf")) -> _
     return _Known(principal, time.monotonic() + _REMEMBERED_SECONDS, rotate_after)
 
 
-def _principal(
+def principal_of_account(
     kind: str, session: Session, user_id: str, credential: str, scope: TokenScope, projects: list[str] | None
 ) -> Principal | None:
     """What an account may do, within a token's scope and projects; None where it is closed."""

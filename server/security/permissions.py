@@ -98,6 +98,15 @@ class _OwnAccount(Permission):
             raise ForbiddenError("This takes an account, signed in with a browser.")
 
 
+class _OwnAlerts(Permission):
+    """With a browser, also that of the installation's owner: a token tells nobody anything."""
+
+    async def check(self, principal: Principal, connection: HTTPConnection, services: Services) -> None:
+        _somebody(principal)
+        if principal.kind not in ("person", "owner"):
+            raise ForbiddenError("This takes somebody who is signed in with a browser.")
+
+
 class _Kind(Permission):
     """A program with a door of its own; `administrates` lets administrators in as well."""
 
@@ -191,6 +200,7 @@ LAUNCH = _dependency(_Anywhere("launch", "editor"))
 INVITE = _dependency(_Anywhere("invite", "admin"))
 ADMINISTRATE = _dependency(_Installation("administrate"))
 OWN_ACCOUNT = _dependency(_OwnAccount("own account"))
+OWN_ALERTS = _dependency(_OwnAlerts("own alerts"))
 WORK = _dependency(_Kind("work", "worker"))
 SCRAPE = _dependency(_Kind("scrape", "scraper", administrators=True))
 

@@ -179,6 +179,16 @@ TABLE = {
         POST /api/account/tokens
         DELETE /api/account/tokens/{token_id}
     """,
+    "own alerts": """
+        GET /api/alerts
+        GET /api/alerts/news
+        GET /api/alerts/channels
+        GET /api/alerts/rules
+        POST /api/alerts/rules
+        PATCH /api/alerts/rules/{rule_id}
+        DELETE /api/alerts/rules/{rule_id}
+        POST /api/alerts/rules/{rule_id}/test
+    """,
     "work": """
         POST /api/worker/heartbeat
         POST /api/worker/runs/{run_id}/claim
@@ -219,6 +229,13 @@ ANSWERS: dict[str, dict[str, int]] = {
     "administrate": {"administrator": OK, "owner": OK, "administrator's token": OK},
     "own account": {
         "owner": 403,
+        "read token": 403,
+        "launch token": 403,
+        "admin token": 403,
+        "foreign token": 403,
+        "administrator's token": 403,
+    },
+    "own alerts": {
         "read token": 403,
         "launch token": 403,
         "admin token": 403,

@@ -81,6 +81,10 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/ProjectPage')).ProjectPage }),
           },
           {
+            path: 'alerts',
+            lazy: async () => ({ Component: (await import('./pages/AlertsPage')).AlertsPage }),
+          },
+          {
             path: 'people',
             lazy: async () => ({ Component: (await import('./pages/PeoplePage')).PeoplePage }),
           },

@@ -41,6 +41,12 @@ export function messageOf(error: unknown): string {
   return error instanceof Error ? error.message : 'Something unexpected happened.'
 }
 
+/** What stands in a refusal: the sentences of its fields, or its own. */
+export function refusalOf(error: unknown): string {
+  const fields = error instanceof ApiError ? error.problems.map(({ msg }) => msg) : []
+  return fields.length > 0 ? fields.join(' ') : messageOf(error)
+}
+
 /** Whether the server itself refused (and will again), rather than being out of reach. */
 export const isRefusal = (error: unknown): boolean => error instanceof ApiError && error.status < 500
 export const isNotFound = (error: unknown): boolean => error instanceof ApiError && error.status === 404

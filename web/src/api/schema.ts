@@ -128,6 +128,134 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/alerts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Alerts
+         * @description What one's rules have said, the newest first, and what came of it.
+         */
+        get: operations["list_alerts_api_alerts_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/alerts/channels": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Alert Channels
+         * @description How alerts can be sent from here.
+         */
+        get: operations["get_alert_channels_api_alerts_channels_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/alerts/news": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Alert News
+         * @description What the browser is to show.
+         */
+        get: operations["list_alert_news_api_alerts_news_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/alerts/rules": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Alert Rules
+         * @description One's rules, the oldest first.
+         */
+        get: operations["list_alert_rules_api_alerts_rules_get"];
+        put?: never;
+        /**
+         * Make Alert Rule
+         * @description Be told of something from now on.
+         */
+        post: operations["make_alert_rule_api_alerts_rules_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/alerts/rules/{rule_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Delete Alert Rule
+         * @description Delete a rule with what it has said.
+         */
+        delete: operations["delete_alert_rule_api_alerts_rules__rule_id__delete"];
+        options?: never;
+        head?: never;
+        /**
+         * Edit Alert Rule
+         * @description Switch a rule on or off.
+         */
+        patch: operations["edit_alert_rule_api_alerts_rules__rule_id__patch"];
+        trace?: never;
+    };
+    "/api/alerts/rules/{rule_id}/test": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Test Alert Rule
+         * @description Let a rule say something; what comes of it is on the list.
+         */
+        post: operations["test_alert_rule_api_alerts_rules__rule_id__test_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/arenas": {
         parameters: {
             query?: never;
@@ -2391,6 +2519,203 @@ export interface components {
              * @enum {string}
              */
             name: "actions";
+        };
+        /**
+         * Alert
+         * @description Something that was, or is about to be, told.
+         */
+        Alert: {
+            /**
+             * Channel
+             * @enum {string}
+             */
+            channel: "browser" | "webhook" | "mail";
+            /** Created At */
+            created_at: number;
+            /**
+             * Event
+             * @enum {string}
+             */
+            event: "ended" | "failed" | "diagnosis" | "success" | "stuck" | "disk";
+            /** Experiment Id */
+            experiment_id: string | null;
+            /** Id */
+            id: number;
+            /**
+             * Next At
+             * @description When the next try is due; null where none is.
+             */
+            next_at: number | null;
+            /**
+             * Outcome
+             * @description What went wrong; null where nothing did.
+             */
+            outcome: string | null;
+            /** Rule Id */
+            rule_id: string;
+            /** Run Id */
+            run_id: string | null;
+            /** Sent At */
+            sent_at: number | null;
+            /**
+             * State
+             * @description `unclear`: the server ended while it was being sent, so it is not sent again; `withheld`: the rule had too much to say.
+             * @enum {string}
+             */
+            state: "waiting" | "sending" | "sent" | "failed" | "unclear" | "withheld";
+            /** Target */
+            target: string | null;
+            /** Text */
+            text: string;
+            /** Title */
+            title: string;
+            /** Tries */
+            tries: number;
+        };
+        /**
+         * AlertChannels
+         * @description How alerts can be sent from here.
+         */
+        AlertChannels: {
+            /** Chooses Address */
+            chooses_address: boolean;
+            /**
+             * Mail
+             * @description Whether a mail server is set.
+             */
+            mail: boolean;
+            /**
+             * Own Address
+             * @description Where mail goes for who does not administrate; null where one may choose.
+             */
+            own_address: string | null;
+        };
+        /**
+         * AlertNews
+         * @description What the browser is to show.
+         */
+        AlertNews: {
+            /**
+             * Items
+             * @description The newest of them, the oldest first; twenty at most.
+             */
+            items: components["schemas"]["Alert"][];
+            /**
+             * Newest
+             * @description Ask for what came after it the next time.
+             */
+            newest: number;
+        };
+        /**
+         * AlertPage
+         * @description Some of what one's rules have said, the newest first.
+         */
+        AlertPage: {
+            /** Items */
+            items: components["schemas"]["Alert"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
+         * AlertRule
+         * @description A rule of one's own.
+         */
+        AlertRule: {
+            /**
+             * Channel
+             * @enum {string}
+             */
+            channel: "browser" | "webhook" | "mail";
+            /** Created At */
+            created_at: number;
+            /** Enabled */
+            enabled: boolean;
+            /**
+             * Event
+             * @enum {string}
+             */
+            event: "ended" | "failed" | "diagnosis" | "success" | "stuck" | "disk";
+            /**
+             * Format
+             * @enum {string}
+             */
+            format: "json" | "slack" | "discord" | "teams";
+            /** Id */
+            id: string;
+            /**
+             * Project
+             * @description Its name.
+             */
+            project: string | null;
+            /** Project Id */
+            project_id: string | null;
+            /** Target */
+            target: string | null;
+            /** Threshold */
+            threshold: number | null;
+        };
+        /**
+         * AlertRuleCreate
+         * @description What to tell of, and how.
+         */
+        AlertRuleCreate: {
+            /**
+             * Channel
+             * @enum {string}
+             */
+            channel: "browser" | "webhook" | "mail";
+            /**
+             * Event
+             * @description `ended`: all runs of a training have; `failed`: a run has; `diagnosis`: one was found; `success`: a run's evaluation is above the threshold; `stuck`: a run waits for longer; `disk`: less is left.
+             * @enum {string}
+             */
+            event: "ended" | "failed" | "diagnosis" | "success" | "stuck" | "disk";
+            /**
+             * Format
+             * @description Of what a webhook is sent.
+             * @default json
+             * @enum {string}
+             */
+            format: "json" | "slack" | "discord" | "teams";
+            /**
+             * Project Id
+             * @description Null for every project that one may see.
+             */
+            project_id?: string | null;
+            /**
+             * Target
+             * @description URL of a webhook or a mail address; null for the browser.
+             */
+            target?: string | null;
+            /**
+             * Threshold
+             * @description Success rate, minutes in the queue, or GiB left; null otherwise.
+             */
+            threshold?: number | null;
+        };
+        /**
+         * AlertRuleEdit
+         * @description What can be changed of a rule.
+         */
+        AlertRuleEdit: {
+            /** Enabled */
+            enabled: boolean;
+        };
+        /**
+         * AlertRulePage
+         * @description Some of one's rules, the oldest first.
+         */
+        AlertRulePage: {
+            /** Items */
+            items: components["schemas"]["AlertRule"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
         };
         /**
          * AlignmentTerm
@@ -6124,6 +6449,49 @@ export interface components {
         NetworkConfig: {
             /** Name */
             name: string;
+        };
+        /**
+         * NewAlertRule
+         * @description A rule that was just made.
+         */
+        NewAlertRule: {
+            /**
+             * Channel
+             * @enum {string}
+             */
+            channel: "browser" | "webhook" | "mail";
+            /** Created At */
+            created_at: number;
+            /** Enabled */
+            enabled: boolean;
+            /**
+             * Event
+             * @enum {string}
+             */
+            event: "ended" | "failed" | "diagnosis" | "success" | "stuck" | "disk";
+            /**
+             * Format
+             * @enum {string}
+             */
+            format: "json" | "slack" | "discord" | "teams";
+            /** Id */
+            id: string;
+            /**
+             * Project
+             * @description Its name.
+             */
+            project: string | null;
+            /** Project Id */
+            project_id: string | null;
+            /**
+             * Secret
+             * @description With which a webhook checks the signature; shown this once.
+             */
+            secret: string | null;
+            /** Target */
+            target: string | null;
+            /** Threshold */
+            threshold: number | null;
         };
         /**
          * NewApiToken
@@ -10704,6 +11072,387 @@ export interface operations {
             };
             /** @description No such thing */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_alerts_api_alerts_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlertPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_alert_channels_api_alerts_channels_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlertChannels"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_alert_news_api_alerts_news_get: {
+        parameters: {
+            query?: {
+                /** @description What came after this alert; nothing if not given. */
+                after?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlertNews"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    list_alert_rules_api_alerts_rules_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlertRulePage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    make_alert_rule_api_alerts_rules_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AlertRuleCreate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewAlertRule"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Takes more rights */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_alert_rule_api_alerts_rules__rule_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                rule_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    edit_alert_rule_api_alerts_rules__rule_id__patch: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                rule_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AlertRuleEdit"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlertRule"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    test_alert_rule_api_alerts_rules__rule_id__test_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                rule_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -10,6 +10,7 @@ import {
 } from '@mantine/core'
 import { Suspense } from 'react'
 import { Link, NavLink, Outlet, useLocation } from 'react-router'
+import { useAlertNews } from '../alerts/useAlertNews'
 import { isUnauthorized } from '../api/errors'
 import { useServerEvents } from '../api/events'
 import type { Status } from '../api/types'
@@ -17,7 +18,7 @@ import { useStatus } from '../api/useStatus'
 import { plural } from '../lib/format'
 import { LoginPage } from '../pages/LoginPage'
 import { AccountMenu } from './AccountMenu'
-import { IconMoon, IconSun } from './icons'
+import { IconBell, IconMoon, IconSun } from './icons'
 import classes from './Shell.module.css'
 
 export function Shell() {
@@ -27,6 +28,7 @@ export function Shell() {
   const joining = useLocation().pathname === '/join'
   const offline = isError && !locked
   useServerEvents(status !== undefined && !locked)
+  useAlertNews(status !== undefined && !locked)
 
   return (
     <div className={classes.shell}>
@@ -58,6 +60,13 @@ export function Shell() {
         )}
         <Group gap={10} ml="auto" wrap="nowrap">
           {!locked && <ServiceState status={status} offline={offline} />}
+          {!locked && (
+            <Tooltip label="Alerts">
+              <ActionIcon component={Link} to="/alerts" variant="subtle" color="gray" aria-label="Alerts">
+                <IconBell size={18} stroke={1.6} />
+              </ActionIcon>
+            </Tooltip>
+          )}
           {!locked && <AccountMenu />}
           <SchemeSwitch />
         </Group>

@@ -17,6 +17,7 @@ const KINDS = [
   'campaign',
   'checkpoint',
   'arena',
+  'alert_rule',
   'project',
   'member',
   'invitation',

@@ -4,18 +4,12 @@ import { useQueryClient } from '@tanstack/react-query'
 import { useState } from 'react'
 import { useNavigate } from 'react-router'
 import { $api, api } from '../../api/client'
-import { ApiError, messageOf } from '../../api/errors'
+import { messageOf, refusalOf } from '../../api/errors'
 import { filesForUpload, type UploadFile } from '../../lib/upload'
 import { IconUpload } from '../icons'
 import { useLaunchProject } from '../people/useLaunchProject'
 import { Notice } from '../ui'
 import { evaluate, policyKey } from './choices'
-
-/** What stands in a refusal: the sentences of its fields, or its own. */
-function refusalOf(error: unknown): string {
-  const fields = error instanceof ApiError ? error.problems.map(({ msg }) => msg) : []
-  return fields.length > 0 ? fields.join(' ') : messageOf(error)
-}
 
 export function PolicyUpload() {
   const client = useQueryClient()

@@ -1,0 +1,1 @@
+"""Alerts: what people want to hear of, noticed once and sent where they want it."""
