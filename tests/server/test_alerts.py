@@ -426,7 +426,7 @@ def test_a_refusal_for_good_and_a_last_try_end_it(client: TestClient, services: 
 
 
 def test_a_server_that_ends_between_sending_and_recording_does_not_send_again(
-    client: TestClient, services: Services, clock: Clock
+    client: TestClient, services: Services, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     receiver = HttpReceiver()
 
@@ -439,7 +439,7 @@ def test_a_server_that_ends_between_sending_and_recording_does_not_send_again(
         def dies(*_: object) -> None:
             raise SystemError
 
-        dying._settle = dies  # type: ignore[method-assign]
+        monkeypatch.setattr(dying, "_settle", dies)
         await dying.send_due()
         await dying.settled()
         assert len(receiver.taken) == 1
