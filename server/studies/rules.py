@@ -65,7 +65,7 @@ def hopeless(trial: SeedRungs, complete: Sequence[SeedRungs], first: int) -> str
         best = max(value for at in range(1, rung + 1) if (value := _together(trial, seeds, at)) is not None)
         if best < median(others):
             reason = (
-                f"Stopped early: after evaluation {rung} at best {best:.1%} of its episodes had arrived with seeds "
+                f"After evaluation {rung} at best {best:.1%} of its episodes had arrived with seeds "
                 f"{', '.join(seeds)}, and {median(others):.1%} with the same ones of the median trial."
             )
             return reason.replace("%", " %")

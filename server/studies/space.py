@@ -17,6 +17,9 @@ Values = dict[str, Value]
 MAX_SETTINGS = 20
 MAX_VALUES = 50
 
+# Where trials drive, what counts as an arrival, when they are looked at, and what on: the same for all of them.
+_MEASURE = ("task.arena", "task.arrival_distance", "task.collision_distance", "task.step_limit", "evaluation", "device")
+
 _Path = Annotated[
     str,
     Field(
@@ -127,8 +130,8 @@ class Space:
 
     def _check_kind(self, setting: RangedSetting | ListedSetting) -> None:
         path = setting.path
-        if path.startswith("task.arena."):
-            raise UnusableSettingError(path, "another arena is another measure: trials would not be comparable")
+        if any(path == fixed or path.startswith(f"{fixed}.") for fixed in _MEASURE):
+            raise UnusableSettingError(path, "it changes what trials are measured by: they could not be compared")
         try:
             value = _value_at(self.base, path)
         except (KeyError, IndexError, TypeError, ValueError):

@@ -61,6 +61,14 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/LeaderboardPage')).LeaderboardPage }),
           },
           {
+            path: 'studies',
+            lazy: async () => ({ Component: (await import('./pages/StudiesPage')).StudiesPage }),
+          },
+          {
+            path: 'studies/:studyId',
+            lazy: async () => ({ Component: (await import('./pages/StudyPage')).StudyPage }),
+          },
+          {
             path: 'reproduction',
             lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },

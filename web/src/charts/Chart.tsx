@@ -4,6 +4,7 @@ import { useEffect, useMemo, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
+import { roundTick } from './axis'
 import classes from './Chart.module.css'
 import { lineColor } from './palette'
 import { type ChartData, type Line, lastValue, valueAt } from './series'
@@ -162,9 +163,6 @@ function withAlpha(hex: string, alpha: number): string {
     .toString(16)
     .padStart(2, '0')}`
 }
-
-/** Ticks are round numbers: "75.0 %" -> "75 %". */
-const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
 
 function appearance(
   dark: boolean,

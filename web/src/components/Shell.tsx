@@ -48,6 +48,7 @@ export function Shell() {
             <NavLink to="/new">
               New<span className={classes.wide}> training</span>
             </NavLink>
+            <NavLink to="/studies">Studies</NavLink>
             <NavLink to="/compare">Compare</NavLink>
             <NavLink to="/evaluations">
               Eval<span className={classes.wide}>uations</span>

@@ -5,7 +5,9 @@ import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
 import { type Field, initialOf } from './layout'
 import { problemOf } from './problems'
+import { SearchInput } from './SearchInput'
 import { type Json, range, type Schema } from './schema'
+import { freshSearch, useSearched } from './search'
 import { TermsInput } from './TermsInput'
 import { TicksInput } from './TicksInput'
 import type { Form } from './useForm'
@@ -29,10 +31,29 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
   const value = valueAt(form.values, field.path) ?? null
   const fresh = initialOf(field, form.values, initial)
   const error = problemOf(form.problems, field.key)
+  const search = useSearched(field)
+  if (search?.searched !== undefined)
+    return <SearchInput field={field} searched={search.searched} error={error} onChange={search.set} />
   const common = {
     id: fieldId(field.key),
     label: field.label,
-    description: <Description field={field} value={value} form={form} initial={fresh} />,
+    description: (
+      <>
+        <Description field={field} value={value} form={form} initial={fresh} />
+        {search && (
+          <Anchor
+            component="button"
+            type="button"
+            inherit
+            ml={6}
+            aria-label={`Search ${field.label}`}
+            onClick={() => search.set(freshSearch(field, value))}
+          >
+            {field.kind === 'number' ? 'Try a range' : 'Try several'}
+          </Anchor>
+        )}
+      </>
+    ),
     error,
     inputWrapperOrder: ['label', 'input', 'error', 'description'] as (
       | 'label'

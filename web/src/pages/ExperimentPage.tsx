@@ -79,6 +79,11 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
           <Text size="sm" c="dimmed">
             launched {dateTime(experiment.created_at)}
           </Text>
+          {experiment.study_id && (
+            <Anchor component={Link} to={`/studies/${experiment.study_id}`} size="sm">
+              a trial of a study
+            </Anchor>
+          )}
           {experiment.campaign && (
             <Anchor component={Link} to={`/reproduction?campaign=${experiment.campaign}`} size="sm">
               a row of the paper's tables

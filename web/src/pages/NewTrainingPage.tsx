@@ -8,12 +8,14 @@ import type { components } from '../api/schema'
 import type { Experiment, Preset, ShippedPolicy, StartFrom, StartPolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
 import { useLaunchProject } from '../components/people/useLaunchProject'
+import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
 import { fieldsOf } from '../form/layout'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
 import { START_FIELD, StartFromInput } from '../form/StartFromInput'
 import type { Json, Schema } from '../form/schema'
+import { SearchContext, settingsOf, useSearchState } from '../form/search'
 import { useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
 import { arenaFromSearch } from '../lib/arenas'
@@ -25,6 +27,7 @@ import classes from './NewTrainingPage.module.css'
 const LONGEST_COPIED_NAME = 110
 
 type ExperimentLaunch = components['schemas']['ExperimentLaunch']
+type StudyLaunch = components['schemas']['StudyLaunch']
 
 export function NewTrainingPage() {
   useTitle('New training')
@@ -191,7 +194,22 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       if (error instanceof ApiError) form.refuse(error.problems)
     },
   })
+  const search = useSearchState(`${draft}:search`)
+  const [choices, setChoices] = useState(FIRST_CHOICES)
+  const launchStudy = $api.useMutation('post', '/api/studies', {
+    onSuccess: (study) => {
+      sessionStorage.removeItem(draft)
+      search.clear()
+      return navigate(`/studies/${study.id}`)
+    },
+    onError: (error) => {
+      if (error instanceof ApiError) form.refuse(error.problems)
+    },
+  })
   const fields = fieldsOf(schema, schema, form.values)
+  const settings = settingsOf(search.searched, fields)
+  const isStudy = settings.length > 0
+  const launched = isStudy ? launchStudy : launch
   const seeds = fields.find((field) => field.key === 'seeds')
   const name = fields.filter((field) => field.key === 'name')
   const main = fields.filter((field) => !field.advanced && field !== seeds && field.key !== 'name')
@@ -202,7 +220,9 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
   const preset = presets.find((one) => sameValue(fresh(training), fresh(one.training as unknown as Json)))
   const runs = valueAt(form.values, ['seeds'])
   const steps = valueAt(training, ['steps'])
-  const otherError = launch.error && !(launch.error instanceof ApiError && launch.error.problems.length > 0)
+  const otherError =
+    launched.error && !(launched.error instanceof ApiError && launched.error.problems.length > 0)
+  const into = project === undefined ? {} : { project_id: project }
 
   return (
     <form
@@ -211,53 +231,67 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       onSubmit={(event) => {
         event.preventDefault()
         const values = form.values as unknown as ExperimentLaunch
-        launch.mutate({ body: project === undefined ? values : { ...values, project_id: project } })
+        if (isStudy) {
+          const { seeds, ...rest } = choices
+          const tuning = Array.from({ length: seeds }, (_, seed) => seed)
+          const study = {
+            name: values.name,
+            training: values.training,
+            settings,
+            seeds: tuning,
+            ...rest,
+            ...into,
+          }
+          launchStudy.mutate({ body: study as StudyLaunch })
+        } else launch.mutate({ body: { ...values, ...into } })
       }}
     >
-      <Stack gap="md" className={classes.fields}>
-        {kept && changed && (
-          <Text size="sm" c="dimmed">
-            As you left it.{' '}
-            <Anchor component="button" type="button" inherit onClick={() => form.replace(initial)}>
-              Start over
-            </Anchor>
-          </Text>
-        )}
-        <ProblemSummary fields={[...fields, START_FIELD]} problems={form.problems} root={schema} />
-        <Panel>
-          <Stack gap="lg">
-            <FieldGrid fields={name} {...shared} />
-            <div>
-              <Input.Label labelElement="div" id="preset-label" mb={2} display="block">
-                Settings
-              </Input.Label>
-              <SegmentedControl
-                aria-labelledby="preset-label"
-                className={classes.presets}
-                data={[
-                  ...presets.map(({ id, title }) => ({ value: id, label: title })),
-                  ...(preset ? [] : [{ value: 'own', label: 'Your settings' }]),
-                ]}
-                value={preset?.id ?? 'own'}
-                onChange={(id) => {
-                  const chosen = presets.find((one) => one.id === id)
-                  if (!chosen) return
-                  const start = valueAt(training, ['start_from'])
-                  const settings = chosen.training as unknown as Json
-                  form.set(['training'], start ? withValue(settings, ['start_from'], start) : settings)
-                }}
-              />
-              <Text size="xs" c="dimmed" mt={6} mih={18}>
-                {preset?.description ??
-                  'Changed by you; choosing a preset again sets the settings below back to it.'}
-              </Text>
-            </div>
-            <StartFromInput form={form} />
-            <FieldGrid fields={main} {...shared} />
-          </Stack>
-        </Panel>
-        <AdvancedFields fields={advanced} {...shared} />
-      </Stack>
+      <SearchContext value={search}>
+        <Stack gap="md" className={classes.fields}>
+          {kept && changed && (
+            <Text size="sm" c="dimmed">
+              As you left it.{' '}
+              <Anchor component="button" type="button" inherit onClick={() => form.replace(initial)}>
+                Start over
+              </Anchor>
+            </Text>
+          )}
+          <ProblemSummary fields={[...fields, START_FIELD]} problems={form.problems} root={schema} />
+          <Panel>
+            <Stack gap="lg">
+              <FieldGrid fields={name} {...shared} />
+              <div>
+                <Input.Label labelElement="div" id="preset-label" mb={2} display="block">
+                  Settings
+                </Input.Label>
+                <SegmentedControl
+                  aria-labelledby="preset-label"
+                  className={classes.presets}
+                  data={[
+                    ...presets.map(({ id, title }) => ({ value: id, label: title })),
+                    ...(preset ? [] : [{ value: 'own', label: 'Your settings' }]),
+                  ]}
+                  value={preset?.id ?? 'own'}
+                  onChange={(id) => {
+                    const chosen = presets.find((one) => one.id === id)
+                    if (!chosen) return
+                    const start = valueAt(training, ['start_from'])
+                    const settings = chosen.training as unknown as Json
+                    form.set(['training'], start ? withValue(settings, ['start_from'], start) : settings)
+                  }}
+                />
+                <Text size="xs" c="dimmed" mt={6} mih={18}>
+                  {preset?.description ??
+                    'Changed by you; choosing a preset again sets the settings below back to it.'}
+                </Text>
+              </div>
+              <StartFromInput form={form} />
+              <FieldGrid fields={main} {...shared} />
+            </Stack>
+          </Panel>
+          <AdvancedFields fields={advanced} {...shared} />
+        </Stack>
+      </SearchContext>
       <aside className={classes.launch}>
         <Panel>
           <Stack gap="md">
@@ -271,15 +305,21 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                 onChange={(value) => value && choose(value)}
               />
             )}
-            {seeds && <SeedsInput key={Array.isArray(runs) ? 'list' : 'none'} field={seeds} form={form} />}
+            {isStudy ? (
+              <StudySettings settings={settings.length} choices={choices} onChange={setChoices} />
+            ) : (
+              seeds && <SeedsInput key={Array.isArray(runs) ? 'list' : 'none'} field={seeds} form={form} />
+            )}
             <Text size="sm" className={classes.sum} data-testid="launch-summary">
-              {Array.isArray(runs) && typeof steps === 'number'
-                ? `${plural(runs.length, 'run')} of ${count(steps)} steps`
-                : ' '}
+              {isStudy && typeof steps === 'number'
+                ? `At most ${plural(choices.trials * choices.seeds, 'run')} of ${count(steps)} steps, and five more for the best`
+                : Array.isArray(runs) && typeof steps === 'number'
+                  ? `${plural(runs.length, 'run')} of ${count(steps)} steps`
+                  : ' '}
             </Text>
             {otherError && (
               <Text size="sm" c="red" role="alert">
-                Not launched: {messageOf(launch.error)}
+                Not launched: {messageOf(launched.error)}
               </Text>
             )}
             <Group>
@@ -288,9 +328,9 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                 fullWidth
                 size="md"
                 leftSection={<IconRocket size={18} />}
-                loading={launch.isPending}
+                loading={launched.isPending}
               >
-                Launch
+                {isStudy ? 'Launch the study' : 'Launch'}
               </Button>
             </Group>
           </Stack>

@@ -21,6 +21,7 @@ const ALWAYS = new Set([
   'created',
   'starred',
   'campaign',
+  'study',
   'id',
   ...SHORT,
 ])
@@ -78,6 +79,8 @@ export function Cell({ row, column, now }: { row: ListedExperiment; column: stri
       return row.id
     case 'campaign':
       return row.campaign ?? ''
+    case 'study':
+      return row.study_id ?? ''
   }
   if (SHORT.has(column)) return words(String(row[column as 'robot']))
   if (column.includes('/')) return <Mean mean={row.metrics[column]} rate={isRate(column)} />

@@ -1,0 +1,27 @@
+import { expect, test } from 'vitest'
+import { choices, numbers, rounds } from './axis'
+
+test('an axis of numbers has round ticks within its ends', () => {
+  expect(rounds(0, 1)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1])
+  expect(rounds(0.95, 0.999)).toEqual([0.95, 0.96, 0.97, 0.98, 0.99])
+  const axis = numbers([2, 12], String)
+  expect(axis.ticks.map(({ label }) => label)).toEqual(['2', '4', '6', '8', '10', '12'])
+  expect(axis.place(7)).toBeCloseTo(0.5)
+})
+
+test('a logarithmic axis has powers of ten, and its ends where those are fewer than two', () => {
+  const axis = numbers([1e-4, 1e-2], String, { log: true })
+  expect(axis.ticks.map(({ label }) => label)).toEqual(['0.0001', '0.001', '0.01'])
+  expect(axis.place(1e-3)).toBeCloseTo(0.5)
+  expect(numbers([2, 8], String, { log: true }).ticks.map(({ label }) => label)).toEqual(['2', '8'])
+})
+
+test('where all values are one, or there are none, they lie in the middle', () => {
+  expect(numbers([3, 3], String).place(3)).toBe(0.5)
+  expect(numbers([], String)).toMatchObject({ ticks: [] })
+})
+
+test('choices lie side by side in their order', () => {
+  const axis = choices(['linear', 'constant'], String)
+  expect([axis.place('linear'), axis.place('constant')]).toEqual([0.25, 0.75])
+})

@@ -1,0 +1,62 @@
+/** Axes of charts that are drawn point by point: where a value lies, and which ticks there are. */
+
+export interface Axis {
+  /** Where a value lies, 0 to 1. */
+  place: (value: unknown) => number
+  ticks: readonly { at: number; label: string }[]
+}
+
+/** Beyond this many, ticks would run into one another. */
+const TICKS = 5
+
+/** Ticks are round numbers: "75.0 %" -> "75 %". */
+export const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
+
+/** Steps of round numbers. */
+const ROUND = [1, 2, 5, 10]
+
+/** An axis of numbers that holds all of `values`; logarithmic where asked for and all are above 0. */
+export function numbers(
+  values: readonly number[],
+  format: (value: number) => string,
+  { log = false, from, to }: { log?: boolean; from?: number; to?: number } = {},
+): Axis {
+  const low = from ?? Math.min(...values)
+  const high = to ?? Math.max(...values)
+  if (!Number.isFinite(low) || !Number.isFinite(high)) return { place: () => 0.5, ticks: [] }
+  if (low === high) return { place: () => 0.5, ticks: [{ at: 0.5, label: format(low) }] }
+  const isLog = log && low > 0
+  const on = (value: number) => (isLog ? Math.log10(value) : value)
+  const place = (value: unknown) => (on(Number(value)) - on(low)) / (on(high) - on(low))
+  const marks = isLog ? decades(low, high) : rounds(low, high)
+  return { place, ticks: marks.map((mark) => ({ at: place(mark), label: roundTick(format(mark)) })) }
+}
+
+/** An axis of choices, in their order. */
+export function choices(values: readonly unknown[], label: (value: unknown) => string): Axis {
+  const at = (index: number) => (index + 0.5) / values.length
+  return {
+    place: (value) => at(Math.max(0, values.indexOf(value))),
+    ticks: values.map((value, index) => ({ at: at(index), label: label(value) })),
+  }
+}
+
+/** Round numbers from `low` to `high`, a few of them. */
+export function rounds(low: number, high: number): number[] {
+  const rough = (high - low) / TICKS
+  const power = 10 ** Math.floor(Math.log10(rough))
+  const step = (ROUND.find((one) => one * power >= rough) ?? 10) * power
+  const first = Math.ceil(low / step - 1e-9)
+  const last = Math.floor(high / step + 1e-9)
+  return Array.from({ length: last - first + 1 }, (_, index) =>
+    Number(((first + index) * step).toPrecision(12)),
+  )
+}
+
+/** Powers of ten between, or the ends where there are fewer than two. */
+function decades(low: number, high: number): number[] {
+  const first = Math.ceil(Math.log10(low) - 1e-9)
+  const last = Math.floor(Math.log10(high) + 1e-9)
+  const found = Array.from({ length: Math.max(0, last - first + 1) }, (_, index) => 10 ** (first + index))
+  return found.length >= 2 ? found : [low, high]
+}

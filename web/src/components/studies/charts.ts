@@ -1,0 +1,108 @@
+/** From a study to the axes and points of its charts. */
+import { type Axis, choices, numbers } from '../../charts/axis'
+import type { Point } from '../../charts/Scatter'
+import { labelsOf } from '../../form/labels'
+import type { Schema } from '../../form/schema'
+import { settingText } from '../../form/settingText'
+import { duration, percent, significant } from '../../lib/format'
+import type { SearchedSetting, Study, Trial } from './study'
+
+const [ORDINARY, BEST] = [0, 1]
+const SHARE = { from: 0, to: 1 }
+
+/** Of success rates. */
+export const successAxis = (): Axis => numbers([0, 1], (share) => percent(share), SHARE)
+
+/** The trials that have a success rate: the complete ones. */
+export const complete = (study: Study): (Trial & { success: number })[] =>
+  study.results.filter((trial): trial is Trial & { success: number } => trial.success !== null)
+
+/** The axis of a searched setting: all that it may be. */
+export function settingAxis(setting: SearchedSetting): Axis {
+  return setting.kind === 'list'
+    ? choices(setting.values, settingText)
+    : numbers([setting.low, setting.high], (value) => significant(value, 3), { log: setting.log ?? false })
+}
+
+/** What a setting is called: "Learning rate"; with its heading where two are called alike. */
+export function settingTitles(settings: readonly SearchedSetting[], schema: Schema | undefined): string[] {
+  const labels = settings.map(({ path }) =>
+    schema ? labelsOf(schema, ['training', ...path.split('.')]) : path.split('.'),
+  )
+  return labels.map((label, index) => {
+    const last = label.at(-1) ?? ''
+    const alike = labels.some((other, at) => at !== index && other.at(-1) === last)
+    return alike ? label.slice(-2).join(', ') : last
+  })
+}
+
+/** A trial in a line, for who points at it. */
+export function titleOf(
+  trial: Trial,
+  settings: readonly SearchedSetting[],
+  titles: readonly string[],
+): string {
+  const values = settings.map(({ path }, index) => `${titles[index]} ${settingText(trial.values[path])}`)
+  const success = trial.success === null ? '' : `: ${percent(trial.success)}`
+  return `Trial ${trial.number}${success}\n${values.join('\n')}`
+}
+
+interface Named {
+  study: Study
+  titles: readonly string[]
+}
+
+function point({ study, titles }: Named, trial: Trial, x: unknown, y: unknown): Point {
+  const best = trial.number === study.best
+  return {
+    key: String(trial.number),
+    x,
+    y,
+    color: best ? BEST : ORDINARY,
+    large: best,
+    title: titleOf(trial, study.spec.settings, titles),
+  }
+}
+
+/** Success by number, and the best until then. */
+export function history(named: Named): { points: Point[]; line: [number, number][] } {
+  let best = Number.NEGATIVE_INFINITY
+  const line: [number, number][] = []
+  const points = complete(named.study).map((trial) => {
+    best = Math.max(best, trial.success)
+    line.push([trial.number, best])
+    return point(named, trial, trial.number, trial.success)
+  })
+  return { points, line }
+}
+
+/** Success over the values of one setting. */
+export const slice = (named: Named, path: string): Point[] =>
+  complete(named.study).map((trial) => point(named, trial, trial.values[path], trial.success))
+
+/** Success over cost, and the trials that no other one beats in both. */
+export function front(named: Named): { points: Point[]; line: [number, number][]; axis: Axis } {
+  const trials = complete(named.study).flatMap((trial) =>
+    trial.cost === null ? [] : [{ ...trial, cost: trial.cost }],
+  )
+  const unbeaten = named.study.front.flatMap(
+    (number) => trials.find((trial) => trial.number === number) ?? [],
+  )
+  return {
+    points: trials.map((trial) => point(named, trial, trial.cost, trial.success)),
+    line: unbeaten.map((trial) => [trial.cost, trial.success]),
+    axis: numbers(
+      trials.map((trial) => trial.cost),
+      duration,
+    ),
+  }
+}
+
+/** How good each trial is among all, 0 to 1. */
+export function merits(study: Study): Map<number, number> {
+  const rates = complete(study).map((trial) => trial.success)
+  const [low, high] = [Math.min(...rates), Math.max(...rates)]
+  return new Map(
+    complete(study).map((trial) => [trial.number, high > low ? (trial.success - low) / (high - low) : 1]),
+  )
+}

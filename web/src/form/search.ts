@@ -1,0 +1,135 @@
+/** Settings of a form that are searched instead of set: which they are, and what of it is sent. */
+import { createContext, useCallback, useContext, useState } from 'react'
+import type { components } from '../api/schema'
+import type { Field } from './layout'
+import type { Json } from './schema'
+
+type Schemas = components['schemas']
+export type SearchedSetting = Schemas['RangedSetting-Input'] | Schemas['ListedSetting']
+
+/** What is searched of a field: the text of a range's ends as far as it is typed, or the chosen options. */
+export type Searched =
+  | { kind: 'range'; low: number | string; high: number | string; log: boolean }
+  | { kind: 'list'; values: (string | number | boolean)[] }
+
+export interface Search {
+  /** By the field's key. */
+  searched: Readonly<Record<string, Searched>>
+  set: (key: string, searched: Searched | null) => void
+}
+
+/** Of the form around; null where nothing can be searched. */
+export const SearchContext = createContext<Search | null>(null)
+
+const BASE = 'training.'
+/** How many times as large as the value, either way, a fresh range reaches. */
+const REACH = 10
+const WHOLE_REACH = 2
+
+/** The search of a form, kept in this tab under `key` until it is launched. */
+export function useSearchState(key: string): Search & { clear: () => void } {
+  const [searched, setSearched] = useState<Record<string, Searched>>(() => {
+    try {
+      return JSON.parse(sessionStorage.getItem(key) ?? '{}') as Record<string, Searched>
+    } catch {
+      return {}
+    }
+  })
+  const keep = useCallback(
+    (next: Record<string, Searched>) => {
+      if (Object.keys(next).length > 0) sessionStorage.setItem(key, JSON.stringify(next))
+      else sessionStorage.removeItem(key)
+      return next
+    },
+    [key],
+  )
+  const set = useCallback(
+    (field: string, value: Searched | null) =>
+      setSearched((before) => {
+        const { [field]: _, ...rest } = before
+        return keep(value === null ? rest : { ...rest, [field]: value })
+      }),
+    [keep],
+  )
+  const clear = useCallback(() => setSearched(keep({})), [keep])
+  return { searched, set, clear }
+}
+
+/** Whether a field can be searched, how it is, and how that is changed; null where it can't. */
+export function useSearched(
+  field: Field,
+): { searched: Searched | undefined; set: (searched: Searched | null) => void } | null {
+  const search = useContext(SearchContext)
+  if (search === null || !isSearchable(field)) return null
+  return {
+    searched: search.searched[field.key],
+    set: (searched) => search.set(field.key, searched),
+  }
+}
+
+/** What trials are measured by is the same for all of them; the server refuses it too. */
+const MEASURE = [
+  'task.arena',
+  'task.arrival_distance',
+  'task.collision_distance',
+  'task.step_limit',
+  'evaluation',
+  'device',
+]
+
+/** Numbers and choices of the training, but for what trials are measured by. */
+function isSearchable(field: Field): boolean {
+  if (!field.key.startsWith(BASE) || field.nullable) return false
+  const path = field.key.slice(BASE.length)
+  if (MEASURE.some((fixed) => path === fixed || path.startsWith(`${fixed}.`))) return false
+  if (field.kind === 'choice') return field.options.length > 1
+  return field.kind === 'number' || field.kind === 'boolean'
+}
+
+/** What a field is searched over at first, from the value that it has. */
+export function freshSearch(field: Field, value: Json): Searched {
+  if (field.kind !== 'number') return { kind: 'list', values: optionsOf(field).map((option) => option.value) }
+  const { minimum, maximum, exclusiveMaximum } = field.schema
+  const most = maximum ?? exclusiveMaximum ?? Number.POSITIVE_INFINITY
+  const least = minimum ?? Number.NEGATIVE_INFINITY
+  const number = typeof value === 'number' ? value : 0
+  const log = !field.integer && number > 0
+  const reach = log ? REACH : WHOLE_REACH
+  const low = field.integer ? Math.floor(number / reach) : number / reach
+  const high = number > 0 ? number * reach : 1
+  const tidy = (end: number) => Number(Math.min(most, Math.max(least, end)).toPrecision(6))
+  return { kind: 'range', low: tidy(low), high: tidy(high), log }
+}
+
+/** The values of a choice with the words for them. */
+export function optionsOf(field: Field): { value: string | number | boolean; label: string }[] {
+  if (field.kind === 'boolean')
+    return [
+      { value: true, label: 'On' },
+      { value: false, label: 'Off' },
+    ]
+  if (field.kind !== 'choice') return []
+  const values = (field.schema.enum ?? []) as (string | number | boolean)[]
+  return field.options.map(({ value, label }) => ({
+    value: values.find((one) => String(one) === value) ?? value,
+    label,
+  }))
+}
+
+/** What is sent of a search: of those fields alone that the form has now. */
+export function settingsOf(
+  searched: Readonly<Record<string, Searched>>,
+  fields: readonly Field[],
+): SearchedSetting[] {
+  return fields.flatMap((field): SearchedSetting[] => {
+    const one = searched[field.key]
+    if (one === undefined || !isSearchable(field)) return []
+    const path = field.key.slice(BASE.length)
+    return one.kind === 'list'
+      ? [{ kind: 'list', path, values: one.values }]
+      : [{ kind: 'range', path, low: Number(one.low), high: Number(one.high), log: one.log, points: POINTS }]
+  })
+}
+
+/** Values of a range in a grid. */
+const POINTS = 5

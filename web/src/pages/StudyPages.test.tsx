@@ -1,0 +1,170 @@
+import { screen, waitFor, within } from '@testing-library/react'
+import { expect, test, vi } from 'vitest'
+import type { Study } from '../api/types'
+import { form, training } from '../testing/examples'
+import { open } from '../testing/render'
+import { FakeEventSource, refusal, startServer } from '../testing/server'
+
+vi.stubGlobal('EventSource', FakeEventSource)
+
+const path = 'algorithm.learning_rate'
+const trial = (number: number, over: Partial<Study['results'][number]> = {}): Study['results'][number] => ({
+  number,
+  state: 'complete',
+  values: { [path]: number / 1000 },
+  experiment_id: `exp${number}`,
+  progress: 1,
+  success: 0.5 + number / 10,
+  seconds_to_target: 16,
+  cost: 180,
+  rungs: {},
+  reason: null,
+  ...over,
+})
+const study: Study = {
+  id: 'st1',
+  project_id: 'default',
+  name: 'Step sizes',
+  created_at: 0,
+  finished_at: null,
+  state: 'running',
+  sampler: 'tpe',
+  trials: 5,
+  asked: 4,
+  complete: 2,
+  pruned: 1,
+  failed: 0,
+  best_success: 0.7,
+  spec: {
+    training: training as unknown as Study['spec']['training'],
+    settings: [{ kind: 'range', path, low: 0.0001, high: 0.01, log: true, points: 5 }],
+    sampler: 'tpe',
+    seeds: [0, 1, 2],
+    at_once: 2,
+    stop_early: true,
+    seed: 0,
+  },
+  rule: 'A trial is stopped early once it does worse than the median.',
+  progress: 0.7,
+  seconds_left: 600,
+  results: [
+    trial(1),
+    trial(2),
+    trial(3, { state: 'pruned', success: null, reason: 'After evaluation 2 it did worse.' }),
+    trial(4, { state: 'running', success: null, cost: null, progress: 0.5 }),
+  ],
+  best: 2,
+  front: [2],
+  importances: null,
+  judgement: null,
+}
+const routes = { 'GET /api/studies/st1': study, 'GET /api/training/form': form }
+
+test('a study shows its trials, what is left, and the rule by which trials are stopped', async () => {
+  const server = startServer({ ...routes, 'POST /api/studies/st1/stop': { ...study, state: 'stopped' } })
+  const { user } = open('/studies/st1')
+  expect(
+    await screen.findByText(/3 of 5 trials through: 2 complete, 1 stopped early, 0 failed/),
+  ).toBeVisible()
+  expect(screen.getByText('about 10 min left')).toBeVisible()
+  expect(screen.getByText(/worse than the median/)).toBeVisible()
+  expect(screen.getByText(/Best by its tuning seeds: trial 2 with 70\.0\s%/)).toBeVisible()
+  const [newest, stopped, best] = screen.getAllByTestId('trial')
+  expect(within(newest as HTMLElement).getByRole('progressbar')).toHaveAttribute('aria-valuenow', '50')
+  expect(stopped).toHaveTextContent(/Stopped early.*After evaluation 2/)
+  expect(best).toHaveTextContent(/Trial 2Best.*0\.002.*70\.0\s%.*16 s.*3 min/)
+  expect(within(best as HTMLElement).getByRole('link')).toHaveAttribute('href', '/experiments/exp2')
+  expect(screen.getByRole('link', { name: 'Train the best' })).toHaveAttribute('href', '/new?from=exp2')
+  await user.click(screen.getByRole('button', { name: 'Stop' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/studies/st1/stop'))
+})
+
+test('its charts hold the complete trials alone, and importances once they are known', async () => {
+  startServer({
+    ...routes,
+    'GET /api/studies/st1': { ...study, importances: { [path]: 1 } },
+  })
+  open('/studies/st1')
+  const history = await screen.findByRole('img', { name: /^Success of each trial/ })
+  expect(history.querySelectorAll('circle')).toHaveLength(2)
+  expect(history.querySelector('circle:last-of-type title')?.textContent).toMatch(
+    /^Trial 2: 70\.0\s%\nLearning rate 0\.002/,
+  )
+  const slices = screen.getByRole('img', { name: 'Success by Learning rate' })
+  // A tenth of the way between powers of ten is no tenth of the way on the page.
+  const [first, second] = [...slices.querySelectorAll('circle')].map((one) => Number(one.getAttribute('cx')))
+  expect(((second ?? 0) - (first ?? 0)) / 366).toBeCloseTo(Math.log10(2) / 2, 2)
+  expect(screen.getByTestId('parallel').querySelectorAll('polyline')).toHaveLength(2)
+  expect(screen.getByText('100 %', { selector: 'dd' })).toBeVisible()
+})
+
+test('one that is done says what its best is worth on fresh seeds, and can go on', async () => {
+  const success = {
+    value: 0.6,
+    low: 0.4,
+    high: 0.8,
+    unit: 'seeds' as const,
+    seeds: 5,
+    episodes: 1000,
+    failed: null,
+  }
+  const done: Study = {
+    ...study,
+    state: 'done',
+    judgement: {
+      trial: 2,
+      experiment_id: 'judge',
+      seeds: [3, 4, 5, 6, 7],
+      state: 'completed',
+      success: { ...success, per_seed: [0.6, 0.6, 0.6, 0.6, 0.6] },
+    },
+  }
+  const server = startServer({
+    ...routes,
+    'GET /api/studies/st1': done,
+    'POST /api/studies/st1/extend': refusal(409, 'It has as many as there may be.'),
+  })
+  const { user } = open('/studies/st1')
+  expect(await screen.findByTestId('judgement')).toHaveTextContent(
+    /5 seeds that the search never saw: trial 2 60\.0\s%/,
+  )
+  await user.click(screen.getByRole('button', { name: '10 more trials' }))
+  expect(await screen.findByText('It has as many as there may be.')).toBeVisible()
+  expect(server.changes[0]?.body).toEqual({ trials: 10 })
+})
+
+test('the list of studies', async () => {
+  startServer({ 'GET /api/studies': { items: [study], total: 1 } })
+  open('/studies')
+  const row = await screen.findByTestId('study')
+  expect(row).toHaveTextContent(/Step sizes.*Searching.*3 of 5.*70\.0\s%.*TPE/)
+  expect(within(row).getByRole('link')).toHaveAttribute('href', '/studies/st1')
+})
+
+test('before the first study it is said how to launch one', async () => {
+  startServer({ 'GET /api/studies': { items: [], total: 0 } })
+  open('/studies')
+  expect(await screen.findByText(/give a number a range/)).toBeVisible()
+})
+
+test('a range in the form makes a study of the training, refused at its field', async () => {
+  const detail = [{ loc: ['body', 'training', 'steps'], msg: 'this is refused', type: 'refused' }]
+  const server = startServer({ 'GET /api/training/form': form, 'POST /api/studies': refusal(422, detail) })
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: 'Search Steps' }))
+  const high = screen.getByRole('textbox', { name: 'Steps, to' })
+  await user.clear(high)
+  await user.type(high, '400000')
+  expect(screen.getByRole('group', { name: 'Study' })).toHaveTextContent('1 setting searched')
+  expect(screen.getByTestId('launch-summary')).toHaveTextContent(/At most 90 runs/)
+  await user.click(screen.getByRole('button', { name: 'Launch the study' }))
+  expect((await screen.findAllByText(/This is refused/)).length).toBeGreaterThan(0)
+  expect(server.changes[0]?.body).toMatchObject({
+    seeds: [0, 1, 2],
+    trials: 30,
+    sampler: 'tpe',
+    settings: [{ kind: 'range', path: 'steps', low: 150_000, high: 400_000, log: false }],
+  })
+  await user.click(screen.getByRole('button', { name: 'One value of Steps' }))
+  expect(screen.getByRole('button', { name: 'Launch' })).toBeVisible()
+})
