@@ -32,6 +32,7 @@ class Leaderboard(Schema):
 
     suite: str
     suite_hash: str = Field(description="Only results of the same hash may be compared.")
+    meaning: str | None = Field(description="What the suite asks of a policy; null for one that is drawn for an arena.")
     entries: list[Entry]
     comparisons: int = Field(description="How many entries were compared with the best: of so many, some differ by chance.")
 

@@ -9,7 +9,7 @@ from server.evaluations.schemas import EvaluationFigures
 from server.leaderboards.repository import LeaderboardRepository
 from server.leaderboards.schemas import Entry, EntryKind, Leaderboard, Leaderboards, ListedSuite
 from server.services import Services
-from sim.frozen import suite_names
+from sim.frozen import MEANINGS, suite_names
 from workers.shipped.figures import Figures
 from workers.shipped.library import SuiteFigures, baselines, shipped_policies
 from workers.statistics.differences import LEAST_SEEDS, Rates, difference_of_rates, fisher_exact
@@ -101,6 +101,7 @@ def ranked(suite: str, suite_hash: str, candidates: list[Candidate]) -> Leaderbo
     return Leaderboard(
         suite=suite,
         suite_hash=suite_hash,
+        meaning=MEANINGS.get(suite),
         entries=[_entry(each, rates.index(each.rate) + 1, best) for each in order],
         comparisons=len(order) - 1,
     )

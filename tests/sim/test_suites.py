@@ -24,6 +24,7 @@ from sim.config import (
 )
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import PlacementError, SuiteError
+from sim.frozen import MEANINGS
 from sim.suites import (
     EpisodeTable,
     Situation,
@@ -173,6 +174,7 @@ def test_an_unknown_suite_is_refused_with_the_known_ones() -> None:
     with pytest.raises(SuiteError, match="complex-200"):
         load_suite("hard-200")
     assert {*HASHES, *RULED} <= set(suite_names())
+    assert MEANINGS.keys() == {*suite_names()}, "each says what it asks of a policy"
     assert suite_for(COMPLEX).name == "complex-200"
 
 

@@ -5745,6 +5745,11 @@ export interface components {
             comparisons: number;
             /** Entries */
             entries: components["schemas"]["Entry"][];
+            /**
+             * Meaning
+             * @description What the suite asks of a policy; null for one that is drawn for an arena.
+             */
+            meaning: string | null;
             /** Suite */
             suite: string;
             /**

@@ -174,6 +174,7 @@ test('a leaderboard says what is tied with the best, and by what that is known',
   const board: Leaderboard = {
     suite: 'complex-200',
     suite_hash: 'abc',
+    meaning: "The paper's complex arena.",
     comparisons: 2,
     entries: [
       { ...entry, rank: 1, id: 'crowd', title: 'Crowd', tied: true, told_by: 'best' },
@@ -197,6 +198,7 @@ test('a leaderboard says what is tied with the best, and by what that is known',
     expect.stringMatching(/^2MineTraining.*Tied/),
     expect.stringMatching(/^3RandomUntrained.*Below/),
   ])
+  expect(screen.getByText("The paper's complex arena.")).toBeInTheDocument()
   expect(screen.getByRole('link', { name: 'Mine' })).toHaveAttribute('href', '/experiments/e1')
   expect(
     screen.getByText(/2 entries can't be told from the best, itself included\. 2 comparisons/),

@@ -76,6 +76,7 @@ function Board({ hash }: { hash: string }) {
   const tied = data.entries.filter((entry) => entry.tied).length
   return (
     <Stack gap="md">
+      {data.meaning && <Text size="sm">{data.meaning}</Text>}
       <Panel title={data.suite} flush>
         <Table.ScrollContainer type="native" minWidth={340}>
           <Table className={table.table} highlightOnHover aria-label={`Leaderboard of ${data.suite}`}>
