@@ -29,7 +29,7 @@ def test_a_good_robot_can_be_watched_before_anything_is_trained(context: Browser
     page.get_by_text("10×", exact=True).click()
     expect(display).to_contain_text("10× real time", timeout=SOON)
 
-    page.get_by_role("link", name=f"Train one like {policy['title']}").click()
+    page.get_by_role("link", name=f"Train one like it: {policy['title']}").click()
     expect(page.get_by_label("Name", exact=True)).to_have_value(f"Like “{policy['title']}”")
     steps = page.get_by_role("textbox", name=re.compile("^Steps"))
     expect(steps).to_have_value(re.compile(r"\D?".join(f"{policy['training']['steps']:,}".split(","))))

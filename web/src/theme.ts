@@ -27,6 +27,20 @@ const dark: MantineColorsTuple = [
   '#0e1114',
 ]
 
+// From the sixth on dark enough for white on it, and for itself on white.
+const red: MantineColorsTuple = [
+  '#fff5f5',
+  '#ffe3e3',
+  '#ffc9c9',
+  '#ffa8a8',
+  '#ff8787',
+  '#ff6b6b',
+  '#c92a2a',
+  '#c92a2a',
+  '#b82525',
+  '#a62121',
+]
+
 const sans =
   "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
 
@@ -35,7 +49,7 @@ export const theme = createTheme({
   // White on the dark shade: 4.7 to 1; the shade on dark panels: 3.7 to 1.
   primaryShade: { light: 8, dark: 7 },
   autoContrast: true,
-  colors: { petrol, dark },
+  colors: { petrol, dark, red },
   fontFamily: sans,
   fontFamilyMonospace: "ui-monospace, 'SF Mono', Menlo, Consolas, 'Liberation Mono', monospace",
   fontSizes: { xs: '0.75rem', sm: '0.84375rem', md: '0.9375rem', lg: '1.0625rem', xl: '1.25rem' },
@@ -54,8 +68,18 @@ export const theme = createTheme({
   components: {
     Button: { defaultProps: { size: 'sm' } },
     Tooltip: { defaultProps: { openDelay: 300, withArrow: true } },
-    Modal: { defaultProps: { centered: true } },
-    Menu: { defaultProps: { position: 'bottom-end', shadow: 'md', width: 190 } },
+    Modal: { defaultProps: { centered: true, closeButtonProps: { 'aria-label': 'Close' } } },
+    // Its focus is on its first item, and on nothing that is no item.
+    Menu: {
+      defaultProps: {
+        position: 'bottom-end',
+        shadow: 'md',
+        width: 190,
+        withInitialFocusPlaceholder: false,
+      },
+    },
+    // What lies over a page belongs to its content, for those who go from landmark to landmark.
+    Portal: { defaultProps: { target: '#main' } },
     Table: {
       defaultProps: { verticalSpacing: 7, horizontalSpacing: 'sm', borderColor: 'var(--mapless-line)' },
     },
@@ -80,6 +104,7 @@ export const cssVariables: CSSVariablesResolver = () => ({
     '--mapless-text-quiet': '#97a1a9',
     '--mantine-color-default-border': '#353c43',
     '--mantine-color-dimmed': '#97a1a9',
+    '--mantine-color-error': 'var(--mantine-color-red-5)',
     '--mantine-color-text': '#dbe0e4',
   },
 })

@@ -1,6 +1,6 @@
 /** A line chart on uPlot with a legend that reads the values under the cursor, in both colour schemes. */
 import { useComputedColorScheme } from '@mantine/core'
-import { useEffect, useMemo, useRef } from 'react'
+import { type CSSProperties, useEffect, useMemo, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
@@ -90,7 +90,7 @@ export function Chart({
     plot.current?.setData(columns)
   }, [columns])
 
-  const legend = useRef<HTMLDListElement>(null)
+  const legend = useRef<HTMLDivElement>(null)
   readout.current = (index) => {
     const cells = legend.current?.querySelectorAll('dd')
     if (!cells) return
@@ -112,19 +112,20 @@ export function Chart({
       data-step={data.x.at(-1)}
     >
       <div ref={frame} style={{ height }} />
-      <dl ref={legend} className={classes.legend}>
-        {labelled.map((line) => {
-          const value = lastValue(line.values)
-          return (
-            <div key={line.key} className={classes.entry}>
-              <span className={classes.swatch} style={{ background: lineColor(line.color, dark) }} />
-              <dt>{line.label}</dt>
-              <dd>{value === null ? '–' : format(value)}</dd>
-            </div>
-          )
-        })}
+      <div ref={legend} className={classes.legend}>
+        <dl>
+          {labelled.map((line) => {
+            const value = lastValue(line.values)
+            return (
+              <div key={line.key} className={classes.entry}>
+                <dt style={{ '--line-color': lineColor(line.color, dark) } as CSSProperties}>{line.label}</dt>
+                <dd>{value === null ? '–' : format(value)}</dd>
+              </div>
+            )
+          })}
+        </dl>
         <span data-step className={classes.step} />
-      </dl>
+      </div>
     </figure>
   )
 }

@@ -1,5 +1,5 @@
 /** The policies of a run, to take away. */
-import { Badge, Button, Group, Table } from '@mantine/core'
+import { Badge, Button, Group, Table, VisuallyHidden } from '@mantine/core'
 import { Link } from 'react-router'
 import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
@@ -33,7 +33,9 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
             <Table.Th ta="right" className={classes.step}>
               Step
             </Table.Th>
-            <Table.Th visibleFrom="sm" w={84} miw={84} aria-label="Best" />
+            <Table.Th visibleFrom="sm" w={84} miw={84}>
+              <VisuallyHidden>Best</VisuallyHidden>
+            </Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th visibleFrom="md" ta="right">
               Steps to target
@@ -44,7 +46,9 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
             <Table.Th visibleFrom="xl" ta="right">
               Saved
             </Table.Th>
-            <Table.Th className={classes.actions} aria-label="Episodes and downloads" />
+            <Table.Th className={classes.actions}>
+              <VisuallyHidden>Episodes and downloads</VisuallyHidden>
+            </Table.Th>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>

@@ -66,7 +66,7 @@ export function ComparisonVerdicts({ comparison, margin, onMargin, base, onBase 
         </Group>
       }
     >
-      <Table.ScrollContainer type="native" minWidth={980}>
+      <Table.ScrollContainer type="native" minWidth={980} tabIndex={0}>
         <Table className={table.table} data-testid="verdicts" aria-label="Verdicts">
           <Table.Thead>
             <Table.Tr>

@@ -1,5 +1,5 @@
 /** The episodes of an evaluation, failures first, each with its replay. */
-import { Button, Group, SegmentedControl, Skeleton, Table, Text } from '@mantine/core'
+import { Button, Group, SegmentedControl, Skeleton, Table, Text, VisuallyHidden } from '@mantine/core'
 import { useState } from 'react'
 import { ApiError } from '../api/errors'
 import type { EpisodeResult, Outcome } from '../api/types'
@@ -63,7 +63,9 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
               <Table.Th ta="right" visibleFrom="sm">
                 Clearance
               </Table.Th>
-              <Table.Th w={120} aria-label="Replay" />
+              <Table.Th w={120}>
+                <VisuallyHidden>Replay</VisuallyHidden>
+              </Table.Th>
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>

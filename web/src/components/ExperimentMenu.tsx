@@ -81,7 +81,7 @@ function OpenedMenu({ experiment, runId, onDeleted }: ExperimentMenuProps) {
           <Menu.Divider />
           <ExportItems path={runId ? `/api/runs/${runId}` : `/api/experiments/${id}`} />
           <Menu.Divider />
-          <Menu.Item color="red" leftSection={<IconTrash size={16} />} onClick={remove.open}>
+          <Menu.Item c="red" leftSection={<IconTrash size={16} />} onClick={remove.open}>
             Delete
           </Menu.Item>
         </Menu.Dropdown>

@@ -50,7 +50,7 @@ export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
         variant="default"
         size={size}
         leftSection={<IconCopy size={15} />}
-        aria-label={`Train one like ${policy.title}`}
+        aria-label={`Train one like it: ${policy.title}`}
       >
         Train one like it
       </Button>

@@ -12,7 +12,7 @@ interface PolicyResultsProps {
 
 export function PolicyResults({ results }: PolicyResultsProps) {
   return (
-    <Table.ScrollContainer type="native" minWidth={620}>
+    <Table.ScrollContainer type="native" minWidth={620} tabIndex={0}>
       <Table className={table.table} data-testid="policy-results">
         <Table.Thead>
           <Table.Tr>

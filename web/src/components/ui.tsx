@@ -101,17 +101,22 @@ export function Message({
   children,
   actions,
   role,
+  alone = false,
 }: {
   icon?: ReactNode
   title: string
   children?: ReactNode
   actions?: ReactNode
   role?: 'alert' | 'status'
+  /** Whether it is all that the page says. */
+  alone?: boolean
 }) {
   return (
     <div className={classes.message} role={role}>
       {icon}
-      <Title order={2}>{title}</Title>
+      <Title order={alone ? 1 : 2} size="h2">
+        {title}
+      </Title>
       {children && <p>{children}</p>}
       {actions && <div className={classes.actions}>{actions}</div>}
     </div>

@@ -71,7 +71,7 @@ export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
           )}
           {grouped(found).map(([heading, some]) => (
             <section key={heading} className={classes.group}>
-              <Title order={3} className={classes.heading}>
+              <Title order={2} size="h3" className={classes.heading}>
                 {heading}
               </Title>
               <GroupProblem fields={some} problems={form.problems} />

@@ -78,7 +78,7 @@ export function TicksInput({ field, form, root }: TicksInputProps) {
                     type="button"
                     inherit
                     ml={8}
-                    aria-label={`Settings of ${label}`}
+                    aria-label={`${isOpen ? 'Done' : 'Change'}: settings of ${label}`}
                     aria-expanded={isOpen}
                     disabled={isRefused}
                     onClick={() =>

@@ -34,7 +34,7 @@ export function AccountPage() {
   const { data: account } = useAccount()
   if (account && account.kind !== 'person') {
     return (
-      <Message title="This login is no account">
+      <Message alone title="This login is no account">
         It is the token that the server printed at its start.
       </Message>
     )

@@ -285,7 +285,7 @@ function Differences({ comparison }: { comparison: Comparison }) {
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={240 + 160 * experiments.length}>
+    <Table.ScrollContainer type="native" minWidth={240 + 160 * experiments.length} tabIndex={0}>
       <Table className={table.table} data-testid="differences">
         <Table.Thead>
           <Table.Tr>

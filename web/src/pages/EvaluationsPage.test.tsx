@@ -90,7 +90,12 @@ test('what is under way says how long it takes, what is measured its figures', a
 })
 
 test('policies on suites are chosen, or come with the address', async () => {
-  const server = startServer(routes)
+  const now = { suite: 'complex-200', suite_hash: 'abc', entries: 3, frozen: true }
+  // What was measured before the suite changed has a board of its own.
+  const server = startServer({
+    ...routes,
+    'GET /api/leaderboards': { suites: [now, { ...now, suite_hash: 'before' }] },
+  })
   const arena = JSON.stringify({ name: 'maze', difficulty: 0.8 })
   const { user } = open(
     `/evaluations?policy=shipped:crowd&policy=nonsense&suite=${encodeURIComponent(`arena:${arena}`)}`,

@@ -36,7 +36,7 @@ export function JoinPage() {
   if (invitation.isPending) return null
   if (invitation.isError) {
     return (
-      <Message title="This link opens nothing" role="alert">
+      <Message alone title="This link opens nothing" role="alert">
         {messageOf(invitation.error)}
       </Message>
     )

@@ -340,11 +340,11 @@ test('what can be set of a part is told in a line, shown when asked for, and nev
   const part = await screen.findByRole('listitem', { name: 'Progress' })
   expect(part).toHaveTextContent('Weight: 500, Exponential: no')
   expect(within(part).queryByRole('textbox')).not.toBeInTheDocument()
-  await user.click(within(part).getByRole('button', { name: 'Settings of Progress' }))
+  await user.click(within(part).getByRole('button', { name: 'Change: settings of Progress' }))
   const weight = within(part).getByRole('textbox', { name: 'Weight' })
   await user.clear(weight)
   await user.type(weight, '70')
-  await user.click(within(part).getByRole('button', { name: 'Settings of Progress' }))
+  await user.click(within(part).getByRole('button', { name: 'Done: settings of Progress' }))
   expect(part).toHaveTextContent('Weight: 70')
 
   server.routes['POST /api/experiments'] = refusal(422, [

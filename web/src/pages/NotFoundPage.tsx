@@ -11,6 +11,7 @@ export function NotFoundPage() {
   return (
     <Message
       icon={<IconCompassOff size={40} stroke={1.3} />}
+      alone
       title="There is no page here"
       actions={
         <Button component={Link} to="/" variant="default">
@@ -29,6 +30,7 @@ export function BrokenPage() {
   const error = useRouteError()
   return (
     <Message
+      alone
       title="This page broke"
       role="alert"
       actions={

@@ -29,7 +29,7 @@ test('every policy with its figures, and what can be done with it', async () => 
     /clutter-500\s*95\.0\s%.*N = 500\s*Over the 500 episodes of one policy\.\s*dynamic window, untrained: 99\.8\s%/,
   )
   expect(within(card).getByRole('link', { name: 'Watch Crowd' })).toHaveAttribute('href', '/policies/crowd')
-  expect(within(card).getByRole('link', { name: 'Train one like Crowd' })).toHaveAttribute(
+  expect(within(card).getByRole('link', { name: 'Train one like it: Crowd' })).toHaveAttribute(
     'href',
     '/new?policy=crowd',
   )

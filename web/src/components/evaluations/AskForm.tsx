@@ -96,9 +96,10 @@ export function AskForm() {
     value: policyKey('baseline', name),
     label: words(name),
   }))
-  const frozen: Option[] = (boards.data?.suites ?? [])
-    .filter((each) => each.frozen)
-    .map((each) => ({ value: suiteByName(each.suite), label: each.suite }))
+  // A suite that has changed since has a board of each of its contents; measured is the one of today.
+  const frozen: Option[] = [
+    ...new Set((boards.data?.suites ?? []).filter((each) => each.frozen).map((each) => each.suite)),
+  ].map((name) => ({ value: suiteByName(name), label: name }))
   const places = (kind: 'generated' | 'imported' | 'fixed'): Option[] =>
     (arenas.data ?? [])
       .filter((each) => each.kind === kind)

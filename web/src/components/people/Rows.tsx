@@ -1,5 +1,5 @@
 /** A table of people's things: its head, its rows, and what stands there while it loads, is empty or failed. */
-import { Table, Text } from '@mantine/core'
+import { Table, Text, VisuallyHidden } from '@mantine/core'
 import type { ReactNode } from 'react'
 import { LoadingRows, QueryError } from '../ui'
 
@@ -25,12 +25,12 @@ export function Rows({ what, head, query, empty, minWidth = 520, children }: Row
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={minWidth}>
+    <Table.ScrollContainer type="native" minWidth={minWidth} tabIndex={0}>
       <Table aria-label={what} aria-busy={!children}>
         <Table.Thead>
           <Table.Tr>
             {head.map((title) => (
-              <Table.Th key={title}>{title}</Table.Th>
+              <Table.Th key={title}>{title || <VisuallyHidden>Actions</VisuallyHidden>}</Table.Th>
             ))}
           </Table.Tr>
         </Table.Thead>

@@ -1,5 +1,5 @@
 /** The paper's tables with ours below each of its lines: means with 95 % intervals, and every seed. */
-import { Anchor, Table } from '@mantine/core'
+import { Anchor, Table, VisuallyHidden } from '@mantine/core'
 import { Link } from 'react-router'
 import type { CampaignRow, PaperTable, Reproduction, Spread } from '../../api/types'
 import { percent, plural } from '../../lib/format'
@@ -25,7 +25,9 @@ function OneTable({ table: paper, rows }: { table: PaperTable; rows: ReadonlyMap
           <Table.Thead>
             <Table.Tr>
               <Table.Th>Method</Table.Th>
-              <Table.Th w={110} aria-label="Whose" />
+              <Table.Th w={110}>
+                <VisuallyHidden>Whose</VisuallyHidden>
+              </Table.Th>
               <Table.Th ta="right" w={125}>
                 Avg. reward
               </Table.Th>

@@ -1,0 +1,130 @@
+"""axe finds nothing: every page with data on it, light and dark, on a phone and on a desk, dialogs and menus open."""
+
+import base64
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import APIRequestContext, Browser, BrowserContext, Page, expect
+
+from benchmarks.dashboard.data import Lab, Sizes, make
+from sim.config import ArenaFile
+from tests.browser.conftest import ROOT, logged_in, running
+
+pytestmark = pytest.mark.browser
+
+AXE = ROOT / "web/node_modules/axe-core/axe.min.js"
+DESK, PHONE = (1280, 900), (390, 844)
+SMALL = Sizes(experiments=9, points=60, long_experiments=1, long_points=400, checkpoints=12, live=0)
+# All rules once on a desk and once on a phone, in one scheme each; what differs in the other scheme are colours.
+LOOKS = (
+    (DESK, "light", None),
+    (DESK, "dark", "color-contrast"),
+    (PHONE, "dark", None),
+    (PHONE, "light", "color-contrast"),
+)
+CHECK = """
+async (rule) => {
+  const found = await axe.run(document, {
+    resultTypes: ['violations'],
+    iframes: false,
+    ...(rule ? { runOnly: { type: 'rule', values: [rule] } } : {}),
+  })
+  return found.violations.flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target} ${failureSummary}`))
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory, browser: Browser) -> Iterator[tuple[Lab, BrowserContext]]:
+    """A service with trainings, an imported arena, and an evaluation on it; and a browser that stands still."""
+    directory = tmp_path_factory.mktemp("lab")
+    made = make(directory, SMALL)
+    with (
+        running([sys.executable, "-m", "server"], directory, workers=1) as address,
+        logged_in(browser, address) as context,
+    ):
+        ask(context.request)
+        yield made, context
+
+
+def ask(api: APIRequestContext) -> None:
+    """Import an arena and have a baseline measured in it."""
+    wall = ArenaFile.model_validate(
+        {"name": "A wall", "width": 6.0, "height": 6.0, "boxes": [{"x": 0.0, "y": 0.0, "length": 3.0, "width": 0.2}]}
+    )
+    file = {"name": "wall.json", "content": base64.b64encode(wall.model_dump_json().encode()).decode()}
+    arena = api.post("/api/arenas/imported", data={"files": [file], "keep": True}).json()["config"]
+    question = {"policies": [{"source": "baseline", "name": "go-to-goal"}], "suites": [{"by": "arena", "arena": arena}]}
+    asked = api.post("/api/evaluations", data=question)
+    assert asked.ok, asked.text()
+
+
+def measured(api: APIRequestContext) -> dict[str, str]:
+    """The evaluation, once it is done."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        (evaluation,) = api.get("/api/evaluations").json()["items"]
+        if evaluation["state"] == "done":
+            return dict(evaluation)
+        time.sleep(0.2)
+    raise AssertionError("the evaluation did not end")
+
+
+def pages(lab: Lab) -> list[tuple[str, str, str]]:
+    """Every page: its address, what is on it once it is whole, and the button that opens something over it ("" for none)."""
+    compared = f"/compare?experiment={lab.experiments[0]}&experiment={lab.long_experiments[0]}"
+    return [
+        ("/", "[data-testid=experiment]", "Actions for Long 0"),
+        ("/", "[data-testid=experiment]", "Views"),
+        ("/new", "[data-testid=launch-summary]", "Advanced"),
+        (f"/experiments/{lab.long_experiments[0]}", "[data-testid=chart] canvas", "Seeds"),
+        (f"/runs/{lab.many}", "[data-testid=checkpoint]", ""),
+        (compared, "[data-testid=figures]", ""),
+        ("/compare", "[data-testid=experiment]", ""),
+        ("/policies", "[data-testid=policy]", ""),
+        ("/policies/complex", "[data-testid=episode]", "Download Complex arena"),
+        ("/arenas", "text=A wall", "Delete A wall"),
+        ("/queue", "[data-testid=job]", ""),
+        ("/evaluations", "[data-testid=evaluation]", ""),
+        ("/leaderboards", "[data-testid=entry]", ""),
+        ("/reproduction", "[data-testid=claim]", ""),
+        ("/account", "h1", ""),
+        ("/projects", "h1", ""),
+        ("/projects/default", "h1", ""),
+        ("/people", "h1", ""),
+        ("/audit", "table", ""),
+        ("/join", "h1", ""),
+        ("/nowhere", "h1", ""),
+        ("/runs/nothing", "h2", ""),
+    ]
+
+
+def faults(page: Page) -> Iterator[str]:
+    """What axe finds in every look of a page."""
+    page.evaluate(f"{AXE.read_text()};0")
+    for (width, height), scheme, rule in LOOKS:
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+        expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
+        page.evaluate("new Promise((painted) => requestAnimationFrame(() => requestAnimationFrame(painted)))")
+        yield from (f"{page.url} {width} {scheme}: {each}" for each in page.evaluate(CHECK, rule))
+
+
+def test_axe_finds_nothing_on_any_page(lab: tuple[Lab, BrowserContext]) -> None:
+    made, context = lab
+    evaluation = measured(context.request)
+    page = context.new_page()
+    page.emulate_media(reduced_motion="reduce")
+    found: list[str] = []
+    for path, whole, opens in [*pages(made), (f"/evaluations/{evaluation['id']}", "[data-testid=episode]", "")]:
+        page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
+        page.goto(path)
+        expect(page.locator(whole).first).to_be_visible()
+        if opens:
+            page.get_by_role("button", name=opens).first.click()
+        found += faults(page)
+    page.close()
+    assert not found, "\n".join(found)
