@@ -4,6 +4,7 @@ from pathlib import Path
 
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
+from starlette.datastructures import Headers
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -19,9 +20,20 @@ reload this page. The API works meanwhile.</p></body></html>"""
 _FOREVER = "public, max-age=31536000, immutable"
 
 
+# Made by the build beside each asset, the smallest first (`web/plugins/compressed.ts`).
+_ENCODINGS = {"br": ".br", "gzip": ".gz"}
+
+
 class _Assets(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
+        taken = {part.split(";")[0].strip() for part in Headers(scope=scope).get("accept-encoding", "").split(",")}
+        for encoding, ending in _ENCODINGS.items():
+            if encoding in taken and self.lookup_path(path + ending)[1]:
+                response = await super().get_response(path + ending, scope)
+                response.headers["Content-Encoding"] = encoding
+                response.headers.add_vary_header("Accept-Encoding")
+                break
         response.headers["Cache-Control"] = _FOREVER
         return response
 

@@ -13,7 +13,7 @@ from pathlib import Path
 WEB = Path(__file__).resolve().parent
 STAMP = WEB / "dist" / ".stamp"
 INSTALLED = WEB / "node_modules" / ".stamp"
-SOURCES = ("package.json", "package-lock.json", "index.html", "vite.config.ts", "tsconfig.json", "src", "public")
+SOURCES = ("package.json", "package-lock.json", "index.html", "vite.config.ts", "tsconfig.json", "plugins", "src", "public")
 
 
 def digest(*names: str) -> str:

@@ -1,11 +1,13 @@
 /** The build: static files in `dist`, which the server serves; in development, a proxy to a running server. */
 import react from '@vitejs/plugin-react'
 import { defineConfig } from 'vite'
+import { compressed } from './plugins/compressed'
+import { frameFirst } from './plugins/frame'
 
 const server = process.env.MAPLESS_SERVER_URL ?? 'http://127.0.0.1:8400'
 
 export default defineConfig({
-  plugins: [react()],
+  plugins: [react(), frameFirst(), compressed()],
   build: {
     target: 'es2022',
     // The vendors change seldom: a browser keeps them across releases.
@@ -14,7 +16,6 @@ export default defineConfig({
         codeSplitting: {
           groups: [
             { name: 'react', test: /node_modules\/(react|react-dom|react-router|scheduler)\// },
-            { name: 'mantine', test: /node_modules\/(@mantine|@floating-ui)\// },
             { name: 'charts', test: /node_modules\/uplot\// },
           ],
         },

@@ -1,5 +1,6 @@
 """The built pages, or a page that says how to build them."""
 
+import gzip
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,25 @@ def test_what_is_large_comes_compressed_to_who_takes_it_so(dist: Path, client: T
     compressed = client.get("/api/openapi.json", headers={"Accept-Encoding": "gzip"})
     assert compressed.headers["content-encoding"] == "gzip"
     assert int(compressed.headers["content-length"]) < len(compressed.content) / 5
+
+
+def test_an_asset_comes_as_the_build_compressed_it(dist: Path, client: TestClient) -> None:
+    script = b"export const answer = 42\n"
+    (dist / "assets" / "page-abc123.js").write_bytes(script)
+    (dist / "assets" / "page-abc123.js.gz").write_bytes(gzip.compress(script))
+    # The client knows no Brotli: what it gets is what is in the file.
+    (dist / "assets" / "page-abc123.js.br").write_bytes(b"brotli")
+    for accepted, encoding, content in (
+        ("gzip, deflate, br;q=1.0", "br", b"brotli"),
+        ("gzip", "gzip", script),
+        ("identity", None, script),
+    ):
+        response = client.get("/assets/page-abc123.js", headers={"Accept-Encoding": accepted})
+        assert response.headers.get("content-encoding") == encoding
+        assert response.content == content
+        assert response.headers["content-type"].startswith("text/javascript")
+        assert response.headers["cache-control"] == "public, max-age=31536000, immutable"
+        assert ("Accept-Encoding" in response.headers.get("vary", "")) == (encoding is not None)
 
 
 @pytest.mark.parametrize("path", ["/", "/experiments/abc", "/runs/x/y", "/apiary"])

@@ -6,10 +6,11 @@ import { BrokenPage, NotFoundPage } from './pages/NotFoundPage'
 export const routes: RouteObject[] = [
   {
     element: <Shell />,
-    hydrateFallbackElement: <div />,
     errorElement: <BrokenPage />,
     children: [
       {
+        // The frame stands, and answers, while the first page's code is on its way.
+        hydrateFallbackElement: <div aria-busy="true" />,
         errorElement: <BrokenPage />,
         children: [
           {
