@@ -38,6 +38,7 @@ from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
 from server.people import endpoints as people
 from server.policies import endpoints as policies
+from server.printing import endpoints as printing
 from server.problems import UNAUTHORIZED, install_error_handlers
 from server.projects import endpoints as projects
 from server.queueing import endpoints as queueing
@@ -89,6 +90,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     replays.router,
     policies.router,
     comparison.router,
+    printing.router,
     data_export.router,
     reproduction.router,
     studies.router,

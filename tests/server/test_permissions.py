@@ -118,6 +118,8 @@ TABLE = {
         GET /api/compare
         GET /api/compare/curves
         GET /api/compare/profiles
+        GET /api/compare/table
+        GET /api/compare/report
         GET /api/reproduction
         GET /api/studies/{study_id}
         GET /live/{run_id}/

@@ -188,6 +188,8 @@ def test_what_the_page_shows_runs(environment: dict[str, str], tmp_path: Path) -
     assert shell.returncode == 0, shell.stderr
     assert "algorithm.gamma: 0.995, 0.97" in shell.stdout
     assert len(json.loads((tmp_path / "comparison.json").read_text())["experiments"]) == 2
+    assert (tmp_path / "tables.tex").read_text().count(r"\toprule") == 4
+    assert "<svg" in (tmp_path / "comparison.html").read_text()
     assert sorted(path.suffix for path in (tmp_path / "policies").iterdir()) == [".onnx", ".zip", ".zip"]
 
     python = subprocess.run([sys.executable, "-c", program], env=environment, cwd=tmp_path, capture_output=True, text=True)
@@ -213,6 +215,8 @@ def test_what_the_page_of_data_shows_runs(
     with zipfile.ZipFile(tmp_path / "comparison.zip") as archive:
         assert archive.namelist() == ["figures.csv", "curves.csv", "seeds.csv"]
         assert b"train/return" in archive.read("curves.csv")
+    assert r"\toprule" in (tmp_path / "figures.tex").read_text()
+    assert "train/return" in (tmp_path / "comparison.html").read_text()
     runs = {path.parent.name for path in (tmp_path / "events").glob("*/*/events.out.tfevents.*")}
     assert runs == {f"seed{run['seed']}" for run in document["runs"]}
 

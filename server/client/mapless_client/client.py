@@ -27,6 +27,10 @@ from mapless_client.watching import watch
 _PAGE = 200
 
 
+Table = Literal["figures", "verdicts", "improvements", "differences"]
+TableForm = Literal["latex", "markdown", "csv"]
+
+
 class Client:
     """Speaks to one server. Close it, or use it as a context manager.
 
@@ -208,14 +212,47 @@ class Client:
             base: what the others are held against; the first without it.
             pairs: judge every pair instead, of 12 experiments at most.
         """
-        answer = self._transport.get(
-            "/api/compare", {"experiment": list(experiment_ids), "margin": margin, "base": base, "pairs": pairs}
-        )
+        answer = self._transport.get("/api/compare", _compared(experiment_ids, margin, base, pairs=pairs))
         return Comparison.model_validate(answer)
+
+    def comparison_table(
+        self,
+        experiment_ids: Sequence[str],
+        table: Table = "verdicts",
+        form: TableForm = "latex",
+        margin: float = 0.02,
+        *,
+        base: str | None = None,
+        pairs: bool = False,
+    ) -> str:
+        """A table of a comparison as one would print it.
+
+        Args:
+            experiment_ids: in order, 50 at most.
+            table: which of them.
+            form: LaTeX with booktabs, Markdown, or CSV.
+            margin: success rates that differ by less are equivalent, 0 to 1.
+            base: what the others are held against; the first without it.
+            pairs: judge every pair instead, of 12 experiments at most.
+        """
+        query = _compared(experiment_ids, margin, base, pairs=pairs) | {"table": table, "format": form}
+        return self._transport.text("/api/compare/table", query)
+
+    def comparison_report(
+        self, experiment_ids: Sequence[str], margin: float = 0.02, *, base: str | None = None, pairs: bool = False
+    ) -> str:
+        """The whole comparison as one HTML file that opens offline; arguments as `compare`."""
+        return self._transport.text("/api/compare/report", _compared(experiment_ids, margin, base, pairs=pairs))
 
     def _checkpoint_page(self, run_id: str, *, limit: int, offset: int) -> Json:
         page: Json = self._transport.get(f"/api/runs/{run_id}/checkpoints", {"limit": limit, "offset": offset})
         return page
+
+
+def _compared(
+    experiment_ids: Sequence[str], margin: float, base: str | None, *, pairs: bool
+) -> dict[str, str | int | float | Sequence[str] | None]:
+    return {"experiment": list(experiment_ids), "margin": margin, "base": base, "pairs": pairs}
 
 
 def _named(part: Json, defaults: Json) -> Json:

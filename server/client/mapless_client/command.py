@@ -7,14 +7,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 
 import typer
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from mapless_client.client import Client
+    from mapless_client.client import Client, TableForm
     from mapless_client.models import ComparedExperiment, Estimate, Run, SeedMean
 
 app = typer.Typer(
@@ -127,11 +127,26 @@ def compare(
     margin: Annotated[float, typer.Option(help="Success rates that differ by less are equivalent.")] = 0.02,
     base: Annotated[str | None, typer.Option(help="Id of the one to judge by, in place of the first.")] = None,
     pairs: Annotated[bool, typer.Option("--pairs", help="Judge every pair.")] = False,
+    latex: Annotated[bool, typer.Option("--latex", help="The tables in LaTeX (booktabs).")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="The tables in Markdown.")] = False,
+    html: Annotated[bool, typer.Option("--html", help="The whole comparison as one HTML file.")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Final figures side by side, with intervals, verdicts and the settings that differ."""
+    if sum((latex, markdown, html, as_json)) > 1:
+        _refuse("One of --latex, --markdown, --html and --json.")
     with _server(url) as client:
+        if html:
+            typer.echo(client.comparison_report(trainings, margin, base=base, pairs=pairs))
+            return
+        if latex or markdown:
+            from mapless_client.client import Table
+
+            form: TableForm = "latex" if latex else "markdown"
+            for table in get_args(Table):
+                typer.echo(client.comparison_table(trainings, table, form, margin, base=base, pairs=pairs))
+            return
         comparison = client.compare(trainings, margin, base=base, pairs=pairs)
     if as_json:
         _json(comparison)

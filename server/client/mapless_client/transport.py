@@ -58,6 +58,16 @@ class Transport:
             response.read()
             return response.json()
 
+    def text(self, path: str, query: Query | None = None) -> str:
+        """The text at a path; asked for again while the server is away or busy.
+
+        Raises:
+            As `get`.
+        """
+        with self.stream(path, query) as response:
+            response.read()
+            return response.text
+
     def send(self, method: str, path: str, body: Any = None, query: Query | None = None) -> Any:
         """Change something, once; the answer's JSON, None where there is none.
 

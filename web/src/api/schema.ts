@@ -584,6 +584,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/compare/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Report
+         * @description The whole comparison as one HTML file that needs no script and opens offline.
+         */
+        get: operations["compare_report_api_compare_report_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/compare/table": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Table
+         * @description A table of the comparison as one would print it: N, seeds, intervals.
+         */
+        get: operations["compare_table_api_compare_table_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/evaluations": {
         parameters: {
             query?: never;
@@ -12358,6 +12398,142 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    compare_report_api_compare_report_get: {
+        parameters: {
+            query: {
+                /** @description Id of the one that the others are held against; the first without it. */
+                base?: string | null;
+                /** @description Ids of the experiments, in order. */
+                experiment: string[];
+                /** @description Success rates that differ by less are equivalent, 0 to 1. */
+                margin?: number;
+                /** @description Metrics whose curves are drawn; those that the page shows at first without. */
+                name?: string[];
+                /** @description Judge every pair, of 12 experiments at most. */
+                pairs?: boolean;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": string;
+                };
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    compare_table_api_compare_table_get: {
+        parameters: {
+            query: {
+                /** @description Id of the one that the others are held against; the first without it. */
+                base?: string | null;
+                /** @description Ids of the experiments, in order. */
+                experiment: string[];
+                /** @description LaTeX with booktabs, Markdown, or CSV. */
+                format?: "latex" | "markdown" | "csv";
+                /** @description Success rates that differ by less are equivalent, 0 to 1. */
+                margin?: number;
+                /** @description Judge every pair, of 12 experiments at most. */
+                pairs?: boolean;
+                /** @description Which of the tables. */
+                table?: "figures" | "verdicts" | "improvements" | "differences";
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
+                };
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": components["schemas"]["ErrorBody"];
                 };
             };
             /** @description Validation Error */

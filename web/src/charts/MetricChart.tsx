@@ -1,7 +1,9 @@
 /** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
 import { Checkbox, Group, Title } from '@mantine/core'
 import { type ReactNode, useMemo, useState } from 'react'
+import { compact, count } from '../lib/format'
 import { Chart } from './Chart'
+import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
 import { allPositive, type ChartData, smooth } from './series'
 
@@ -33,6 +35,9 @@ export function MetricChart({
   scalable = false,
   height = 220,
   empty = 'No value yet',
+  format = compact,
+  xTitle = 'Steps',
+  xFormat = count,
   ...rest
 }: MetricChartProps) {
   const [smoothed, setSmoothed] = useState(false)
@@ -69,6 +74,17 @@ export function MetricChart({
               onChange={(event) => setLogarithmic(event.currentTarget.checked)}
             />
           )}
+          {data.x.length > 0 && (
+            <ChartExport
+              data={shown}
+              title={note ? `${title}, ${note}` : title}
+              format={format}
+              xTitle={xTitle}
+              xFormat={xFormat}
+              yRange={rest.yRange}
+              logarithmic={logarithmic && loggable}
+            />
+          )}
         </Group>
       </div>
       {data.x.length === 0 ? (
@@ -76,7 +92,16 @@ export function MetricChart({
           {empty}
         </div>
       ) : (
-        <Chart data={shown} label={title} logarithmic={logarithmic && loggable} height={height} {...rest} />
+        <Chart
+          data={shown}
+          label={title}
+          logarithmic={logarithmic && loggable}
+          height={height}
+          format={format}
+          xTitle={xTitle}
+          xFormat={xFormat}
+          {...rest}
+        />
       )}
     </div>
   )

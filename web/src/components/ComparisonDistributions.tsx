@@ -1,6 +1,6 @@
 /** Whole distributions side by side (Agarwal et al. 2021): how many attempts reach a score, how likely one improves. */
 
-import { Table, Text } from '@mantine/core'
+import { Group, Table, Text, Title } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo } from 'react'
 import { $api } from '../api/client'
@@ -9,6 +9,7 @@ import { MetricChart } from '../charts/MetricChart'
 import { chartOfProfiles } from '../charts/shape'
 import { percent, percentRange, significant } from '../lib/format'
 import classes from './ComparisonDistributions.module.css'
+import { TableExport } from './ComparisonExport'
 import { NamedTraining } from './ComparisonVerdicts'
 import table from './ExperimentTable.module.css'
 import { Panel } from './ui'
@@ -16,7 +17,13 @@ import ui from './ui.module.css'
 
 const score = (value: number) => significant(value, 2)
 
-export function ComparisonDistributions({ comparison }: { comparison: Comparison }) {
+interface ComparisonDistributionsProps {
+  comparison: Comparison
+  /** What is compared, and how, as the API takes it. */
+  query: string
+}
+
+export function ComparisonDistributions({ comparison, query }: ComparisonDistributionsProps) {
   const experiment = comparison.experiments.map((one) => one.id)
   const { data, error } = $api.useQuery(
     'get',
@@ -39,6 +46,10 @@ export function ComparisonDistributions({ comparison }: { comparison: Comparison
           empty={error && !data ? 'Could not be loaded' : data ? 'Nothing evaluated yet' : ''}
         />
         <div className={classes.column}>
+          <Group justify="space-between">
+            <Title order={3}>Probability of improvement</Title>
+            <TableExport table="improvements" title="Probability of improvement" query={query} />
+          </Group>
           <Table.ScrollContainer type="native" minWidth={380}>
             <Table className={table.table} aria-label="Probability of improvement" data-testid="improvements">
               <Table.Thead>

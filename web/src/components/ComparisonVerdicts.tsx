@@ -3,6 +3,7 @@ import { Group, NativeSelect, NumberInput, Table, Text } from '@mantine/core'
 import type { Comparison, ComparisonVerdict } from '../api/types'
 import { MOST_IN_PAIRS } from '../lib/comparison'
 import { pIs, plural, pValue } from '../lib/format'
+import { TableExport } from './ComparisonExport'
 import classes from './ComparisonVerdicts.module.css'
 import table from './ExperimentTable.module.css'
 import { Panel, Swatch } from './ui'
@@ -26,9 +27,12 @@ interface ComparisonVerdictsProps {
   /** An id, or `EVERY_PAIR`. */
   base: string
   onBase: (base: string) => void
+  /** What is compared, and how, as the API takes it. */
+  query: string
 }
 
-export function ComparisonVerdicts({ comparison, margin, onMargin, base, onBase }: ComparisonVerdictsProps) {
+export function ComparisonVerdicts(props: ComparisonVerdictsProps) {
+  const { comparison, margin, onMargin, base, onBase, query } = props
   const { experiments, verdicts, comparisons } = comparison
   const named = (id: string) => <NamedTraining comparison={comparison} id={id} />
   return (
@@ -63,6 +67,7 @@ export function ComparisonVerdicts({ comparison, margin, onMargin, base, onBase 
             }}
             className={classes.margin}
           />
+          <TableExport table="verdicts" title="Verdicts" query={query} />
         </Group>
       }
     >

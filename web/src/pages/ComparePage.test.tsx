@@ -75,6 +75,20 @@ test('whole distributions: a profile, and how likely one improves on the other',
   expect(profile).not.toHaveTextContent('Alone')
 })
 
+test('tables leave as one prints them, as they are judged on the page', async () => {
+  startServer(routes)
+  const { user } = open('/compare?experiment=exp1&experiment=exp2&base=exp2')
+  await user.click(await screen.findByRole('button', { name: 'Export the table Verdicts' }))
+  expect(await screen.findByRole('menuitem', { name: 'LaTeX (booktabs)' })).toHaveAttribute(
+    'href',
+    '/api/compare/table?experiment=exp1&experiment=exp2&margin=0.02&base=exp2&table=verdicts&format=latex',
+  )
+  expect(screen.getByRole('link', { name: 'Report (HTML)' })).toHaveAttribute(
+    'href',
+    '/api/compare/report?experiment=exp1&experiment=exp2&margin=0.02&base=exp2',
+  )
+})
+
 test('with none chosen there is a list to choose from', async () => {
   startServer(routes)
   const { router, user } = open('/compare')

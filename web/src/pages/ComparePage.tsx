@@ -7,6 +7,7 @@ import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
+import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
 import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import table from '../components/ExperimentTable.module.css'
@@ -140,6 +141,7 @@ interface ChosenProps {
 
 function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
   const held = base === EVERY_PAIR ? { pairs: true } : base === chosen[0] ? {} : { base }
+  const query = comparisonQuery(chosen, margin, held)
   const { data, error, refetch } = $api.useQuery(
     'get',
     '/api/compare',
@@ -155,9 +157,12 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
         </Text>
       }
       actions={
-        <Button variant="default" onClick={onChange}>
-          Choose others
-        </Button>
+        <Group gap="sm">
+          <WholeExport query={query} />
+          <Button variant="default" onClick={onChange}>
+            Choose others
+          </Button>
+        </Group>
       }
     >
       {error && !data ? (
@@ -171,9 +176,12 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
             title="Final figures"
             flush
             actions={
-              <Text size="xs" c="dimmed">
-                mean over seeds, 95 % interval (Student's t)
-              </Text>
+              <Group gap="sm" wrap="nowrap">
+                <Text size="xs" c="dimmed">
+                  mean over seeds, 95 % interval (Student's t)
+                </Text>
+                <TableExport table="figures" title="Final figures" query={query} />
+              </Group>
             }
           >
             {data ? <Figures comparison={data} /> : <Skeleton height={120} m="md" w="auto" />}
@@ -185,9 +193,10 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               onMargin={onMargin}
               base={base}
               onBase={onBase}
+              query={query}
             />
           )}
-          {data && data.verdicts.length > 0 && <ComparisonDistributions comparison={data} />}
+          {data && data.verdicts.length > 0 && <ComparisonDistributions comparison={data} query={query} />}
           <Panel
             title="Curves"
             actions={
@@ -202,7 +211,11 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               ))}
             </div>
           </Panel>
-          <Panel title="What differs in their settings" flush>
+          <Panel
+            title="What differs in their settings"
+            flush
+            actions={<TableExport table="differences" title="What differs in their settings" query={query} />}
+          >
             {data ? <Differences comparison={data} /> : <Skeleton height={80} m="md" w="auto" />}
           </Panel>
         </Stack>

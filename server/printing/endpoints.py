@@ -1,0 +1,71 @@
+"""Routes of what is printed of a comparison."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, PlainTextResponse
+
+from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Margin
+from server.printing.service import SUFFIXES, PrintingService, TextFormat, Wanted
+from server.printing.tables import TableName
+from server.problems import INVALID, NOT_FOUND
+from server.security.permissions import view
+from server.services import ServicesDep
+
+router = APIRouter(prefix="/api/compare", tags=["comparison"])
+
+_MEDIA = {"latex": "application/x-tex", "markdown": "text/markdown", "csv": "text/csv"}
+# What the page shows at first.
+_CURVES = ("eval/success_rate", "train/success_rate", "train/return", "eval/steps")
+
+Metrics = Annotated[
+    list[str],
+    Query(
+        alias="name",
+        max_length=24,
+        description="Metrics whose curves are drawn; those that the page shows at first without.",
+    ),
+]
+
+
+@router.get(
+    "/table",
+    response_class=PlainTextResponse,
+    responses=INVALID | NOT_FOUND,
+    dependencies=[view("experiment")],
+)
+def compare_table(
+    experiment_ids: ExperimentIds,
+    services: ServicesDep,
+    table: Annotated[TableName, Query(description="Which of the tables.")] = "verdicts",
+    text_format: Annotated[
+        TextFormat, Query(alias="format", description="LaTeX with booktabs, Markdown, or CSV.")
+    ] = "latex",
+    margin: Margin = 0.02,
+    base: Base = None,
+    every_pair: EveryPair = False,
+) -> PlainTextResponse:
+    """A table of the comparison as one would print it: N, seeds, intervals."""
+    wanted = Wanted(list(dict.fromkeys(experiment_ids)), margin, base, every_pair)
+    text = PrintingService(services).table(wanted, table, text_format)
+    name = f"mapless-{table}.{SUFFIXES[text_format]}"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return PlainTextResponse(text, media_type=f"{_MEDIA[text_format]}; charset=utf-8", headers=headers)
+
+
+@router.get("/report", response_class=HTMLResponse, responses=INVALID | NOT_FOUND, dependencies=[view("experiment")])
+def compare_report(
+    request: Request,
+    experiment_ids: ExperimentIds,
+    services: ServicesDep,
+    names: Metrics = [],  # noqa: B006 (FastAPI copies it)
+    margin: Margin = 0.02,
+    base: Base = None,
+    every_pair: EveryPair = False,
+) -> HTMLResponse:
+    """The whole comparison as one HTML file that needs no script and opens offline."""
+    wanted = Wanted(list(dict.fromkeys(experiment_ids)), margin, base, every_pair)
+    metrics = list(dict.fromkeys(names)) or _CURVES
+    text = PrintingService(services).report(wanted, metrics, str(request.base_url).rstrip("/"))
+    headers = {"Content-Disposition": 'attachment; filename="mapless-comparison.html"'}
+    return HTMLResponse(text, headers=headers)

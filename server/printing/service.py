@@ -1,0 +1,83 @@
+"""Tables and reports of a comparison."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+from urllib.parse import urlencode
+
+from server.comparison.service import ComparisonService
+from server.printing.report import Report
+from server.printing.tables import TableName, printed
+from server.printing.text import comma_separated, latex, markdown
+from server.services import Services
+from server.version import commit, version
+
+TextFormat = Literal["latex", "markdown", "csv"]
+
+SUFFIXES: dict[TextFormat, str] = {"latex": "tex", "markdown": "md", "csv": "csv"}
+_WRITERS = {"latex": latex, "markdown": markdown, "csv": comma_separated}
+# Of curves in a report: as many as its charts have room for.
+_POINTS = 240
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is compared, and how, as the page's address says it.
+
+    Attributes:
+        experiment_ids: in order.
+        margin: success rates that differ by less are equivalent.
+        base: what the others are held against; the first without it.
+        every_pair: hold each against all before it instead.
+    """
+
+    experiment_ids: Sequence[str]
+    margin: float
+    base: str | None
+    every_pair: bool
+
+    def address(self) -> str:
+        """Of the page that shows it, without the host."""
+        base = "pairs" if self.every_pair else self.base
+        query = [*(("experiment", each) for each in self.experiment_ids), ("margin", f"{self.margin:g}")]
+        return f"/compare?{urlencode(query + ([('base', base)] if base else []))}"
+
+
+class PrintingService:
+    """Prints comparisons."""
+
+    def __init__(self, services: Services) -> None:
+        self._comparisons = ComparisonService(services)
+
+    def table(self, wanted: Wanted, name: TableName, text_format: TextFormat) -> str:
+        """One of the tables.
+
+        Raises:
+            As `ComparisonService.compare`.
+        """
+        comparison = self._comparisons.compare(
+            wanted.experiment_ids, wanted.margin, wanted.base, every_pair=wanted.every_pair
+        )
+        return _WRITERS[text_format](printed(comparison, name))
+
+    def report(self, wanted: Wanted, metrics: Sequence[str], host: str) -> str:
+        """Everything in one HTML file.
+
+        Args:
+            wanted: what is compared.
+            metrics: whose curves are drawn.
+            host: where the service is reached, without a slash at its end.
+
+        Raises:
+            As `ComparisonService.compare`.
+        """
+        ids = wanted.experiment_ids
+        made = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+        return Report(
+            comparison=self._comparisons.compare(ids, wanted.margin, wanted.base, every_pair=wanted.every_pair),
+            profiles=self._comparisons.profiles(ids),
+            curves=[self._comparisons.curves(ids, name, _POINTS) for name in metrics],
+            link=host + wanted.address(),
+            made=f"Made {made} by Mapless {version()}{f' ({commit()})' if commit() else ''}.",
+        ).html()

@@ -1,0 +1,129 @@
+"""A line chart as SVG: means with their bands, axes with titles, a legend. Needs no script and no font of its own."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+_WIDTH, _HEIGHT = 560, 280
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 12, 12, 48
+# Pixels of a row of the legend.
+_ROW = 18
+_TICKS = 5
+# After Okabe and Ito (2008), as on the pages; after eight they repeat.
+COLORS = ("#0072b2", "#d55e00", "#00895e", "#b8568f", "#a06f00", "#3f9bd1", "#6a4fb3", "#767676")
+
+Values = Sequence[float | None]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve: its mean, and the interval where it is known; None where there is no value."""
+
+    label: str
+    color: int
+    mean: Values
+    low: Values
+    high: Values
+
+
+def line_chart(title: str, x_title: str, x: Sequence[float], lines: Sequence[Line], *, rate: bool) -> str:
+    """The chart as an `svg` element.
+
+    Args:
+        title: for those who can't see it.
+        x_title: of the axis.
+        x: of every value, ascending.
+        lines: each as long as `x`.
+        rate: whether y is a share, 0 to 1.
+    """
+    drawn = [line for line in lines if any(value is not None for value in line.mean)]
+    values = [value for line in drawn for side in (line.mean, line.low, line.high) for value in side if value is not None]
+    height = _HEIGHT + _ROW * len(drawn)
+    box = f'viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="{escape(title)}"'
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" {box} font-family="system-ui, sans-serif" font-size="11">']
+    if values:
+        low, high = (0.0, 1.0) if rate else _padded(min(values), max(values))
+        across = _scale(x[0], x[-1], _LEFT, _WIDTH - _RIGHT)
+        up = _scale(low, high, _HEIGHT - _BOTTOM, _TOP)
+        parts += _axes(x_title, (x[0], x[-1]), (low, high), across, up, rate=rate)
+        for line in drawn:
+            parts += _line(x, line, across, up)
+        parts += [_entry(row, line) for row, line in enumerate(drawn)]
+    else:
+        parts.append(
+            f'<text x="{_WIDTH / 2}" y="{_HEIGHT / 2}" text-anchor="middle" fill="currentColor">No value yet</text>'
+        )
+    return "\n".join([*parts, "</svg>"])
+
+
+def _axes(
+    x_title: str,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    across: Callable[[float], float],
+    up: Callable[[float], float],
+    *,
+    rate: bool,
+) -> list[str]:
+    parts = []
+    for tick in _ticks(*y):
+        level = f"{up(tick):.1f}"
+        ends = f'x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{level}" y2="{level}"'
+        parts.append(f'<line {ends} stroke="currentColor" stroke-opacity="0.15"/>')
+        parts.append(_text(_LEFT - 6, up(tick) + 4, "end", f"{tick:.0%}" if rate else f"{tick:g}"))
+    below = _HEIGHT - _BOTTOM
+    parts += [_text(across(tick), below + 16, "middle", f"{tick:,g}") for tick in _ticks(*x)]
+    return [*parts, _text((_LEFT + _WIDTH - _RIGHT) / 2, below + 34, "middle", x_title)]
+
+
+def _text(left: float, top: float, anchor: str, text: str) -> str:
+    return f'<text x="{left:.1f}" y="{top:.1f}" text-anchor="{anchor}" fill="currentColor">{escape(text)}</text>'
+
+
+def _line(x: Sequence[float], line: Line, across: Callable[[float], float], up: Callable[[float], float]) -> list[str]:
+    color = COLORS[line.color % len(COLORS)]
+
+    def points(values: Values) -> list[str]:
+        return [f"{across(at):.1f},{up(value):.1f}" for at, value in zip(x, values, strict=True) if value is not None]
+
+    parts = []
+    edge = points(line.high) + points(line.low)[::-1]
+    if edge:
+        parts.append(f'<polygon points="{" ".join(edge)}" fill="{color}" fill-opacity="0.15"/>')
+    mean = points(line.mean)
+    if len(mean) == 1:
+        left, top = mean[0].split(",")
+        parts.append(f'<circle cx="{left}" cy="{top}" r="3" fill="{color}"/>')
+    else:
+        parts.append(f'<polyline points="{" ".join(mean)}" fill="none" stroke="{color}" stroke-width="2"/>')
+    return parts
+
+
+def _entry(row: int, line: Line) -> str:
+    top = _HEIGHT + _ROW * row
+    color = COLORS[line.color % len(COLORS)]
+    return f'<rect x="{_LEFT}" y="{top + 4}" width="14" height="3" fill="{color}"/>' + _text(
+        _LEFT + 20, top + 9, "start", line.label
+    )
+
+
+def _padded(low: float, high: float) -> tuple[float, float]:
+    room = (high - low) * 0.05 or abs(high) * 0.05 or 1.0
+    return low - room, high + room
+
+
+def _scale(low: float, high: float, start: float, end: float) -> Callable[[float], float]:
+    span = high - low
+    return lambda value: (start + end) / 2 if span == 0 else start + (value - low) / span * (end - start)
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Round numbers from low to high, about five."""
+    if high <= low:
+        return [low]
+    rough = (high - low) / _TICKS
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * factor for factor in (1, 2, 2.5, 5, 10) if power * factor >= rough)
+    first = math.ceil(low / step - 1e-9)
+    return [round(index * step, 12) + 0.0 for index in range(first, math.floor(high / step + 1e-9) + 1)]

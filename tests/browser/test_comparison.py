@@ -1,0 +1,92 @@
+"""A verdict and what leaves of it, in a real browser: trainings of five seeds, measured before the service starts."""
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from playwright.sync_api import Browser, BrowserContext, expect
+
+from server.app import create_app
+from server.settings import Settings
+from tests.browser.conftest import logged_in, running
+from tests.server.harness import BASE_URL, TOKEN, Reports
+from tests.server.test_comparison import measured
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def compared(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[BrowserContext, str]]:
+    """A profile that is logged in to a service with two trainings, and the address of their comparison."""
+    directory = tmp_path_factory.mktemp("compared")
+    # Playwright's event loop runs on this thread.
+    with ThreadPoolExecutor(1) as thread:
+        address = thread.submit(fill, directory).result()
+    with running([sys.executable, "-m", "server"], directory, workers=1) as service, logged_in(browser, service) as context:
+        yield context, address
+
+
+def fill(directory: Path) -> str:
+    """Two trainings with curves and verdicts; the address of their comparison."""
+    app = create_app(Settings(data_dir=directory, token=TOKEN))
+    with TestClient(app, base_url=BASE_URL, headers={"Authorization": f"Bearer {TOKEN}", "Origin": BASE_URL}) as client:
+        reports = Reports(client, app.state.services)
+        base = measured(reports, "Short sight", (800, 820, 790, 850, 810), steps=100)
+        other = measured(reports, "Long_sight & 99%", (990, 980, 970, 990, 980), steps=80)
+        for experiment in (base, other):
+            for run in experiment["runs"]:
+                reports.metrics(run, "eval/success_rate", {1_000: 0.5, 2_000: 0.75, 3_000: 0.9})
+                reports.metrics(run, "loss/value", {1_000: 10.0, 2_000: 1.0, 3_000: 0.1})
+                reports.state(run, "completed")
+    return f"/compare?experiment={base['id']}&experiment={other['id']}"
+
+
+def test_a_verdict_and_its_latex_by_keyboard(compared: tuple[BrowserContext, str], tmp_path: Path) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    verdicts = page.get_by_role("table", name="Verdicts")
+    success = verdicts.get_by_role("row").nth(1)
+    expect(success).to_contain_text("16.8 points more, 95 % interval [+")
+    expect(success.get_by_text("better", exact=True)).to_be_visible()
+
+    page.get_by_role("button", name="Export the table Verdicts").focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("menuitem", name="LaTeX (booktabs)")).to_be_visible()
+    page.keyboard.press("ArrowDown")
+    with page.expect_download() as download:
+        page.keyboard.press("Enter")
+    assert download.value.suggested_filename == "mapless-verdicts.tex"
+    text = download.value.path().read_text()
+    assert r"Long\_sight \& 99\% & Short sight & Success & 5, 5 & +16.8 [+" in text
+
+    # The base that is chosen is the one that is printed.
+    page.get_by_role("combobox", name="Held against").select_option("Long_sight & 99%")
+    expect(success.get_by_text("worse", exact=True)).to_be_visible()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Report (HTML)").click()
+    report = tmp_path / "report.html"
+    download.value.save_as(report)
+    offline = context.new_page()
+    offline.goto(report.as_uri())
+    expect(offline.get_by_role("cell", name="worse").first).to_be_visible()
+    expect(offline.get_by_role("img", name="eval/success_rate")).to_be_visible()
+
+
+def test_a_chart_leaves_as_numbers_and_as_pictures(compared: tuple[BrowserContext, str]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    found = {}
+    for kind in ("Numbers (CSV)", "Picture (SVG)", "Picture (PNG)"):
+        page.get_by_role("button", name="Export the chart Success rate, evaluation").click()
+        with page.expect_download() as download:
+            page.get_by_role("menuitem", name=kind).click()
+        found[Path(download.value.suggested_filename).suffix] = download.value.path().read_bytes()
+    assert found[".csv"].decode().splitlines()[-1].startswith("3000,0.9")
+    assert found[".svg"].startswith(b"<svg ")
+    assert found[".png"].startswith(b"\x89PNG")
+    assert len(found[".png"]) > 5_000

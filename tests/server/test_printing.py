@@ -1,0 +1,138 @@
+"""What is printed of a comparison: LaTeX that compiles, Markdown that stays a table, a report without a script."""
+
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from httpx import Response
+
+from server.printing.svg import Line, line_chart
+from server.printing.tables import PrintedTable
+from server.printing.text import comma_separated, latex, markdown
+from tests.server.harness import Reports
+from tests.server.test_comparison import measured
+
+HOSTILE = r"50% & more_<b>x</b> {y}$ | \end{document} #1 ^~"
+
+
+def printed(client: TestClient, path: str, *experiments: dict[str, Any], **query: str) -> Response:
+    params: dict[str, Any] = {"experiment": [experiment["id"] for experiment in experiments]}
+    response: Response = client.get(f"/api/compare/{path}", params=params | query)
+    assert response.status_code == 200, response.text
+    return response
+
+
+@pytest.fixture
+def pair(reports: Reports) -> tuple[dict[str, Any], dict[str, Any]]:
+    base = measured(reports, "base", (800, 820, 790, 850, 810), steps=100)
+    return base, measured(reports, HOSTILE, (990, 980, 970, 990, 980), steps=80)
+
+
+def test_the_verdicts_as_latex(client: TestClient, pair: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    response = printed(client, "table", *pair)
+    text = response.text
+    assert response.headers["content-disposition"] == 'attachment; filename="mapless-verdicts.tex"'
+    for part in (
+        r"\usepackage{booktabs}",
+        r"\begin{tabular}{lrrrrrrrr}",
+        r"\toprule",
+        r"\midrule",
+        r"\bottomrule",
+        "tab:verdicts",
+    ):
+        assert part in text
+    rows = [line for line in text.splitlines() if line.endswith(r"\\")]
+    assert len(rows) == 3
+    assert all(len(re.findall(r"(?<!\\)&", row)) == 8 for row in rows)
+    assert r"50\% \& more\_$<$b$>$x$<$/b$>$ \{y\}\$ | \textbackslash{}end\{document\} \#1" in rows[1]
+    assert re.search(r"& Success & 5, 5 & \+16\.8 \[\+\d+\.\d, \+\d+\.\d\] & \$?<?\$? ?0\.\d+ & better &", rows[1])
+    # Signs are minus signs.
+    assert r"$-$20.0 [$-$20.0, $-$20.0]" in rows[2]
+    assert r"p adjusted for 2 comparisons (Holm)" in text
+
+
+def test_figures_as_markdown_and_csv(client: TestClient, pair: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    text = printed(client, "table", *pair, table="figures", format="markdown").text
+    heading, rule, base, other = [line for line in text.splitlines() if line.startswith("|")]
+    assert heading.startswith("| Training | Seeds | N (episodes) | Success (%) |")
+    assert rule == "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    assert re.match(r"\| base \| 5 \| 5000 \| 81\.4 \[\d\d\.\d, \d\d\.\d\] \| 100\.0 \[100\.0, 100\.0\] \|", base)
+    # The name's own bar is no column, and its tags are text.
+    assert len(re.findall(r"(?<!\\)\|", other)) == 8
+    assert r"\<b\>" in other
+    assert "None" not in text
+
+    table = printed(client, "table", *pair, table="figures", format="csv")
+    assert table.headers["content-type"] == "text/csv; charset=utf-8"
+    assert table.text.splitlines()[1].startswith('base,5,5000,"81.4 [')
+
+
+def test_below_five_seeds_a_table_refuses_as_the_page_does(client: TestClient, reports: Reports) -> None:
+    few = [measured(reports, name, (900,) * 4) for name in ("one", "two")]
+    text = printed(client, "table", *few, format="markdown").text
+    assert "| two | one | Success | 4, 4 | – | – | refused | – | – |" in text
+
+
+def test_cells_are_no_formulas_and_no_commands() -> None:
+    table = PrintedTable("verdicts", "T", "c", ("a", "b"), [("=1+1", "[x] -5 a-1 <")])
+    assert "{[x] $-$5 a-1 $<$}" in latex(table)
+    assert comma_separated(table).splitlines()[1].startswith("'=1+1,")
+    assert markdown(table).count("|") == 9
+
+
+class Tags(HTMLParser):
+    """What a page consists of, and what it would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.loads: list[str | None] = []
+        self.links: list[str | None] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.loads += [
+            value for name, value in attrs if name in ("src", "srcset", "data") or (tag == "link" and name == "href")
+        ]
+        self.links += [value for name, value in attrs if tag == "a" and name == "href"]
+
+
+def test_the_report_is_one_file_without_a_script(
+    client: TestClient, reports: Reports, pair: tuple[dict[str, Any], dict[str, Any]]
+) -> None:
+    for experiment in pair:
+        reports.metrics(experiment["runs"][0], "eval/success_rate", {100: 0.25, 200: 0.75})
+    response = printed(client, "report", *pair, base=pair[1]["id"], margin="0.05")
+    assert response.headers["content-disposition"] == 'attachment; filename="mapless-comparison.html"'
+    page = Tags()
+    page.feed(response.text)
+    assert (page.tags.count("script"), page.loads) == (0, [])
+    assert (page.tags.count("table"), page.tags.count("svg")) == (3, 5)
+    assert "b" not in page.tags
+    ids = "&".join(f"experiment={experiment['id']}" for experiment in pair)
+    assert page.links == [f"http://127.0.0.1:8400/compare?{ids}&margin=0.05&base={pair[1]['id']}"]
+    assert "within 5 points of success" in response.text
+    # Both curves with two points, and four metrics that nobody reported.
+    assert response.text.count("<polyline") == 2 + 2
+
+
+def test_a_line_chart_in_numbers() -> None:
+    """From 64 to 548 across, from 232 up to 12: a half is at 122."""
+    line = Line("one", 0, mean=[0.0, None, 0.5], low=[None, None, 0.25], high=[None, None, 1.0])
+    chart = line_chart("t", "Steps", [0, 50, 100], [line], rate=True)
+    assert '<polyline points="64.0,232.0 548.0,122.0"' in chart
+    assert '<polygon points="548.0,12.0 548.0,177.0"' in chart
+    assert all(f">{tick}</text>" in chart for tick in ("0%", "100%", "20", "100"))
+    alone = line_chart("t", "Steps", [5], [Line("one", 0, [2.0], [None], [None])], rate=False)
+    assert '<circle cx="306.0" cy="122.0" r="3"' in alone
+    assert "No value yet" in line_chart("t", "Steps", [], [], rate=True)
+
+
+def test_what_cannot_be_printed(client: TestClient, reports: Reports) -> None:
+    one = reports.experiment()
+    for path in ("table", "report"):
+        assert client.get(f"/api/compare/{path}").status_code == 422
+        assert client.get(f"/api/compare/{path}", params={"experiment": "nobody"}).status_code == 404
+        assert client.get(f"/api/compare/{path}", params={"experiment": one["id"], "base": "nobody"}).status_code == 400

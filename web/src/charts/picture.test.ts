@@ -1,0 +1,39 @@
+import { expect, test } from 'vitest'
+import { csvOf, heightOf, svgOf } from './picture'
+import type { ChartData } from './series'
+
+const text = (value: number) => String(value)
+const look = { title: 'Success <rate>', xTitle: 'Steps', xFormat: text, format: text }
+
+const data: ChartData = {
+  x: [0, 100],
+  lines: [
+    { key: 'a:0', color: 0, thin: true, values: [0.5, null] },
+    { key: 'a', label: '=One, 2 seeds', color: 0, values: [0, 1], band: { low: [0, 0.5], high: [0.5, 1] } },
+  ],
+}
+
+test('a chart as CSV: a column for each line and the ends of its band, and no cell a formula', () => {
+  expect(csvOf(data, 'Steps')).toBe(
+    '"Steps","a:0","\'=One, 2 seeds","\'=One, 2 seeds, low","\'=One, 2 seeds, high"\r\n0,0.5,0,0,0.5\r\n100,,1,0.5,1\r\n',
+  )
+})
+
+test('a chart as SVG: lines, bands, a single point as a dot, axes and legend', () => {
+  // From 70 to 704 across, from 312 up to 36.
+  const svg = svgOf(data, { ...look, yRange: [0, 1] })
+  expect(svg).toContain('<polyline points="70.0,312.0 704.0,36.0"')
+  expect(svg).toContain('<polygon points="70.0,174.0 704.0,36.0 704.0,174.0 70.0,312.0"')
+  expect(svg).toContain('<circle cx="70.0" cy="174.0"')
+  expect(svg).toContain('Success &lt;rate&gt;')
+  expect(svg).toContain('>Steps</text>')
+  expect(svg).toContain('=One, 2 seeds</text>')
+  expect(new DOMParser().parseFromString(svg, 'image/svg+xml').querySelector('parsererror')).toBeNull()
+  expect(svg).toContain(`height="${heightOf(data)}"`)
+})
+
+test('a logarithmic axis has powers of ten', () => {
+  const values = { key: 'a', label: 'loss', color: 0, values: [0.01, 10] }
+  const svg = svgOf({ x: [0, 1], lines: [values] }, { ...look, logarithmic: true })
+  for (const power of ['0.01', '0.1', '1', '10']) expect(svg).toContain(`>${power}</text>`)
+})

@@ -1,0 +1,145 @@
+/** A chart as it leaves the page: SVG that needs nothing else, and the numbers as CSV. */
+import { lineColor } from './palette'
+import type { ChartData, Line, Values } from './series'
+
+export const WIDTH = 720
+const HEIGHT = 360
+const LEFT = 70
+const RIGHT = 16
+const TOP = 36
+const BOTTOM = 48
+const ROW = 18
+const TICKS = 5
+
+export interface PictureOptions {
+  title: string
+  xTitle: string
+  xFormat: (value: number) => string
+  format: (value: number) => string
+  yRange?: readonly [number, number] | undefined
+  logarithmic?: boolean
+}
+
+/** The chart in its light colours, with title, axes and legend; as high as `heightOf` says. */
+export function svgOf(data: ChartData, options: PictureOptions): string {
+  const { title, xTitle, xFormat, format, yRange, logarithmic = false } = options
+  const bend = logarithmic ? Math.log10 : (value: number) => value
+  const seen = data.lines.flatMap((line) => [line.values, line.band?.low ?? [], line.band?.high ?? []].flat())
+  const values = seen.filter((value): value is number => value !== null && (!logarithmic || value > 0))
+  const [low, high] = yRange && !logarithmic ? yRange : padded(values.map(bend))
+  const across = scale(data.x[0] ?? 0, data.x.at(-1) ?? 0, LEFT, WIDTH - RIGHT)
+  const rise = scale(low, high, HEIGHT - BOTTOM, TOP)
+  const up = (value: number) => rise(bend(value))
+  const yTicks = logarithmic
+    ? ticks(Math.floor(low), Math.ceil(high))
+        .filter((power) => Number.isInteger(power) && power >= low && power <= high)
+        .map((power) => 10 ** power)
+    : ticks(low, high)
+  const ink = 'fill="#3d464d"'
+  const legend = data.lines.filter((line) => line.label !== undefined)
+  return [
+    `<svg xmlns="http://www.w3.org/2000/svg" width="${WIDTH}" height="${heightOf(data)}" viewBox="0 0 ${WIDTH} ${heightOf(data)}" font-family="system-ui, sans-serif" font-size="12">`,
+    `<rect width="100%" height="100%" fill="#fff"/>`,
+    `<text x="${LEFT}" y="20" font-size="14" font-weight="600" ${ink}>${escaped(title)}</text>`,
+    ...yTicks.map(
+      (tick) =>
+        `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(format(tick))}</text>`,
+    ),
+    ...ticks(data.x[0] ?? 0, data.x.at(-1) ?? 0).map(
+      (tick) =>
+        `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(xFormat(tick))}</text>`,
+    ),
+    `<text x="${(LEFT + WIDTH - RIGHT) / 2}" y="${HEIGHT - BOTTOM + 38}" text-anchor="middle" ${ink}>${escaped(xTitle)}</text>`,
+    ...data.lines.map((line) => curve(data.x, line, across, up)),
+    ...legend.map((line, row) => {
+      const top = HEIGHT + ROW * row
+      return `<rect x="${LEFT}" y="${top + 3}" width="16" height="3" fill="${lineColor(line.color, false)}"/><text x="${LEFT + 24}" y="${top + 8}" ${ink}>${escaped(line.label ?? '')}</text>`
+    }),
+    '</svg>',
+  ].join('\n')
+}
+
+/** Pixels. */
+export function heightOf(data: ChartData): number {
+  return HEIGHT + ROW * data.lines.filter((line) => line.label !== undefined).length
+}
+
+/** A row for each x: every line, and the ends of its band. */
+export function csvOf(data: ChartData, xTitle: string): string {
+  const columns: { head: string; values: Values }[] = data.lines.flatMap((line) => {
+    const head = line.label ?? line.key
+    const own = [{ head, values: line.values }]
+    return line.band
+      ? [
+          ...own,
+          { head: `${head}, low`, values: line.band.low },
+          { head: `${head}, high`, values: line.band.high },
+        ]
+      : own
+  })
+  const rows = data.x.map((x, index) => [x, ...columns.map(({ values }) => values[index] ?? '')].join(','))
+  return `${[[xTitle, ...columns.map(({ head }) => head)].map(cell).join(','), ...rows].join('\r\n')}\r\n`
+}
+
+function curve(
+  x: readonly number[],
+  { color, thin, values, band }: Line,
+  across: (value: number) => number,
+  up: (value: number) => number,
+): string {
+  const ink = lineColor(color, false)
+  const points = (line: Values) =>
+    x.flatMap((at, index) => {
+      const value = line[index]
+      const y = value === null || value === undefined ? Number.NaN : up(value)
+      return Number.isFinite(y) ? [`${fixed(across(at))},${fixed(y)}`] : []
+    })
+  const edge = band ? [...points(band.high), ...points(band.low).reverse()] : []
+  const area =
+    edge.length > 0 ? `<polygon points="${edge.join(' ')}" fill="${ink}" fill-opacity="0.15"/>` : ''
+  const [first, ...rest] = points(values)
+  if (first !== undefined && rest.length === 0) {
+    const [left, top] = first.split(',')
+    return `${area}<circle cx="${left}" cy="${top}" r="3" fill="${ink}"/>`
+  }
+  const look = thin ? 'stroke-width="1" stroke-opacity="0.4"' : 'stroke-width="2"'
+  const drawn = [...(first === undefined ? [] : [first]), ...rest].join(' ')
+  return `${area}<polyline points="${drawn}" fill="none" stroke="${ink}" ${look}/>`
+}
+
+function scale(low: number, high: number, start: number, end: number): (value: number) => number {
+  return (value) =>
+    high === low ? (start + end) / 2 : start + ((value - low) / (high - low)) * (end - start)
+}
+
+function padded(values: readonly number[]): [number, number] {
+  const low = values.reduce((least, value) => Math.min(least, value), Number.POSITIVE_INFINITY)
+  const high = values.reduce((most, value) => Math.max(most, value), Number.NEGATIVE_INFINITY)
+  if (!Number.isFinite(low)) return [0, 1]
+  const room = (high - low) * 0.05 || Math.abs(high) * 0.05 || 1
+  return [low - room, high + room]
+}
+
+/** Round numbers from low to high, about five. */
+function ticks(low: number, high: number): number[] {
+  if (high <= low) return [low]
+  const rough = (high - low) / TICKS
+  const power = 10 ** Math.floor(Math.log10(rough))
+  const step = [1, 2, 2.5, 5, 10].map((factor) => factor * power).find((each) => each >= rough) ?? rough
+  const found: number[] = []
+  for (let index = Math.ceil(low / step - 1e-9); index * step <= high + step * 1e-9; index++)
+    found.push(Number((index * step).toPrecision(12)))
+  return found
+}
+
+const fixed = (value: number) => value.toFixed(1)
+
+function escaped(text: string): string {
+  return text.replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;')
+}
+
+/** A cell that no spreadsheet takes for a formula. */
+function cell(text: string): string {
+  const safe = /^[=+\-@\t\r]/.test(text) ? `'${text}` : text
+  return `"${safe.replaceAll('"', '""')}"`
+}
