@@ -162,6 +162,20 @@ def test_what_the_server_refuses_is_an_error_with_its_sentence(client: mapless_c
         stranger.run("any")
 
 
+def test_settings_are_searched(client: mapless_client.Client, environment: dict[str, str]) -> None:
+    command = ["mapless", "search", "Afar", "--range", "algorithm.learning_rate=1e-4..1e-2:log", "--values"]
+    command += ["algorithm.epochs=3,6", "--trials", "4", "--sampler", "quasi", "--set", "steps=1000000"]
+    printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+
+    stopped = client.stop_study(printed)
+    assert (stopped.name, stopped.state, stopped.trials) == ("Afar", "stopped", 4)
+    found = client.study(printed)
+    assert found.best is None
+    assert all(set(trial.values) == {"algorithm.learning_rate", "algorithm.epochs"} for trial in found.results)
+    with pytest.raises(mapless_client.InvalidRequestError, match="no such setting"):
+        client.search("Wrong", [{"kind": "range", "path": "algorithm.speed", "low": 0.0, "high": 1.0}])
+
+
 def test_the_models_say_what_the_api_says() -> None:
     """Every field is in the API's description, and may be None only where the API says so."""
     for name in vars(models):
@@ -249,4 +263,6 @@ def test_the_command_line_refuses_in_one_line(environment: dict[str, str]) -> No
 
     assert refused("watch", "nowhere") == "mapless: There is no experiment nowhere; it may have been deleted.\n"
     assert refused("launch", "x", "--set", "steps") == "mapless: --set steps: a setting, an equals sign, a value.\n"
+    assert refused("search", "x", "--values", "epochs").startswith("mapless: --values epochs: a setting")
+    assert refused("search", "x", "--range", "gamma=0.9").startswith("mapless: --range gamma=0.9: a setting")
     assert refused("pull", "x", "--as", "zip") == "mapless: --as takes archive, bundle, onnx, not zip.\n"

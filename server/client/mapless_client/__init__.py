@@ -36,12 +36,15 @@ from mapless_client.models import (
     Evidence,
     Experiment,
     Improvement,
+    Judgement,
     ListedExperiment,
     PairedTest,
     Run,
     RunEvent,
     RunState,
     SeedMean,
+    Study,
+    Trial,
 )
 
 __all__ = [
@@ -65,6 +68,7 @@ __all__ = [
     "Form",
     "Improvement",
     "InvalidRequestError",
+    "Judgement",
     "ListedExperiment",
     "NotFoundError",
     "PairedTest",
@@ -74,6 +78,8 @@ __all__ = [
     "RunEvent",
     "RunState",
     "SeedMean",
+    "Study",
+    "Trial",
     "UnauthorizedError",
     "UnreachableError",
     "connect",

@@ -20,6 +20,7 @@ from mapless_client.models import (
     ListedExperiment,
     Run,
     RunEvent,
+    Study,
 )
 from mapless_client.transport import Transport
 from mapless_client.watching import watch
@@ -126,6 +127,46 @@ class Client:
         if project is not None:
             body["project_id"] = project
         return Experiment.model_validate(self._transport.send("POST", "/api/experiments", body))
+
+    def search(
+        self,
+        name: str,
+        settings: Sequence[Json],
+        training: Json | None = None,
+        *,
+        trials: int = 30,
+        sampler: str = "tpe",
+        seeds: Sequence[int] = (0, 1, 2),
+        project: str | None = None,
+    ) -> Study:
+        """Launch a study, which searches settings of a training.
+
+        Args:
+            name: for people.
+            settings: `{"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}`, with `"log": True` where what
+                counts is how many times as large, or `{"kind": "list", "path": "algorithm.epochs", "values": [3, 6]}`.
+            training: all others, as for `launch`.
+            trials: to train.
+            sampler: `tpe`, `random`, `quasi` or `grid`.
+            seeds: of every trial, three or more; the best is judged on five others.
+            project: id of the project; the first one without it.
+
+        Raises:
+            InvalidRequestError: it names the settings that can't be searched so.
+            ForbiddenError: the token may not launch.
+        """
+        training = _named(training, self.defaults()) if training else {}
+        body: Json = {"name": name, "training": training, "settings": list(settings), "trials": trials}
+        body |= {"sampler": sampler, "seeds": list(seeds)} | ({} if project is None else {"project_id": project})
+        return Study.model_validate(self._transport.send("POST", "/api/studies", body))
+
+    def study(self, study_id: str) -> Study:
+        """A study with its trials."""
+        return Study.model_validate(self._transport.get(f"/api/studies/{study_id}"))
+
+    def stop_study(self, study_id: str) -> Study:
+        """Ask for no more trials, and stop those that go on; the page of the study resumes it."""
+        return Study.model_validate(self._transport.send("POST", f"/api/studies/{study_id}/stop"))
 
     def stop(self, experiment_id: str) -> Experiment:
         """End every run that has not ended; each writes a checkpoint first."""

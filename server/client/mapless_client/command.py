@@ -1,4 +1,4 @@
-"""`mapless runs`, `launch`, `watch`, `pull` and `compare`: a server's trainings from any command line."""
+"""`mapless runs`, `launch`, `search`, `watch`, `pull` and `compare`: a server's trainings from any command line."""
 
 from __future__ import annotations
 
@@ -85,6 +85,40 @@ def launch(
             typer.echo(launched.id)
         if follow:
             _follow(client, launched.id, as_json=as_json)
+
+
+@app.command()
+def search(
+    name: Annotated[str, typer.Argument(help="What you will know it by.")],
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option("--range", help="A number's range: algorithm.gamma=0.9..0.99; with :log at its end by ratio."),
+    ] = None,
+    values: Annotated[
+        list[str] | None, typer.Option("--values", help="The values of a setting: algorithm.epochs=3,6,10.")
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, help="Choices of the settings to train.")] = 30,
+    sampler: Annotated[str, typer.Option(help="tpe, random, quasi or grid.")] = "tpe",
+    seeds: Annotated[str, typer.Option(help="Comma-separated, three or more: of every trial.")] = "0,1,2",
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Another setting and its value: steps=100000; may be given again.")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="Configuration as the form's JSON; - for standard input.", allow_dash=True)
+    ] = None,
+    project: Annotated[str | None, typer.Option(help="Id of the project.")] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Launch a study, which searches settings of a training, and print its id."""
+    searched = [_range(each) for each in ranges or []] + [_list(each) for each in values or []]
+    training = _training(config, settings or [])
+    with _server(url) as client:
+        study = client.search(name, searched, training, trials=trials, sampler=sampler, seeds=_seeds(seeds), project=project)
+    if as_json:
+        _json(study)
+    else:
+        typer.echo(study.id)
 
 
 @app.command()
@@ -235,11 +269,35 @@ def _training(config: Path | None, settings: list[str]) -> dict[str, Any]:
             inner = inner.setdefault(folder, {})
             if not isinstance(inner, dict):
                 _refuse(f"--set {path}: {folder} has nothing in it.")
-        try:
-            inner[last] = json.loads(text)
-        except ValueError:
-            inner[last] = text
+        inner[last] = _read(text)
     return training
+
+
+def _range(text: str) -> dict[str, Any]:
+    path, _, ends = text.partition("=")
+    ends, colon, scale = ends.partition(":")
+    low, _, high = ends.partition("..")
+    try:
+        found = {"kind": "range", "path": path, "low": float(low), "high": float(high), "log": scale == "log"}
+    except ValueError:
+        found = {}
+    if not found or (colon and scale != "log"):
+        _refuse(f"--range {text}: a setting, an equals sign, two numbers with .. between them, :log if by ratio.")
+    return found
+
+
+def _list(text: str) -> dict[str, Any]:
+    path, equals, values = text.partition("=")
+    if not equals:
+        _refuse(f"--values {text}: a setting, an equals sign, values with commas between them.")
+    return {"kind": "list", "path": path, "values": [_read(value) for value in values.split(_COMMA)]}
+
+
+def _read(value: str) -> Any:
+    try:
+        return json.loads(value)
+    except ValueError:
+        return value
 
 
 def _seeds(text: str) -> list[int]:

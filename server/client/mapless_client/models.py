@@ -62,6 +62,50 @@ class ListedExperiment(Model):
     metrics: dict[str, SeedMean]
 
 
+class Trial(Model):
+    """One choice of a study's settings, by path; `reason` says why it was stopped early or failed."""
+
+    number: int
+    state: Literal["running", "complete", "pruned", "failed", "stopped"]
+    values: dict[str, bool | int | float | str]
+    experiment_id: str | None
+    progress: float
+    success: float | None
+    seconds_to_target: float | None
+    cost: float | None
+    reason: str | None
+
+
+class Judgement(Model):
+    """The best trial's settings, trained with seeds that the search never saw."""
+
+    trial: int
+    experiment_id: str
+    success: Estimate | None
+
+
+class Study(Model):
+    """A search over settings of a training. `trials` may be had, `asked` were; `best` is a trial's number."""
+
+    id: str
+    project_id: str
+    name: str
+    created_at: float
+    state: Literal["running", "judging", "done", "stopped"]
+    trials: int
+    asked: int
+    complete: int
+    pruned: int
+    failed: int
+    progress: float
+    seconds_left: float | None
+    best: int | None
+    best_success: float | None
+    results: list[Trial]
+    importances: dict[str, float] | None
+    judgement: Judgement | None
+
+
 class Run(Model):
     """One seed's training. `step` counts environment steps; `error` says why it failed."""
 
