@@ -37,6 +37,7 @@ from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
 from server.people import endpoints as people
+from server.people.oidc import endpoints as oidc
 from server.policies import endpoints as policies
 from server.printing import endpoints as printing
 from server.problems import UNAUTHORIZED, install_error_handlers
@@ -73,6 +74,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     system.router,
     login.router,
     people.router,
+    oidc.router,
     audit.router,
     alerts.router,
     projects.router,

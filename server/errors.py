@@ -3,6 +3,7 @@
 ServiceError (a sim.errors.MaplessError)   500
 ├── InvalidRequestError             400  the request makes no sense as a whole (a wrong Host header, say)
 ├── UnauthorizedError               401  no valid token
+│   └── (server.people.oidc.refusals.SignInRefusedError)
 ├── ForbiddenError                  403  a request from a foreign page, or a token without that right
 ├── NotFoundError                   404  no such experiment, run, checkpoint
 ├── ConflictError                   409  not in this state
@@ -18,6 +19,7 @@ ServiceError (a sim.errors.MaplessError)   500
 ├── DatabaseBusyError               503  other writers take too long
 ├── BusyError                       503  as much of this kind of work waits as may
 ├── JobTimeoutError                 503  what was asked for took a worker too long
+├── (server.people.oidc.refusals.ProviderUnusableError)
 └── NoWorkerError                   503  no worker is there to do it
 """
 

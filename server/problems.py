@@ -28,6 +28,7 @@ BUSY: Responses = {
     503: {"model": ErrorBody, "description": "Too many wait already: Retry-After says when to come again"},
 }
 TOO_MANY_STREAMS: Responses = {503: {"model": ErrorBody, "description": "Too many streams are open"}}
+PROVIDER_FAILED: Responses = {503: {"model": ErrorBody, "description": "The provider of identities can't be used now"}}
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 

@@ -21,6 +21,7 @@ from server.live.views import open_view
 from server.metrics.cache import AnswerCache
 from server.monitoring.instruments import Instruments
 from server.people.gate import Gate
+from server.people.oidc.provider import Provider
 from server.projects.repository import ProjectRepository
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
@@ -53,11 +54,14 @@ class Services:
     pulse: Pulse = field(default_factory=Pulse)
     login_limiter: GuessLimiter = field(init=False)
     gate: Gate = field(init=False)
+    provider: Provider | None = field(init=False)
 
     def __post_init__(self) -> None:
         self.login_limiter = GuessLimiter(on_guess=self.instruments.wrong_secrets.inc)
         self.bus = EventBus(find_projects=self._projects_of)
         self.gate = Gate(self.database, self.lanes.accounts)
+        oidc = self.settings.oidc
+        self.provider = Provider(oidc) if oidc is not None else None
         self.drivers = PolicyDrivers(self.live)
         self.leases = Leases(self.settings.lease_seconds)
         self.job_leases = Leases(self.settings.lease_seconds)

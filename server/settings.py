@@ -3,10 +3,12 @@
 import ipaddress
 from pathlib import Path
 from typing import Literal, Self
+from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from server.people.oidc.settings import OidcSettings, check_right, is_safe_url
 from workers.logs import LogFormat
 from workers.runtime.settings import EXTENSIONS_SETTING
 
@@ -75,6 +77,31 @@ class Settings(BaseSettings):
         description="Opens /metrics and nothing else, for Prometheus (16 characters or more); the login token does too.",
     )
 
+    oidc_issuer: str | None = Field(
+        None, description="URL of a provider of identities (OpenID Connect) that people sign in with, as its tokens have it."
+    )
+    oidc_client_id: str | None = Field(None, description="What the provider calls this installation.")
+    oidc_client_secret: SecretStr | None = Field(
+        None, description="What the provider knows this installation by; a public client has none."
+    )
+    oidc_title: str | None = Field(None, description="What the pages call the provider; its host if not given.")
+    oidc_scopes: str = Field(
+        "openid profile email", pattern=r"^openid( |$)", description="Asked of the provider, separated by spaces."
+    )
+    oidc_name_claim: str = Field("preferred_username", description="Claim that new accounts are called after.")
+    oidc_email_claim: str = Field("email", description="Claim with the e-mail address, kept if `email_verified` says so.")
+    oidc_groups_claim: str = Field("groups", description="Claim with a person's groups.")
+    oidc_domains: tuple[str, ...] = Field(
+        (), description="Domains of verified e-mail addresses that are let in (JSON list); all if not given."
+    )
+    oidc_groups: tuple[str, ...] = Field((), description="Groups that are let in (JSON list); all if not given.")
+    oidc_rights: dict[str, tuple[str, ...]] = Field(
+        default_factory=dict,
+        description='What a group may do (JSON): `{"nav": ["editor in Halls"], "ops": ["administrator"]}`. Roles in '
+        "projects named here are the groups' at every sign-in.",
+    )
+    oidc_strangers: bool = Field(False, description="Whether who is let in and was not invited gets an account.")
+
     workers: int | None = Field(
         None, ge=0, le=256, description="Local worker processes of `mapless up`; one a core if not given."
     )
@@ -130,6 +157,23 @@ class Settings(BaseSettings):
                 raise ValueError(f"{proxy!r} is neither an address nor a network (10.0.0.5, 172.16.0.0/12)") from error
         return proxies
 
+    @field_validator("oidc_rights")
+    @classmethod
+    def _are_rights(cls, rights: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        for right in (right for theirs in rights.values() for right in theirs):
+            check_right(right)
+        return rights
+
+    @model_validator(mode="after")
+    def _whole_provider(self) -> Self:
+        if self.oidc_issuer is None:
+            return self
+        if self.oidc_client_id is None:
+            raise ValueError("MAPLESS_OIDC_ISSUER needs MAPLESS_OIDC_CLIENT_ID: what the provider calls this installation")
+        if not is_safe_url(self.oidc_issuer):
+            raise ValueError("MAPLESS_OIDC_ISSUER must begin with https://: the provider is sent secrets")
+        return self
+
     @model_validator(mode="after")
     def _closed_on_a_network(self) -> Self:
         if is_loopback(self.host):
@@ -142,6 +186,26 @@ class Settings(BaseSettings):
         if len(self.token.get_secret_value()) < _MIN_NETWORK_TOKEN:
             raise ValueError(f"MAPLESS_TOKEN must have at least {_MIN_NETWORK_TOKEN} characters to listen on {self.host}")
         return self
+
+    @property
+    def oidc(self) -> OidcSettings | None:
+        """The provider of identities; None where there is none."""
+        if self.oidc_issuer is None or self.oidc_client_id is None:
+            return None
+        return OidcSettings(
+            issuer=self.oidc_issuer,
+            client_id=self.oidc_client_id,
+            client_secret=self.oidc_client_secret.get_secret_value() if self.oidc_client_secret else None,
+            scopes=self.oidc_scopes,
+            title=self.oidc_title or urlsplit(self.oidc_issuer).hostname or self.oidc_issuer,
+            name_claim=self.oidc_name_claim,
+            email_claim=self.oidc_email_claim,
+            groups_claim=self.oidc_groups_claim,
+            domains=frozenset(domain.lower() for domain in self.oidc_domains),
+            groups=frozenset(self.oidc_groups),
+            rights=self.oidc_rights,
+            strangers=self.oidc_strangers,
+        )
 
     @property
     def resolved_database_url(self) -> str:

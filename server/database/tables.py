@@ -367,7 +367,7 @@ class Worker(Base):
 
 
 class User(Base):
-    """A person with an account; `issuer` and `subject` are kept for who will sign in with a provider of identities."""
+    """A person with an account; `issuer` and `subject` are of who signs in with a provider of identities."""
 
     __tablename__ = "users"
     __table_args__ = (UniqueConstraint("issuer", "subject"),)

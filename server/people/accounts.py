@@ -34,6 +34,7 @@ class AccountService:
                 email=user.email if user else None,
                 administrates=principal.administrates,
                 people=people.any(),
+                connected=user is not None and user.subject is not None,
                 has_password=user is not None and user.password_hash is not None,
                 may_launch=principal.has_anywhere("editor"),
             )

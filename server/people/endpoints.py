@@ -2,12 +2,13 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Request, Response, status
+from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from server.errors import NotFoundError, UnauthorizedError
 from server.paging import WindowDep
 from server.people.accounts import AccountService
 from server.people.invitations import InvitationService
+from server.people.oidc.refusals import Refusal, in_words
 from server.people.schemas import (
     Account,
     ApiToken,
@@ -35,10 +36,10 @@ from server.people.service import PeopleService
 from server.people.sign_in import SignInService
 from server.problems import CONFLICT, FORBIDDEN, INVALID, NOT_FOUND, TOO_MANY, UNAUTHORIZED
 from server.schemas import Page
-from server.security.cookies import clear_cookies, session_cookie
+from server.security.cookies import clear_cookies, set_session
 from server.security.permissions import ADMINISTRATE, INVITE, OPEN, OWN_ACCOUNT, SIGNED_IN, manage
 from server.security.principal import PrincipalDep
-from server.services import Services, ServicesDep
+from server.services import ServicesDep
 
 router = APIRouter(tags=["people"])
 
@@ -69,9 +70,18 @@ SignInDep = Annotated[SignInService, Depends(_sign_in)]
 
 
 @router.get("/api/sign-in", dependencies=[OPEN])
-def get_sign_in_options(service: SignInDep) -> SignInOptions:
+def get_sign_in_options(
+    service: SignInDep,
+    services: ServicesDep,
+    refused: Annotated[Refusal | None, Query(description="Why the provider's sign-in failed.")] = None,
+) -> SignInOptions:
     """How one may sign in here."""
-    return SignInOptions(people=service.has_people())
+    provider = services.provider.settings.title if services.provider is not None else None
+    return SignInOptions(
+        people=service.has_people(),
+        provider=provider,
+        refused=in_words(refused, provider) if refused is not None and provider is not None else None,
+    )
 
 
 @router.post("/api/sign-in", status_code=_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY, dependencies=[OPEN])
@@ -90,7 +100,7 @@ async def sign_in(
     except UnauthorizedError:
         services.login_limiter.failed(request, credentials.password)
         raise
-    _keep(response, request, services, secret)
+    set_session(response, request, services.settings, secret)
 
 
 @router.post("/api/sign-out", status_code=_NO_CONTENT, dependencies=[SIGNED_IN])
@@ -254,7 +264,7 @@ async def accept_invitation(
         services.login_limiter.failed(request, acceptance.code, once=True)
         raise
     if secret is not None:
-        _keep(response, request, services, secret)
+        set_session(response, request, services.settings, secret)
 
 
 @router.get("/api/worker-tokens", dependencies=[ADMINISTRATE])
@@ -273,7 +283,3 @@ def make_worker_token(request: WorkerTokenCreate, service: PeopleDep) -> NewWork
 def revoke_worker_token(token_id: str, service: PeopleDep) -> None:
     """Let a workers' token open nothing any more; links that it opened are cut."""
     service.revoke_worker_token(token_id)
-
-
-def _keep(response: Response, request: Request, services: Services, secret: str) -> None:
-    response.headers.append("set-cookie", session_cookie(request, services.settings, secret))

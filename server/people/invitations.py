@@ -94,7 +94,7 @@ class InvitationService:
             NotFoundError: it opens nothing (any more).
         """
         with self._services.database.read() as session:
-            row = _find(session, code)
+            row = find_invitation(session, code)
             user = PeopleRepository(session).get(row.user_id) if row.user_id is not None else None
             return InvitationView(
                 purpose="join" if user is None else "password",
@@ -117,7 +117,7 @@ class InvitationService:
         # Ahead of the transaction: it takes its time.
         hashed = hash_password(request.password) if request.password is not None else None
         with self._services.database.write() as session:
-            row = _find(session, request.code, for_update=True)
+            row = find_invitation(session, request.code, for_update=True)
             people = PeopleRepository(session)
             if row.user_id is not None:
                 user = people.get(row.user_id)
@@ -130,21 +130,26 @@ class InvitationService:
                 user, signed_in = people.get(principal.user_id), True
             else:
                 user, signed_in = _join(people, request, hashed), False
-            user.admin = user.admin or row.admin
-            if row.project_id is not None and row.role is not None:
-                people.set_role(row.project_id, user.id, row.role)
-            row.used_at = time.time()
-            with acting(Actor(Principal("person", user.name, user_id=user.id), current_actor().address)):
-                AuditRepository(session).add(
-                    "password.reset" if row.user_id is not None else "invitation.accepted",
-                    target=user.id,
-                    name=user.name,
-                    project_id=row.project_id,
-                    details=f"invited by {row.invited_by}",
-                )
+            use_invitation(session, row, user)
             secret = None if signed_in else open_session(session, user, browser)
         self._services.gate.changed()
         return secret
+
+
+def use_invitation(session: Session, row: tables.Invitation, user: tables.User) -> None:
+    """Give somebody what an invitation promises, within the caller's transaction; it opens nothing any more."""
+    user.admin = user.admin or row.admin
+    if row.project_id is not None and row.role is not None:
+        PeopleRepository(session).set_role(row.project_id, user.id, row.role)
+    row.used_at = time.time()
+    with acting(Actor(Principal("person", user.name, user_id=user.id), current_actor().address)):
+        AuditRepository(session).add(
+            "password.reset" if row.user_id is not None else "invitation.accepted",
+            target=user.id,
+            name=user.name,
+            project_id=row.project_id,
+            details=f"invited by {row.invited_by}",
+        )
 
 
 def add_invitation(session: Session, invited_by: str, request: InvitationCreate) -> NewInvitation:
@@ -210,7 +215,12 @@ def _join(people: PeopleRepository, request: InvitationAccept, hashed: str | Non
     return user
 
 
-def _find(session: Session, code: str, *, for_update: bool = False) -> tables.Invitation:
+def find_invitation(session: Session, code: str, *, for_update: bool = False) -> tables.Invitation:
+    """The invitation of a link's code; `for_update` for who will use it.
+
+    Raises:
+        NotFoundError: the link opens nothing (any more).
+    """
     row = CredentialRepository(session).invitation(hash_of(code), time.time(), for_update=for_update)
     if row is None:
         raise NotFoundError(_GONE)

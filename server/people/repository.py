@@ -41,6 +41,15 @@ class PeopleRepository:
         """The account of that name, in any case."""
         return self._session.scalar(select(tables.User).where(tables.User.name == name.strip().lower()))
 
+    def identified(self, issuer: str, subject: str) -> tables.User | None:
+        """The account of somebody whom a provider of identities knows."""
+        row = tables.User
+        return self._session.scalar(select(row).where(row.issuer == issuer, row.subject == subject))
+
+    def with_email(self, email: str) -> tables.User | None:
+        """The account of that e-mail address."""
+        return self._session.scalar(select(tables.User).where(tables.User.email == email))
+
     def administrators(self) -> int:
         """How many may administrate the installation, and sign in."""
         query = select(func.count()).where(tables.User.admin, tables.User.disabled_at.is_(None))

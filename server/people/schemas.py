@@ -23,6 +23,8 @@ class SignInOptions(Schema):
     """How one may sign in here."""
 
     people: bool = Field(description="There are accounts; without them the server's own token is all there is.")
+    provider: str | None = Field(None, description="What the provider of identities is called; null where none is set up.")
+    refused: str | None = Field(None, description="Why the provider's sign-in failed, in words.")
 
 
 class SignIn(Schema):
@@ -41,6 +43,7 @@ class Account(Schema):
     administrates: bool = Field(description="May administrate people, workers' tokens and the audit log.")
     people: bool = Field(description="There are accounts.")
     has_password: bool
+    connected: bool = Field(description="An identity of a provider signs in to it.")
     may_launch: bool = Field(description="Is an editor in some project.")
 
 

@@ -39,6 +39,8 @@ OPEN_PATHS = frozenset(
     {
         "/api/login",
         "/api/sign-in",
+        "/api/sign-in/provider",
+        "/api/sign-in/provider/callback",
         "/api/invitations/look",
         "/api/invitations/accept",
     }

@@ -7,6 +7,7 @@ from server.security.secrets import Secrets
 from server.settings import Settings
 
 _THIRTY_DAYS = 30 * 24 * 3600
+_JOURNEY_PATH = "/api/sign-in/provider"
 
 
 def cookie_name(settings: Settings) -> str:
@@ -22,8 +23,36 @@ def session_cookie_name(settings: Settings) -> str:
 def session_cookie(request: HTTPConnection, settings: Settings, secret: str) -> str:
     """The header that keeps a session's secret in the browser, as `set_login_cookie` keeps the login."""
     response = Response()
-    _set(response, request, session_cookie_name(settings), secret)
+    set_session(response, request, settings, secret)
     return response.headers["set-cookie"]
+
+
+def set_session(response: Response, request: HTTPConnection, settings: Settings, secret: str) -> None:
+    """Sign the browser in."""
+    _set(response, request, session_cookie_name(settings), secret)
+
+
+def journey_cookie_name(settings: Settings) -> str:
+    """Of who is at the provider of identities to sign in."""
+    return f"mapless-journey-{settings.port}"
+
+
+def set_journey(response: Response, request: HTTPConnection, settings: Settings, sealed: str, seconds: int) -> None:
+    """Keep what the browser comes back with; it comes from the provider's page, which *strict* would not allow."""
+    response.set_cookie(
+        journey_cookie_name(settings),
+        sealed,
+        max_age=seconds,
+        path=_JOURNEY_PATH,
+        httponly=True,
+        samesite="lax",
+        secure=request.url.scheme == "https",
+    )
+
+
+def clear_journey(response: Response, settings: Settings) -> None:
+    """Forget it: it serves once."""
+    response.delete_cookie(journey_cookie_name(settings), path=_JOURNEY_PATH, httponly=True, samesite="lax")
 
 
 def clear_cookies(response: Response, settings: Settings) -> None:

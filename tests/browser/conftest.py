@@ -51,16 +51,20 @@ def read_url(process: "subprocess.Popen[str]", seconds: float) -> str:
 
 
 @contextmanager
-def running(mapless: list[str], directory: Path, workers: int) -> Iterator[str]:
+def running(
+    mapless: list[str], directory: Path, workers: int, *, port: int = 0, env: dict[str, str] | None = None
+) -> Iterator[str]:
     """The address, with its login token, of a service that runs meanwhile.
 
     Args:
         mapless: the command.
         directory: where it keeps its data.
         workers: how many it has.
+        port: to listen on; any free one if not given.
+        env: the environment; this one if not given.
     """
-    command = [*mapless, "up", "--port", "0", "--workers", str(workers), "--data-dir", str(directory)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    command = [*mapless, "up", "--port", str(port), "--workers", str(workers), "--data-dir", str(directory)]
+    process = subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         yield read_url(process, 60.0)
     finally:

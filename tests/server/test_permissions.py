@@ -30,6 +30,8 @@ TABLE = {
         POST /api/login
         GET /api/sign-in
         POST /api/sign-in
+        POST /api/sign-in/provider
+        GET /api/sign-in/provider/callback
         POST /api/invitations/look
         POST /api/invitations/accept
         GET /healthz

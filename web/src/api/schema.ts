@@ -1877,6 +1877,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sign-in/provider": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Go To Provider
+         * @description Where to send the browser, which is given a cookie to come back with.
+         */
+        post: operations["go_to_provider_api_sign_in_provider_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sign-in/provider/callback": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Come From Provider
+         * @description Signs in whom the provider sends back, and leads to the page that they came from; refusals lead to it too.
+         */
+        get: operations["come_from_provider_api_sign_in_provider_callback_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sign-out": {
         parameters: {
             query?: never;
@@ -2391,6 +2431,11 @@ export interface components {
              * @description May administrate people, workers' tokens and the audit log.
              */
             administrates: boolean;
+            /**
+             * Connected
+             * @description An identity of a provider signs in to it.
+             */
+            connected: boolean;
             /** Email */
             email: string | null;
             /** Has Password */
@@ -7548,6 +7593,40 @@ export interface components {
             name: string;
         };
         /**
+         * ProviderAddress
+         * @description Where to send the browser.
+         */
+        ProviderAddress: {
+            /**
+             * Url
+             * @description The provider's page; it sends the browser back here.
+             */
+            url: string;
+        };
+        /**
+         * ProviderSignIn
+         * @description How somebody wants to sign in with the provider of the settings.
+         */
+        ProviderSignIn: {
+            /**
+             * Back
+             * @description Path of the page that it leads to.
+             * @default /
+             */
+            back: string;
+            /**
+             * Connect
+             * @description From now on the identity signs in to the account that is signed in here.
+             * @default false
+             */
+            connect: boolean;
+            /**
+             * Invitation
+             * @description What an invitation's link ends with, to accept it with the sign-in.
+             */
+            invitation?: string | null;
+        };
+        /**
          * ProximityTerm
          * @description Near to anything: max(0, 1 - distance from the body / margin).
          */
@@ -9015,6 +9094,16 @@ export interface components {
              * @description There are accounts; without them the server's own token is all there is.
              */
             people: boolean;
+            /**
+             * Provider
+             * @description What the provider of identities is called; null where none is set up.
+             */
+            provider: string | null;
+            /**
+             * Refused
+             * @description Why the provider's sign-in failed, in words.
+             */
+            refused: string | null;
         };
         /**
          * SingleMount
@@ -16235,7 +16324,10 @@ export interface operations {
     };
     get_sign_in_options_api_sign_in_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Why the provider's sign-in failed. */
+                refused?: ("stopped" | "stale" | "unreachable" | "unusable" | "not_allowed" | "stranger" | "closed" | "link" | "taken" | "busy") | null;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -16258,6 +16350,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -16307,6 +16408,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    go_to_provider_api_sign_in_provider_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ProviderSignIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProviderAddress"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description The provider of identities can't be used now */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    come_from_provider_api_sign_in_provider_callback_get: {
+        parameters: {
+            query?: {
+                code?: string;
+                error?: string;
+                iss?: string;
+                state?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            303: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -15,6 +15,7 @@ import { useState } from 'react'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
+import { ProviderButton, useSignInOptions } from '../components/people/ProviderButton'
 import { Rows } from '../components/people/Rows'
 import { Secret } from '../components/people/Secret'
 import { useChange } from '../components/people/useChange'
@@ -42,11 +43,33 @@ export function AccountPage() {
   return (
     <Page title={account?.name ?? 'My account'}>
       <Stack gap="md">
+        {account && <ProviderPanel connected={account.connected} />}
         {account?.has_password && <Password />}
         <Tokens />
         <Sessions />
       </Stack>
     </Page>
+  )
+}
+
+function ProviderPanel({ connected }: { connected: boolean }) {
+  const { data: options } = useSignInOptions()
+  if (!options?.provider) return null
+  return (
+    <Panel title={`Signing in with ${options.provider}`}>
+      {connected ? (
+        <Text size="sm">Connected: you sign in to this account with {options.provider}.</Text>
+      ) : (
+        <Stack gap="sm" align="start">
+          <Text size="sm" c="dimmed">
+            Connect your identity there, and it signs you in to this account from now on.
+          </Text>
+          <ProviderButton refused={options.refused ?? null} connect back="/account">
+            Connect
+          </ProviderButton>
+        </Stack>
+      )}
+    </Panel>
   )
 }
 

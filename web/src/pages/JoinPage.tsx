@@ -1,11 +1,12 @@
 /** Where an invitation's link leads: join, or set a new password. The code stays behind the #, which no server ever sees. */
-import { Button, PasswordInput, Text, TextInput, Title } from '@mantine/core'
+import { Button, Divider, PasswordInput, Text, TextInput, Title } from '@mantine/core'
 import { useQueryClient } from '@tanstack/react-query'
 import { useState } from 'react'
 import { useLocation, useNavigate } from 'react-router'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
+import { ProviderButton, useSignInOptions } from '../components/people/ProviderButton'
 import { Message } from '../components/ui'
 import { dateTime } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -19,6 +20,7 @@ export function JoinPage() {
   const navigate = useNavigate()
   const code = useLocation().hash.slice(1)
   const account = useAccount()
+  const options = useSignInOptions()
   const [name, setName] = useState('')
   const [password, setPassword] = useState('')
   const invitation = $api.useQuery(
@@ -93,6 +95,14 @@ export function JoinPage() {
       <Button type="submit" loading={accept.isPending} disabled={!ready}>
         {resets ? 'Set the password' : 'Join'}
       </Button>
+      {!resets && !known && options.data?.provider && (
+        <>
+          <Divider label="or" />
+          <ProviderButton refused={null} invitation={code} back="/">
+            Join with {options.data.provider}
+          </ProviderButton>
+        </>
+      )}
     </LoginFrame>
   )
 }

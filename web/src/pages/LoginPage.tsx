@@ -1,18 +1,38 @@
 /** Asks who it is: name and password where there are accounts, else the token that the server printed at its start. */
-import { Anchor, Button, Code, Paper, PasswordInput, Stack, Text, TextInput, Title } from '@mantine/core'
+import {
+  Anchor,
+  Button,
+  Code,
+  Divider,
+  Paper,
+  PasswordInput,
+  Stack,
+  Text,
+  TextInput,
+  Title,
+} from '@mantine/core'
 import { useQueryClient } from '@tanstack/react-query'
 import { type ReactNode, useState } from 'react'
 import { $api } from '../api/client'
 import { isUnauthorized, messageOf } from '../api/errors'
+import { ProviderButton, useSignInOptions } from '../components/people/ProviderButton'
 import { useTitle } from '../lib/hooks'
 
 export function LoginPage() {
   useTitle('Log in')
-  const options = $api.useQuery('get', '/api/sign-in', undefined, { retry: false })
+  const options = useSignInOptions()
   const [byToken, setByToken] = useState(false)
   if (options.isPending) return null
-  if (!options.data?.people || byToken) return <TokenForm />
-  return <AccountForm onToken={() => setByToken(true)} />
+  const { people, provider, refused } = options.data ?? {}
+  if ((!people && !provider) || byToken) return <TokenForm />
+  return (
+    <AccountForm
+      passwords={people ?? false}
+      provider={provider ?? null}
+      refused={refused ?? null}
+      onToken={() => setByToken(true)}
+    />
+  )
 }
 
 export function LoginFrame({ onSubmit, children }: { onSubmit: () => void; children: ReactNode }) {
@@ -35,7 +55,17 @@ export function LoginFrame({ onSubmit, children }: { onSubmit: () => void; child
   )
 }
 
-function AccountForm({ onToken }: { onToken: () => void }) {
+function AccountForm({
+  passwords,
+  provider,
+  refused,
+  onToken,
+}: {
+  passwords: boolean
+  provider: string | null
+  refused: string | null
+  onToken: () => void
+}) {
   const client = useQueryClient()
   const [name, setName] = useState('')
   const [password, setPassword] = useState('')
@@ -43,24 +73,35 @@ function AccountForm({ onToken }: { onToken: () => void }) {
   return (
     <LoginFrame onSubmit={() => signIn.mutate({ body: { name: name.trim(), password } })}>
       <Title order={1}>Sign in</Title>
-      <TextInput
-        label="Name"
-        autoComplete="username"
-        value={name}
-        onChange={(event) => setName(event.currentTarget.value)}
-        data-autofocus
-        autoFocus
-      />
-      <PasswordInput
-        label="Password"
-        autoComplete="current-password"
-        value={password}
-        onChange={(event) => setPassword(event.currentTarget.value)}
-        error={signIn.error && messageOf(signIn.error)}
-      />
-      <Button type="submit" loading={signIn.isPending} disabled={name.trim() === '' || password === ''}>
-        Sign in
-      </Button>
+      {provider && <ProviderButton refused={refused}>Sign in with {provider}</ProviderButton>}
+      {provider && passwords && <Divider label="or" />}
+      {passwords && (
+        <>
+          <TextInput
+            label="Name"
+            autoComplete="username"
+            value={name}
+            onChange={(event) => setName(event.currentTarget.value)}
+            data-autofocus
+            autoFocus
+          />
+          <PasswordInput
+            label="Password"
+            autoComplete="current-password"
+            value={password}
+            onChange={(event) => setPassword(event.currentTarget.value)}
+            error={signIn.error && messageOf(signIn.error)}
+          />
+          <Button
+            type="submit"
+            variant={provider ? 'default' : 'filled'}
+            loading={signIn.isPending}
+            disabled={name.trim() === '' || password === ''}
+          >
+            Sign in{provider && ' with a password'}
+          </Button>
+        </>
+      )}
       <Text size="sm" c="dimmed">
         No account? Somebody who administrates a project can send you a link. Whoever runs the server can{' '}
         <Anchor component="button" type="button" size="sm" onClick={onToken}>

@@ -13,6 +13,7 @@ const account = {
   administrates: false,
   people: true,
   has_password: true,
+  connected: false,
   may_launch: true,
 }
 const project = { id: 'p1', name: 'Halls', created_at: 1, experiments: 3, role: 'admin' }
@@ -34,6 +35,24 @@ test('where there are accounts, name and password are asked for, and the server 
   })
   await user.click(screen.getByRole('button', { name: 'use its token' }))
   expect(await screen.findByLabelText('Token')).toBeInTheDocument()
+})
+
+test('a provider of identities is led to, and quoted where it did not work out', async () => {
+  const server = startServer({
+    'GET /api/status': locked,
+    'GET /api/sign-in': { people: false, provider: 'the university', refused: 'Who are you?' },
+    'POST /api/sign-in/provider': refusal(503, 'the university does not answer.'),
+  })
+  const { user } = open('/queue?refused=stranger&tab=2')
+  expect(await screen.findByText('Who are you?')).toBeInTheDocument()
+  expect(screen.queryByLabelText('Password')).toBeNull()
+  await user.click(screen.getByRole('button', { name: 'Sign in with the university' }))
+  expect(await screen.findByText('the university does not answer.')).toBeInTheDocument()
+  expect(server.changes.at(-1)).toEqual({
+    route: 'POST /api/sign-in/provider',
+    body: { back: '/queue?tab=2', invitation: null, connect: false },
+  })
+  expect(server.asked).toContain('/api/sign-in?refused=stranger')
 })
 
 test('without accounts nothing of people is shown', async () => {
