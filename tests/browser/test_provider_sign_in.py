@@ -34,7 +34,7 @@ def test_somebody_joins_by_a_link_and_comes_back_without_one(browser: Browser, t
             page.goto("/queue")
             page.get_by_role("button", name="Sign in with the university").click()
             at_the_provider(page, "ada", provider)
-            expect(page.get_by_role("alert")).to_contain_text("the university knows you, but you have no account here")
+            expect(page.get_by_role("alert")).to_contain_text("The university knows you, but you have no account here")
 
             token = address.partition("token=")[2]
             made = context.request.post(

@@ -247,7 +247,7 @@ def test_stopping_at_the_provider_leads_back_with_a_reason(serve: Serve) -> None
     state = parse_qs(urlsplit(go(browser)).query)["state"][0]
     answer = browser.get(CALLBACK, params={"error": "access_denied", "state": state})
     assert answer.headers["location"] == "/?refused=stopped"
-    assert words(browser, answer.headers["location"]).startswith("the university did not let you in, or you stopped there.")
+    assert words(browser, answer.headers["location"]).startswith("The university did not let you in, or you stopped there.")
     assert browser.get("/api/sign-in?refused=<script>").status_code == 422
 
 

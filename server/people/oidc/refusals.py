@@ -44,4 +44,5 @@ class ProviderUnusableError(ServiceError):
 
 def in_words(reason: Refusal, provider: str) -> str:
     """What the page says."""
-    return _WORDS[reason].format(provider=provider)
+    said = _WORDS[reason].format(provider=provider)
+    return said[0].upper() + said[1:]
