@@ -85,6 +85,7 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
         ("/policies/complex", "[data-testid=episode]", "Download Complex arena"),
         ("/arenas", "text=A wall", "Delete A wall"),
         ("/alerts", "h1", ""),
+        ("/studies", "h1", ""),
         ("/queue", "[data-testid=job]", ""),
         ("/evaluations", "[data-testid=evaluation]", ""),
         ("/leaderboards", "[data-testid=entry]", ""),

@@ -50,7 +50,7 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
             <Title order={3}>Probability of improvement</Title>
             <TableExport table="improvements" title="Probability of improvement" query={query} />
           </Group>
-          <Table.ScrollContainer type="native" minWidth={380}>
+          <Table.ScrollContainer type="native" minWidth={380} tabIndex={0}>
             <Table className={table.table} aria-label="Probability of improvement" data-testid="improvements">
               <Table.Thead>
                 <Table.Tr>
