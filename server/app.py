@@ -56,6 +56,8 @@ from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
 from server.slow_clients import SlowClientMiddleware
+from server.storage import endpoints as storage
+from server.storage.sweep import keep_thinned
 from server.studies import endpoints as studies
 from server.studies.advance import keep_studying
 from server.sweeper import dispatch
@@ -104,6 +106,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     evaluations.router,
     leaderboards.router,
     uploads.router,
+    storage.router,
     monitoring.router,
 )
 
@@ -115,7 +118,15 @@ _COMPRESS_LEVEL = 3
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
-BACKGROUND: tuple[Background, ...] = (dispatch, keep_swept, keep_indexed, keep_emptied, keep_studying, keep_alerting)
+BACKGROUND: tuple[Background, ...] = (
+    dispatch,
+    keep_swept,
+    keep_indexed,
+    keep_emptied,
+    keep_thinned,
+    keep_studying,
+    keep_alerting,
+)
 
 
 def create_services(settings: Settings) -> Services:

@@ -9,6 +9,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from server.people.oidc.settings import OidcSettings, check_right, is_safe_url
+from server.storage.rule import KeepRule
 from workers.logs import LogFormat
 from workers.runtime.settings import EXTENSIONS_SETTING
 
@@ -132,6 +133,14 @@ class Settings(BaseSettings):
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
     max_checkpoint_bytes: int = Field(512 * 2**20, gt=0, description="Largest checkpoint accepted from a worker.")
     trash_days: float = Field(7.0, ge=0.0, le=3_650.0, description="How long what was deleted can be taken back.")
+    keep_checkpoints: KeepRule | None = Field(
+        None,
+        description='Which checkpoints of each run stay, where an experiment has no rule of its own, as JSON: `{"last": 3, '
+        '"every": 10, "best": true}` keeps the newest 3, one in 10 and the best; all if not given.',
+    )
+    min_free_disk_bytes: int = Field(
+        2**30, ge=0, description="Free on each disk: with less, `mapless doctor` and the page *Storage* say so."
+    )
     max_replay_bytes: int = Field(
         256 * 2**20, ge=0, description="Of all replays and bundles that are kept; older ones are made again."
     )

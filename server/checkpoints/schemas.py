@@ -27,6 +27,7 @@ class Checkpoint(Schema):
     sha256: str
     created_at: float
     damaged: bool = Field(description="Its archive was found damaged or gone: the run went on from an older one.")
+    goes_at: float | None = Field(description="When it goes because a rule took it, unless it is kept till then; else null.")
     best: bool = Field(description="Highest success rate of the run; of equal ones, fewest steps to the target.")
     evaluation: Evaluation | None
 

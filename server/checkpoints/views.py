@@ -64,6 +64,7 @@ def checkpoint_view(checkpoint: tables.Checkpoint, evaluation: tables.Evaluation
         sha256=checkpoint.sha256,
         created_at=checkpoint.created_at,
         damaged=checkpoint.damaged_at is not None,
+        goes_at=checkpoint.goes_at,
         best=best,
         evaluation=evaluation_view(evaluation) if evaluation else None,
     )

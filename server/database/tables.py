@@ -76,6 +76,8 @@ class Experiment(Base):
     deleted_at: Mapped[float | None] = mapped_column(Float, index=True)
     # The form of the settings under which `ExperimentKey` has them; another one than this version's, and they are due.
     indexed_as: Mapped[str | None] = mapped_column(String(12), index=True)
+    # Which of its checkpoints stay (`server.storage.rule`); null for what the installation's settings say.
+    keep_rule: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
     runs: Mapped[list["Run"]] = relationship(
         back_populates="experiment", cascade="all, delete-orphan", passive_deletes=True, order_by="Run.seed"
@@ -314,6 +316,8 @@ class Checkpoint(Base):
     created_at: Mapped[float] = mapped_column(Float, default=time.time)
     # When its archive was found damaged or gone: no run goes on from it any more. Null while it is whole.
     damaged_at: Mapped[float | None] = mapped_column(Float)
+    # When it goes, because a rule took it; null while it stays.
+    goes_at: Mapped[float | None] = mapped_column(Float, index=True)
 
 
 class LooseArchive(Base):

@@ -23,7 +23,6 @@ from server.version import commit, version
 from sim.extending.discovery import installed
 from workers.runtime.app import create_app
 
-_MIN_FREE = 2**30
 # Clocks of one lab differ by less; leases and waiting times are told by them.
 _MAX_SKEW = 5.0
 # What was stored lies in the past.
@@ -32,19 +31,14 @@ _PYTHON = (3, 11)
 _FILE_MODE = 0o077
 
 
-def examine(settings: Settings, min_free: int = _MIN_FREE) -> list[Finding]:
-    """Look at everything.
-
-    Args:
-        settings: of the installation.
-        min_free: bytes that each disk should have left.
-    """
+def examine(settings: Settings) -> list[Finding]:
+    """Look at everything."""
     shown = make_url(settings.resolved_database_url).render_as_string(hide_password=True)
     broker = make_url(settings.resolved_broker_url.removeprefix("sqla+")).render_as_string(hide_password=True)
     parts: tuple[tuple[str, Callable[[], str], str], ...] = (
         ("versions", lambda: _versions(settings), "Restart the server, so that it runs what is installed here."),
         ("data", lambda: _data(settings), "Choose another place with MAPLESS_DATA_DIR, or give this user write access."),
-        ("disk", lambda: _disk(settings, min_free), "Delete checkpoints, or give the disk more space."),
+        ("disk", lambda: _disk(settings), "Free checkpoints on the page Storage, or give the disk more space."),
         ("database", lambda: _database(settings), f"Start it, or point MAPLESS_DATABASE_URL at it; now: {shown}"),
         ("clock", lambda: _clock(settings), "Set the clocks by NTP on this machine and on the database's."),
         ("broker", lambda: _broker(settings), f"Start it, or point MAPLESS_BROKER_URL at it; now: {broker}"),
@@ -87,8 +81,8 @@ def _data(settings: Settings) -> str:
     return str(directory)
 
 
-def _disk(settings: Settings, min_free: int) -> str:
-    said = []
+def _disk(settings: Settings) -> str:
+    said, min_free = [], settings.min_free_disk_bytes
     for path in dict.fromkeys((_existing(settings.data_dir), Path(tempfile.gettempdir()))):
         free = shutil.disk_usage(path).free
         if free < min_free:

@@ -41,9 +41,9 @@ def settings(tmp_path: Path) -> Settings:
     return settings
 
 
-def ailing(settings: Settings, **arguments: int) -> dict[str, Finding]:
+def ailing(settings: Settings) -> dict[str, Finding]:
     """What is wrong, by part; whatever is wrong comes with advice."""
-    found = examine(settings, **arguments)
+    found = examine(settings)
     assert [finding.name for finding in found] == NAMES
     assert all((finding.advice is None) == finding.ok for finding in found)
     return {finding.name: finding for finding in found if not finding.ok}
@@ -156,7 +156,7 @@ def test_a_store_of_a_kind_that_is_unknown(settings: Settings) -> None:
 
 
 def test_a_disk_that_is_full(settings: Settings) -> None:
-    found = ailing(settings, min_free=2**60)
+    found = ailing(settings.model_copy(update={"min_free_disk_bytes": 2**60}))
 
     assert set(found) == {"disk"}
     assert "are free at" in found["disk"].found

@@ -40,6 +40,7 @@ TABLE = {
     "signed in": """
         GET /api/version
         GET /api/status
+        GET /api/storage
         GET /api/account
         POST /api/sign-out
         GET /api/projects
@@ -92,6 +93,7 @@ TABLE = {
     "view": """
         GET /api/experiments/{experiment_id}
         GET /api/experiments/{experiment_id}/marks
+        GET /api/experiments/{experiment_id}/thinning
         GET /api/runs/{run_id}
         GET /api/runs/{run_id}/events
         GET /api/runs/{run_id}/log
@@ -133,6 +135,8 @@ TABLE = {
     "edit": """
         PATCH /api/experiments/{experiment_id}
         DELETE /api/experiments/{experiment_id}
+        PUT /api/experiments/{experiment_id}/thinning
+        POST /api/experiments/{experiment_id}/thinning/free
         POST /api/experiments/{experiment_id}/stop
         POST /api/experiments/{experiment_id}/resume
         PUT /api/experiments/{experiment_id}/notes

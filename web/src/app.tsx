@@ -98,6 +98,10 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/PeoplePage')).PeoplePage }),
           },
           {
+            path: 'storage',
+            lazy: async () => ({ Component: (await import('./pages/StoragePage')).StoragePage }),
+          },
+          {
             path: 'audit',
             lazy: async () => ({ Component: (await import('./pages/AuditPage')).AuditPage }),
           },

@@ -969,6 +969,50 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/experiments/{experiment_id}/thinning": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Preview Thinning
+         * @description What a rule would take of an experiment, and leave; nothing is changed.
+         */
+        get: operations["preview_thinning_api_experiments__experiment_id__thinning_get"];
+        /**
+         * Change Thinning
+         * @description Give an experiment a rule: what it takes goes after some days, and what was to go otherwise stays.
+         */
+        put: operations["change_thinning_api_experiments__experiment_id__thinning_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/thinning/free": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Free Storage
+         * @description Remove what goes of an experiment at once.
+         */
+        post: operations["free_storage_api_experiments__experiment_id__thinning_free_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/invitations": {
         parameters: {
             query?: never;
@@ -1949,6 +1993,26 @@ export interface paths {
          * @description Workers heard of lately, and how many runs wait and go on.
          */
         get: operations["get_status_api_status_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/storage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Storage
+         * @description What experiments take of the disk, the largest first.
+         */
+        get: operations["list_storage_api_storage_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -3666,6 +3730,11 @@ export interface components {
              */
             damaged: boolean;
             evaluation: components["schemas"]["Evaluation"] | null;
+            /**
+             * Goes At
+             * @description When it goes because a rule took it, unless it is kept till then; else null.
+             */
+            goes_at: number | null;
             /** Id */
             id: string;
             /** Sha256 */
@@ -5769,6 +5838,50 @@ export interface components {
              * @description Whose settings were judged.
              */
             trial: number;
+        };
+        /**
+         * KeepRule
+         * @description What stays of each run; that is all, where `last` is null.
+         */
+        "KeepRule-Input": {
+            /**
+             * Best
+             * @description The best one as well, where runs are evaluated.
+             * @default true
+             */
+            best: boolean;
+            /**
+             * Every
+             * @description Each so many-th by step as well, from the first one on.
+             */
+            every?: number | null;
+            /**
+             * Last
+             * @description So many newest ones; null for all, and then nothing goes.
+             */
+            last?: number | null;
+        };
+        /**
+         * KeepRule
+         * @description What stays of each run; that is all, where `last` is null.
+         */
+        "KeepRule-Output": {
+            /**
+             * Best
+             * @description The best one as well, where runs are evaluated.
+             * @default true
+             */
+            best: boolean;
+            /**
+             * Every
+             * @description Each so many-th by step as well, from the first one on.
+             */
+            every: number | null;
+            /**
+             * Last
+             * @description So many newest ones; null for all, and then nothing goes.
+             */
+            last: number | null;
         };
         /**
          * Keyframe
@@ -8501,6 +8614,14 @@ export interface components {
             success: components["schemas"]["Spread"];
         };
         /**
+         * RuleChange
+         * @description Another rule for an experiment.
+         */
+        RuleChange: {
+            /** @description Null for the installation's. */
+            rule: components["schemas"]["KeepRule-Input"] | null;
+        };
+        /**
          * Run
          * @description One seed's training.
          */
@@ -9198,6 +9319,20 @@ export interface components {
             weight: number;
         };
         /**
+         * SparedCheckpoint
+         * @description A checkpoint that a rule would take, and that stays.
+         */
+        SparedCheckpoint: {
+            /** Id */
+            id: string;
+            /** Reason */
+            reason: string;
+            /** Seed */
+            seed: number;
+            /** Step */
+            step: number;
+        };
+        /**
          * SpeedsPart
          * @description How fast it drove and turned in the last step, as fractions of its limits.
          */
@@ -9418,6 +9553,82 @@ export interface components {
             version: string;
             /** Workers */
             workers: components["schemas"]["WorkerStatus"][];
+        };
+        /**
+         * Storage
+         * @description The experiments that may be seen, those with the most bytes of checkpoints first.
+         */
+        Storage: {
+            /**
+             * Checkpoint Bytes
+             * @description Of all of them together.
+             */
+            checkpoint_bytes: number;
+            /**
+             * Free Bytes
+             * @description Left on the disk of the data directory.
+             */
+            free_bytes: number;
+            /** Going Bytes */
+            going_bytes: number;
+            /** Items */
+            items: components["schemas"]["StoredExperiment"][];
+            /**
+             * Keep Days
+             * @description From when a rule takes a checkpoint until it is gone.
+             */
+            keep_days: number;
+            /**
+             * Min Free Bytes
+             * @description That should be left (MAPLESS_MIN_FREE_DISK_BYTES).
+             */
+            min_free_bytes: number;
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
+         * StoredExperiment
+         * @description What an experiment takes.
+         */
+        StoredExperiment: {
+            /**
+             * Checkpoint Bytes
+             * @description Of the archives of its checkpoints.
+             */
+            checkpoint_bytes: number;
+            /** Checkpoints */
+            checkpoints: number;
+            /**
+             * Curve Bytes
+             * @description Of its compacted curves in the database.
+             */
+            curve_bytes: number;
+            /**
+             * Going
+             * @description Checkpoints that go, and can be kept until then.
+             */
+            going: number;
+            /** Going Bytes */
+            going_bytes: number;
+            /** Id */
+            id: string;
+            /**
+             * In Trash
+             * @description It goes as a whole, some days after it was deleted.
+             */
+            in_trash: boolean;
+            /** Name */
+            name: string;
+            /**
+             * Own Rule
+             * @description The rule is its own, not the installation's.
+             */
+            own_rule: boolean;
+            /** @description That it goes by. */
+            rule: components["schemas"]["KeepRule-Output"];
         };
         /**
          * Study
@@ -10052,6 +10263,29 @@ export interface components {
              * @default 10000
              */
             warmup_steps: number;
+        };
+        /**
+         * Thinning
+         * @description What a rule takes of an experiment, and leaves.
+         */
+        Thinning: {
+            /**
+             * Going
+             * @description Checkpoints that go, with their evaluations' episodes.
+             */
+            going: number;
+            /** Going Bytes */
+            going_bytes: number;
+            rule: components["schemas"]["KeepRule-Output"];
+            /**
+             * Spared
+             * @description Some of those that the rule leaves alone; 50 at most.
+             */
+            spared: components["schemas"]["SparedCheckpoint"][];
+            /** Spared Total */
+            spared_total: number;
+            /** Staying */
+            staying: number;
         };
         /**
          * Timed
@@ -13757,6 +13991,164 @@ export interface operations {
             };
         };
     };
+    preview_thinning_api_experiments__experiment_id__thinning_get: {
+        parameters: {
+            query?: {
+                /** @description The best one as well. */
+                best?: boolean;
+                /** @description Each so many-th as well; goes with `last`. */
+                every?: number | null;
+                /** @description So many newest ones stay; all if not given. */
+                last?: number | null;
+            };
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Thinning"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_thinning_api_experiments__experiment_id__thinning_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RuleChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Thinning"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    free_storage_api_experiments__experiment_id__thinning_free_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Thinning"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     list_invitations_api_invitations_get: {
         parameters: {
             query?: never;
@@ -16574,6 +16966,49 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_storage_api_storage_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Storage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -68,6 +68,17 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                     Best
                   </Badge>
                 )}
+                {checkpoint.goes_at != null && (
+                  <Badge
+                    size="sm"
+                    color="gray"
+                    variant="light"
+                    miw="fit-content"
+                    title={`The rule on the page Storage takes it on ${dateTime(checkpoint.goes_at)}, unless it is kept`}
+                  >
+                    Goes
+                  </Badge>
+                )}
                 {checkpoint.damaged && (
                   <Badge
                     size="sm"

@@ -90,9 +90,16 @@ export function Shell() {
       <footer className={classes.footer}>
         <span>Mapless{status ? ` ${status.version}` : ''}</span>
         {status?.commit && <code>{status.commit}</code>}
-        <Anchor href="/api/openapi.json" inherit c="inherit" className={classes.docs}>
-          API
-        </Anchor>
+        <Group gap="md" className={classes.docs}>
+          {!locked && (
+            <Anchor component={Link} to="/storage" inherit c="inherit">
+              Storage
+            </Anchor>
+          )}
+          <Anchor href="/api/openapi.json" inherit c="inherit">
+            API
+          </Anchor>
+        </Group>
       </footer>
     </div>
   )

@@ -181,6 +181,7 @@ const best: Checkpoint = {
   sha256: 'cd'.repeat(32),
   created_at: NOW - 20,
   damaged: false,
+  goes_at: null,
   best: true,
   evaluation: {
     suite: 'simple-200',
@@ -204,6 +205,7 @@ export const checkpoints: CheckpointPage = {
       sha256: 'ab'.repeat(32),
       created_at: NOW - 40,
       damaged: false,
+      goes_at: null,
       best: false,
       evaluation: null,
     },

@@ -1,0 +1,135 @@
+"""Disk use, and what goes, in SQL."""
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, case, delete, func, select, true, update
+from sqlalchemy.orm import Session
+
+from server.database import tables
+from server.paging import Window
+
+_STARTED = "a training began with it"
+_EVALUATED = "somebody had it evaluated"
+_SEARCHED = "a study that goes on measures by it"
+_RANKED = "its run stands by it on leaderboards"
+
+
+@dataclass(frozen=True)
+class Use:
+    """What an experiment takes, in checkpoints and bytes."""
+
+    experiment: tables.Experiment
+    checkpoints: int
+    size: int
+    going: int
+    going_size: int
+
+
+class StorageRepository:
+    """Reads and writes within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def page(self, visible: Collection[str] | None, window: Window) -> tuple[list[Use], int, int, int]:
+        """Experiments of `visible` projects (None: all) that have checkpoints, the largest first.
+
+        Returns:
+            Them, how many there are on all pages, and the bytes of all, and of what goes of it.
+        """
+        checkpoint, experiment = tables.Checkpoint, tables.Experiment
+        gone = checkpoint.goes_at.is_not(None)
+        sums = (
+            func.count(checkpoint.id),
+            func.coalesce(func.sum(checkpoint.size), 0),
+            func.coalesce(func.sum(case((gone, 1), else_=0)), 0),
+            func.coalesce(func.sum(case((gone, checkpoint.size), else_=0)), 0),
+        )
+        seen: ColumnElement[bool] = experiment.project_id.in_(visible) if visible is not None else true()
+        by_run = select(checkpoint).join(tables.Run).join(experiment).where(seen)
+        total = self._session.execute(by_run.with_only_columns(func.count(experiment.id.distinct()), sums[1], sums[3])).one()
+        found = self._session.execute(
+            by_run.with_only_columns(experiment.id, *sums)
+            .group_by(experiment.id)
+            .order_by(sums[1].desc(), experiment.id)
+            .limit(window.limit)
+            .offset(window.offset)
+        ).all()
+        rows = self._session.scalars(select(experiment).where(experiment.id.in_([row[0] for row in found])))
+        named = {row.id: row for row in rows}
+        uses = [Use(named[row[0]], row[1], int(row[2]), int(row[3]), int(row[4])) for row in found]
+        return uses, total[0], int(total[1]), int(total[2])
+
+    def curve_bytes(self, experiment_ids: Collection[str]) -> dict[str, int]:
+        """Bytes of their compacted curves."""
+        chunk, run = tables.MetricChunk, tables.Run
+        query = (
+            select(run.experiment_id, func.sum(func.length(chunk.points)))
+            .join(run, run.id == chunk.run_id)
+            .where(run.experiment_id.in_(experiment_ids))
+            .group_by(run.experiment_id)
+        )
+        return {row[0]: int(row[1]) for row in self._session.execute(query)}
+
+    def of_experiment(self, experiment_id: str) -> dict[str, list[tables.Checkpoint]]:
+        """Its checkpoints by step, by run."""
+        query = (
+            select(tables.Checkpoint)
+            .join(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
+            .where(tables.Run.experiment_id == experiment_id)
+            .order_by(tables.Checkpoint.step, tables.Checkpoint.created_at)
+        )
+        found: dict[str, list[tables.Checkpoint]] = defaultdict(list)
+        for checkpoint in self._session.scalars(query):
+            found[checkpoint.run_id].append(checkpoint)
+        return found
+
+    def reasons(self, checkpoints: Sequence[tables.Checkpoint]) -> dict[str, str]:
+        """Why some of them stay whatever a rule says, by id."""
+        ids = [checkpoint.id for checkpoint in checkpoints]
+        key, asked = tables.ExperimentKey, tables.PolicyEvaluation
+        run, trial = tables.Run, tables.StudyTrial
+        found: dict[str, str] = {}
+        for begin in range(0, len(ids), 500):
+            some = ids[begin : begin + 500]
+            mine = select(tables.Checkpoint.id).join(run).where(tables.Checkpoint.id.in_(some))
+            searched = mine.join(trial, trial.experiment_id == run.experiment_id).where(trial.state == "running")
+            ranked = mine.where(run.final_suite.is_not(None), run.final_step == tables.Checkpoint.step)
+            evaluated = select(asked.checkpoint_id).where(asked.checkpoint_id.in_(some))
+            started = select(key.text).where(key.key == tables.START_KEY, key.text.in_(some))
+            reasons = ((searched, _SEARCHED), (ranked, _RANKED), (evaluated, _EVALUATED), (started, _STARTED))
+            for query, reason in reasons:
+                found |= {each: reason for each in self._session.scalars(query) if each is not None}
+        return found
+
+    def mark(self, checkpoint_ids: Collection[str], goes_at: float | None) -> None:
+        """Say when they go; None: they stay."""
+        ids = list(checkpoint_ids)
+        for begin in range(0, len(ids), 500):
+            some = tables.Checkpoint.id.in_(ids[begin : begin + 500])
+            self._session.execute(update(tables.Checkpoint).where(some).values(goes_at=goes_at))
+
+    def due(self, moment: float, limit: int) -> list[tables.Checkpoint]:
+        """Some that were to go by `moment`, the longest due first."""
+        checkpoint = tables.Checkpoint
+        query = select(checkpoint).where(checkpoint.goes_at <= moment).order_by(checkpoint.goes_at).limit(limit)
+        return list(self._session.scalars(query))
+
+    def remove(self, checkpoint_ids: Collection[str]) -> None:
+        """Remove them with their evaluations."""
+        self._session.execute(delete(tables.Checkpoint).where(tables.Checkpoint.id.in_(checkpoint_ids)))
+
+    def with_new(self, since: float, limit: int) -> list[tuple[str, float]]:
+        """Experiments whose runs have got checkpoints after `since`, with when the newest one came, the oldest first."""
+        newest = func.max(tables.Checkpoint.created_at)
+        query = (
+            select(tables.Run.experiment_id, newest)
+            .join(tables.Checkpoint, tables.Checkpoint.run_id == tables.Run.id)
+            .where(tables.Checkpoint.created_at > since)
+            .group_by(tables.Run.experiment_id)
+            .order_by(newest)
+            .limit(limit)
+        )
+        return [(row[0], row[1]) for row in self._session.execute(query)]
