@@ -20,21 +20,17 @@ TRAINING = {"steps": 100_000, "evaluation": {"every_steps": 10_000}}
 
 
 @pytest.fixture
-def settings(settings: Settings, request: pytest.FixtureRequest) -> Settings:
-    """On both kinds of database for tests that ask for their address."""
+def settings(settings: Settings, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """On both kinds of database for tests that ask for their address; for those that move studies, nothing else does."""
+    if "move" in request.fixturenames:
+        monkeypatch.setattr("server.studies.advance._PAUSE_SECONDS", 3_600.0)
     if "database_url" not in request.fixturenames:
         return settings
     return settings.model_copy(update={"database_url": request.getfixturevalue("database_url")})
 
 
 @pytest.fixture
-def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Studies move on when the test says so."""
-    monkeypatch.setattr("server.studies.advance._PAUSE_SECONDS", 3_600.0)
-
-
-@pytest.fixture
-def move(by_hand: None, services: Services, client: TestClient) -> Callable[[], int]:
+def move(services: Services, client: TestClient) -> Callable[[], int]:
     return lambda: advance(services)
 
 
@@ -326,7 +322,7 @@ def test_what_can_not_be_searched_is_refused_at_its_field(
     assert why in problem["msg"]
 
 
-def test_a_grid_has_no_more_trials_than_points(client: TestClient, by_hand: None) -> None:
+def test_a_grid_has_no_more_trials_than_points(client: TestClient) -> None:
     study = launch(client, sampler="grid", settings=[EPOCHS, {**LEARNING_RATE, "points": 3}], trials=100)
     assert study["trials"] == 9
     assert client.post(f"/api/studies/{study['id']}/extend", json={"trials": 1}).status_code == 409
