@@ -41,6 +41,7 @@ from server.people.oidc import endpoints as oidc
 from server.policies import endpoints as policies
 from server.printing import endpoints as printing
 from server.problems import UNAUTHORIZED, install_error_handlers
+from server.project_archives import endpoints as project_archives
 from server.projects import endpoints as projects
 from server.queueing import endpoints as queueing
 from server.replays import endpoints as replays
@@ -80,6 +81,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     audit.router,
     alerts.router,
     projects.router,
+    project_archives.router,
     queueing.router,
     experiments.router,
     lineage.router,

@@ -91,6 +91,7 @@ class Lanes:
     # Each takes 64 MiB and a core for some 50 ms.
     passwords: Lane = field(default_factory=lambda: Lane("sign-ins", threads=2, queue=16))
     sweeper: Lane = field(default_factory=lambda: Lane("sweeps", threads=1))
+    imports: Lane = field(default_factory=lambda: Lane("imports", threads=2))
     # Of alerts: names are looked up and mail is sent there, each of which may take its time.
     alerts: Lane = field(default_factory=lambda: Lane("alerts", threads=4))
 
@@ -105,5 +106,6 @@ class Lanes:
             self.accounts,
             self.passwords,
             self.sweeper,
+            self.imports,
             self.alerts,
         )

@@ -117,6 +117,7 @@ TABLE = {
         GET /api/evaluations/{evaluation_id}/replays/{episode}
         GET /replays/evaluations/{evaluation_id}/{episode}/{theme}/
         GET /api/runs/{run_id}/export
+        GET /api/projects/{project_id}/export
         GET /api/experiments/{experiment_id}/export
         GET /api/compare/export
         GET /api/compare
@@ -134,6 +135,7 @@ TABLE = {
     """,
     "edit": """
         PATCH /api/experiments/{experiment_id}
+        POST /api/projects/{project_id}/import
         DELETE /api/experiments/{experiment_id}
         PUT /api/experiments/{experiment_id}/thinning
         POST /api/experiments/{experiment_id}/thinning/free

@@ -233,6 +233,8 @@ def test_what_the_page_of_data_shows_runs(
     assert "train/return" in (tmp_path / "comparison.html").read_text()
     runs = {path.parent.name for path in (tmp_path / "events").glob("*/*/events.out.tfevents.*")}
     assert runs == {f"seed{run['seed']}" for run in document["runs"]}
+    # What comes back to where it is from is there already.
+    assert re.search(rf"^{document['runs'][0]['id']} +there", shell.stdout, re.MULTILINE)
 
 
 def test_the_notebook_runs(environment: dict[str, str], tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 import httpx
 
 from mapless_client.curves import Curve, curve
-from mapless_client.downloads import Form, Pulled, pull
+from mapless_client.downloads import Form, Pulled, keep, pull
 from mapless_client.errors import ClientError
 from mapless_client.models import (
     Checkpoint,
@@ -18,6 +18,8 @@ from mapless_client.models import (
     Experiment,
     Json,
     ListedExperiment,
+    Project,
+    ProjectImport,
     Run,
     RunEvent,
     Study,
@@ -284,6 +286,37 @@ class Client:
     ) -> str:
         """The whole comparison as one HTML file that opens offline; arguments as `compare`."""
         return self._transport.text("/api/compare/report", _compared(experiment_ids, margin, base, pairs=pairs))
+
+    def projects(self) -> Iterator[Project]:
+        """The projects that the token may see, by name, fetched as they are asked for."""
+        offset = 0
+        while items := self._transport.get("/api/projects", {"limit": _PAGE, "offset": offset})["items"]:
+            yield from map(Project.model_validate, items)
+            offset += len(items)
+
+    def export_project(self, project_id: str, to: str | Path = ".") -> Path:
+        """All of a project in one file, checkpoints included, for `import_project` of another server.
+
+        Args:
+            project_id: which.
+            to: directory, which is made.
+        """
+        return keep(self._transport, f"/api/projects/{project_id}/export", Path(to))
+
+    def import_project(self, archive: str | Path, project_id: str) -> ProjectImport:
+        """Take what another server exported, with the same ids: each run whole, or not at all.
+
+        Sent again, it goes on: runs that are there are left as they are.
+
+        Args:
+            archive: of `export_project`.
+            project_id: where to.
+
+        Raises:
+            InvalidRequestError: it is no such archive, or ends too early; runs before that are kept.
+        """
+        answer = self._transport.upload(f"/api/projects/{project_id}/import", Path(archive), "application/x-tar")
+        return ProjectImport.model_validate(answer)
 
     def _checkpoint_page(self, run_id: str, *, limit: int, offset: int) -> Json:
         page: Json = self._transport.get(f"/api/runs/{run_id}/checkpoints", {"limit": limit, "offset": offset})

@@ -1,4 +1,4 @@
-"""`mapless runs`, `launch`, `search`, `watch`, `pull` and `compare`: a server's trainings from any command line."""
+"""`mapless runs`, `launch`, `search`, `watch`, `pull`, `compare` and whole projects: a server from any command line."""
 
 from __future__ import annotations
 
@@ -196,6 +196,49 @@ def compare(
         typer.echo(f"{difference.path}: {', '.join(json.dumps(value) for value in difference.values)}")
     for warning in comparison.warnings:
         typer.echo(f"warning: {warning}")
+
+
+@app.command()
+def projects(as_json: AsJson = False, url: Url = None) -> None:
+    """List a server's projects."""
+    with _server(url) as client:
+        for project in client.projects():
+            if as_json:
+                _json(project)
+            else:
+                typer.echo(f"{project.id:16}  {project.experiments:5}  {project.role:6}  {project.name}")
+
+
+@app.command()
+def export_project(
+    project: Annotated[str, typer.Argument(help="Its id.")],
+    to: Annotated[Path, typer.Option(help="Directory.")] = Path(),
+    url: Url = None,
+) -> None:
+    """Take a whole project home in one file: trainings, points, checkpoints, evaluations, notes and tags."""
+    with _server(url) as client:
+        typer.echo(str(client.export_project(project, to)))
+
+
+@app.command()
+def import_project(
+    archive: Annotated[Path, typer.Argument(help="What export-project wrote.")],
+    project: Annotated[str, typer.Option(help="Id of the project to import into.")] = "default",
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Bring an exported project to another server, with the same ids; exit status 1 where a run was refused."""
+    if not archive.is_file():
+        _refuse(f"{archive} is no file.")
+    with _server(url) as client:
+        came = client.import_project(archive, project)
+    if as_json:
+        _json(came)
+    else:
+        for run in came.runs:
+            typer.echo("  ".join([f"{run.id:16}", f"{run.outcome:8}", *([run.why] if run.why else [])]))
+    if any(run.outcome == "refused" for run in came.runs):
+        raise typer.Exit(1)
 
 
 @app.command()

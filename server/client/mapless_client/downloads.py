@@ -52,6 +52,27 @@ def pull(transport: Transport, checkpoint_id: str, directory: Path, form: Form) 
         return _take_out(bundle.path, directory / bundle.path.name.replace("-bundle.zip", ".onnx"))
 
 
+def keep(transport: Transport, path: str, directory: Path) -> Path:
+    """What the server makes while it sends it, as a file in a directory, which is made; begun anew each time.
+
+    Raises:
+        RefusedError: there is no such thing.
+        UnreachableError: the server was away for too long, or broke off.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=directory, prefix=".", suffix=".part", delete=False) as file:
+        part = Path(file.name)
+        try:
+            with transport.stream(path) as response:
+                target = directory / _file_name(response)
+                for block in response.iter_bytes():
+                    file.write(block)
+        except BaseException:
+            part.unlink()
+            raise
+    return part.replace(target)
+
+
 def _download(transport: Transport, path: str, directory: Path, key: str) -> Pulled:
     part, vain = _part_of(directory, key), 0
     while True:

@@ -150,6 +150,33 @@ class Experiment(Model):
         return all(run.ended for run in self.runs)
 
 
+class Project(Model):
+    """Trainings that belong together, and what the token may do in them."""
+
+    id: str
+    name: str
+    created_at: float
+    experiments: int
+    role: str
+
+
+class ImportedRun(Model):
+    """What came of a run of an archive: `imported`, `there` (it was before), or `refused`, with why."""
+
+    id: str
+    experiment_id: str
+    outcome: str
+    why: str | None
+
+
+class ProjectImport(Model):
+    """What came of an archive; `checkpoints` came with the runs that are new."""
+
+    project_id: str
+    runs: list[ImportedRun]
+    checkpoints: int
+
+
 class RunEvent(Model):
     """A line of a run's event log."""
 

@@ -6,6 +6,7 @@ import random
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import httpx
@@ -20,6 +21,9 @@ _TRIES = 6
 _LONGEST_PAUSE = 30.0
 # Of bodies: a bundle is made while the request waits.
 _TIMEOUT = httpx.Timeout(30.0, read=180.0)
+# The server writes what arrives, and takes no more meanwhile.
+_UPLOAD = httpx.Timeout(30.0, read=600.0, write=600.0)
+_BLOCK = 256 * 1024
 
 
 def pause(failures: int) -> float:
@@ -81,6 +85,23 @@ class Transport:
             raise UnreachableError(f"{self._url} does not answer: {error}") from error
         _check(response)
         return response.json() if response.content else None
+
+    def upload(self, path: str, file: Path, content_type: str) -> Any:
+        """Send a file, read bit by bit; the answer's JSON.
+
+        Raises:
+            RefusedError: one of its kinds.
+            UnreachableError: the server did not answer: what it has taken is not known.
+        """
+        headers = {"Content-Type": content_type, "Content-Length": str(file.stat().st_size)}
+        try:
+            with file.open("rb") as content:
+                blocks = iter(lambda: content.read(_BLOCK), b"")
+                response = self._http.post(path, content=blocks, headers=headers, timeout=_UPLOAD)
+        except httpx.TransportError as error:
+            raise UnreachableError(f"{self._url} does not answer: {error}") from error
+        _check(response)
+        return response.json()
 
     @contextmanager
     def stream(

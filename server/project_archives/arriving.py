@@ -1,0 +1,322 @@
+"""A project on its way in, as it arrives: each run with all that hangs on it, or not at all.
+
+A checkpoint's archive goes into the store first, announced as every upload is, so that one of a run that does not come to
+its end is swept away; the run's last word (`end`) registers everything in one transaction.
+"""
+
+import zlib
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from server.audit.repository import AuditRepository
+from server.checkpoints.archives import LooseArchives, remove_archives
+from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
+from server.errors import ConflictError, CorruptUploadError, InvalidRequestError
+from server.events.changes import Change
+from server.experiments.repository import ExperimentRepository
+from server.files import StoredFile
+from server.metrics.points import Points
+from server.metrics.repository import MetricRepository
+from server.project_archives.repository import ProjectArchiveRepository
+from server.project_archives.schemas import (
+    ArchivedCheckpoint,
+    ArchivedEvaluation,
+    ArchivedExperiment,
+    ArchivedPoints,
+    ArchivedRun,
+    ArchiveManifest,
+    ImportedRun,
+    ProjectImport,
+)
+from server.project_archives.tar import IncomingTar
+from server.projects.repository import ProjectRepository
+from server.runs import states
+from server.runs.repository import RunRepository
+from server.services import Services
+from workers.checkpoints import check_archive
+from workers.errors import ArchiveError
+
+MAX_RUNS = 10_000
+"""Of one archive."""
+
+_MAX_DOCUMENT = 64 * 2**20
+# Of a run, in memory before it is written.
+_MAX_POINTS = 10_000_000
+_POINT_BYTES = 20
+
+_Document = TypeVar("_Document", bound=BaseModel)
+
+
+@dataclass
+class _Run:
+    """What has arrived of a run."""
+
+    archived: ArchivedRun
+    files: dict[str, StoredFile] = field(default_factory=dict)
+    evaluations: dict[str, ArchivedEvaluation] = field(default_factory=dict)
+    series: dict[str, list[Points]] = field(default_factory=dict)
+    points: int = 0
+
+
+class ProjectArrival:
+    """Takes an archive into a project.
+
+    Args:
+        services: of the server.
+        project_id: where to.
+    """
+
+    def __init__(self, services: Services, project_id: str) -> None:
+        self._services = services
+        self._lane = services.lanes.imports
+        self._project_id = project_id
+        self._outcomes: list[ImportedRun] = []
+        self._checkpoints = 0
+
+    async def take(self, stream: AsyncIterator[bytes]) -> ProjectImport:
+        """All runs of an archive as it arrives; those before a fault in it stay.
+
+        Raises:
+            InvalidRequestError: it is no project's archive, or ends too early.
+        """
+        incoming = IncomingTar(stream)
+        if await incoming.next() != "manifest.json":
+            raise InvalidRequestError("This is no project's archive: it does not begin with its manifest.")
+        _read(ArchiveManifest, await incoming.whole(_MAX_DOCUMENT))
+        experiment: ArchivedExperiment | None = None
+        try:
+            while (name := await incoming.next()) is not None:
+                parts = name.split("/")
+                if len(parts) == 2 and parts[1] == "experiment.json":
+                    experiment = _read(ArchivedExperiment, await incoming.whole(_MAX_DOCUMENT))
+                elif experiment is not None and parts[0] == experiment.id and len(parts) == 3 and parts[2] == "run.json":
+                    await self._run(experiment, _read(ArchivedRun, await incoming.whole(_MAX_DOCUMENT)), incoming)
+                else:
+                    raise InvalidRequestError(f"This is no project's archive: {name} has no place in it.")
+        finally:
+            if self._outcomes:
+                await self._lane.run(self._note)
+        return ProjectImport(project_id=self._project_id, runs=self._outcomes, checkpoints=self._checkpoints)
+
+    async def _run(self, experiment: ArchivedExperiment, archived: ArchivedRun, incoming: IncomingTar) -> None:
+        if len(self._outcomes) >= MAX_RUNS:
+            raise InvalidRequestError(f"An archive may hold {MAX_RUNS} runs: import the rest as another one.")
+        folder = f"{experiment.id}/{archived.id}/"
+        run = _Run(archived)
+        problem: str | None = None
+        is_there = False
+        try:
+            try:
+                is_there = await self._lane.run(self._look, experiment, archived)
+            except ConflictError as error:
+                problem = error.message
+            while (name := await incoming.next()) != f"{folder}end":
+                if name is None or not name.startswith(folder):
+                    raise InvalidRequestError(f"This is no project's archive: run {archived.id} has no end.")
+                if is_there or problem is not None:
+                    # Its bytes pass by.
+                    continue
+                try:
+                    await self._part(run, name.removeprefix(folder), incoming)
+                except (CorruptUploadError, ArchiveError) as error:
+                    problem = f"{name} is damaged: {error}"
+            if not is_there and problem is None:
+                try:
+                    await self._lane.run(self._register, experiment, run)
+                    self._checkpoints += len(run.files)
+                    run.files = {}
+                except ConflictError as error:
+                    problem = error.message
+        finally:
+            # Of a run that was not registered, whatever the reason.
+            if run.files:
+                with suppress(OSError):
+                    await self._lane.run(remove_archives, self._services, list(run.files))
+        outcome = ImportedRun(
+            id=archived.id,
+            experiment_id=experiment.id,
+            outcome="there" if is_there else "imported" if problem is None else "refused",
+            why=problem,
+        )
+        self._outcomes.append(outcome)
+        if outcome.outcome == "imported":
+            self._services.bus.belongs(experiment.id, self._project_id)
+            self._services.bus.publish(Change(experiment_id=experiment.id, run_id=None, kind="experiment"))
+
+    async def _part(self, run: _Run, name: str, incoming: IncomingTar) -> None:
+        stem, _, kind = name.partition(".")
+        checkpoint = next((each for each in run.archived.checkpoints if each.id == stem), None)
+        if kind == "zip" and checkpoint is not None and stem not in run.files:
+            await self._archive(run, checkpoint, incoming)
+        elif kind == "json" and checkpoint is not None:
+            run.evaluations[stem] = _read(ArchivedEvaluation, await incoming.whole(_MAX_DOCUMENT))
+        elif kind == "points":
+            await self._lane.run(_add_points, run, await incoming.whole(_MAX_DOCUMENT))
+        else:
+            raise InvalidRequestError(f"This is no project's archive: {name} has no place in a run.")
+
+    async def _archive(self, run: _Run, checkpoint: ArchivedCheckpoint, incoming: IncomingTar) -> None:
+        await self._lane.run(self._announce, checkpoint.id)
+        # From here on it is ours to remove.
+        run.files[checkpoint.id] = StoredFile(checkpoint.id, 0, "")
+        run.files[checkpoint.id] = await self._services.files.write(checkpoint.id, incoming.blocks(), checkpoint.sha256)
+        await self._lane.run(self._check, checkpoint.id)
+
+    def _announce(self, archive_id: str) -> None:
+        with self._services.database.write() as session:
+            if ProjectArchiveRepository(session).taken([archive_id]):
+                raise CorruptUploadError("it stands in the archive twice")
+            LooseArchives(session).begin(archive_id)
+
+    def _check(self, archive_id: str) -> None:
+        with self._services.files.open(archive_id) as file:
+            check_archive(file, f"checkpoint {archive_id}")
+
+    def _look(self, wanted: ArchivedExperiment, archived: ArchivedRun) -> bool:
+        """Whether the run has been imported before.
+
+        Raises:
+            ConflictError: it cannot be taken.
+        """
+        with self._services.database.read() as session:
+            ProjectRepository(session).get(self._project_id)
+            experiment = session.get(tables.Experiment, wanted.id)
+            _check_same(experiment, wanted, self._project_id)
+            run = session.get(tables.Run, archived.id)
+            if run is not None:
+                if experiment is None or run.experiment_id != experiment.id or run.created_at != archived.created_at:
+                    raise ConflictError("This server has another run of that id.")
+                return True
+            taken = ProjectArchiveRepository(session).taken([each.id for each in archived.checkpoints])
+        if taken:
+            raise ConflictError(f"This server has another checkpoint of the id {min(taken)}.")
+        return False
+
+    def _register(self, wanted: ArchivedExperiment, arrived: _Run) -> None:
+        """All of a run in one transaction.
+
+        Raises:
+            ConflictError: it cannot be taken (any more), or something of it is missing.
+        """
+        archived = arrived.archived
+        missing = {each.id for each in archived.checkpoints} - arrived.files.keys()
+        if missing:
+            raise ConflictError(f"The archive of checkpoint {min(missing)} is missing.")
+        series = {name: Points.joined(pieces) for name, pieces in arrived.series.items()}
+        with self._services.database.write() as session:
+            experiment = session.get(tables.Experiment, wanted.id)
+            _check_same(experiment, wanted, self._project_id)
+            if session.get(tables.Run, archived.id) is not None:
+                raise ConflictError("This server has another run of that id.")
+            if experiment is None:
+                experiment = _experiment(wanted, self._project_id)
+                ExperimentRepository(session).add(experiment)
+                session.add_all(tables.ExperimentTag(experiment_id=wanted.id, tag=tag) for tag in dict.fromkeys(wanted.tags))
+            session.add(_run(wanted.id, archived))
+            session.flush()
+            session.add_all(
+                tables.RunEvent(run_id=archived.id, at=event.at, step=event.step, level=event.level, message=event.message)
+                for event in archived.events
+            )
+            MetricRepository(session).add_series(archived.id, series)
+            for each in archived.checkpoints:
+                if not LooseArchives(session).register(each.id):
+                    raise ConflictError("The archive took too long: import it again.")
+                evaluation = arrived.evaluations.get(each.id)
+                checkpoint = CheckpointRepository(session).add(
+                    archived.id, each.step, arrived.files[each.id], evaluation.result if evaluation else None
+                )
+                checkpoint.created_at = each.created_at
+                if evaluation is not None:
+                    session.flush()
+                    CheckpointRepository(session).evaluation(each.id).created_at = evaluation.created_at
+            if archived.state not in states.FINISHED:
+                message = f"Imported; it was {archived.state} where it comes from. Resume it to go on."
+                RunRepository(session).add_event(archived.id, "info", message, archived.step)
+
+    def _note(self) -> None:
+        counts = {kind: sum(each.outcome == kind for each in self._outcomes) for kind in ("imported", "there", "refused")}
+        details = ", ".join(f"{number} {kind}" for kind, number in counts.items() if number)
+        with self._services.database.write() as session:
+            project = ProjectRepository(session).get(self._project_id)
+            AuditRepository(session).add(
+                "project.imported", target=project.id, name=project.name, project_id=project.id, details=f"runs: {details}"
+            )
+
+
+def _check_same(experiment: tables.Experiment | None, wanted: ArchivedExperiment, project_id: str) -> None:
+    if experiment is None:
+        return
+    if experiment.project_id != project_id or experiment.training != wanted.training:
+        raise ConflictError(f"This server has another training of the id {wanted.id}.")
+    if experiment.deleted_at is not None:
+        raise ConflictError(f"The training {wanted.id} lies in the trash: take it back, or remove it.")
+
+
+def _experiment(wanted: ArchivedExperiment, project_id: str) -> tables.Experiment:
+    return tables.Experiment(
+        id=wanted.id,
+        project_id=project_id,
+        name=wanted.name,
+        training=wanted.training,
+        created_at=wanted.created_at,
+        notes=wanted.notes,
+        starred_at=wanted.starred_at,
+        archived_at=wanted.archived_at,
+    )
+
+
+def _run(experiment_id: str, archived: ArchivedRun) -> tables.Run:
+    return tables.Run(
+        id=archived.id,
+        experiment_id=experiment_id,
+        seed=archived.seed,
+        # No worker of this server has it.
+        state=archived.state if archived.state in states.FINISHED else "stopped",
+        attempt=archived.attempt,
+        step=archived.step,
+        last_seq=archived.last_seq,
+        error=archived.error,
+        created_at=archived.created_at,
+        queued_at=archived.created_at,
+        started_at=archived.started_at,
+        finished_at=archived.finished_at,
+    )
+
+
+def _add_points(run: _Run, content: bytes) -> None:
+    line, _, data = content.partition(b"\n")
+    head = _read(ArchivedPoints, line)
+    run.points += head.count
+    if run.points > _MAX_POINTS:
+        raise CorruptUploadError(f"a run may have {_MAX_POINTS:,} points")
+    size = _POINT_BYTES * head.count
+    reader = zlib.decompressobj()
+    try:
+        # No more is unpacked than was promised, whatever lies in there.
+        if len(reader.decompress(data, size + 1)) != size or not reader.eof:
+            raise CorruptUploadError(f"it does not hold {head.count} points")
+        points = Points.decode(data, head.count)
+    except zlib.error as error:
+        raise CorruptUploadError(str(error)) from error
+    if int(points.steps.min()) < 0 or not bool((abs(points.times) <= 1e11).all()):
+        raise CorruptUploadError("steps or times are no such")
+    run.series.setdefault(head.name, []).append(
+        Points.of(points.steps.tolist(), points.times.tolist(), points.values.tolist())
+    )
+
+
+def _read(model: type[_Document], content: bytes) -> _Document:
+    try:
+        return model.model_validate_json(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InvalidRequestError(
+            f"This archive is not one that this version reads: {place or model.__name__}: {first['msg']}."
+        ) from error

@@ -1,0 +1,114 @@
+"""What stands in a project's archive, and what came of one that was brought in.
+
+manifest.json                     ArchiveManifest
+EXPERIMENT/experiment.json        ArchivedExperiment
+EXPERIMENT/RUN/run.json           ArchivedRun
+EXPERIMENT/RUN/CHECKPOINT.zip     the archive of a checkpoint
+EXPERIMENT/RUN/CHECKPOINT.json    its evaluation, where it has one
+EXPERIMENT/RUN/NUMBER.points      a line of JSON (ArchivedPoints), then the points as the database keeps them
+EXPERIMENT/RUN/end                behind all of a run
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StringConstraints
+
+from server.database.tables import RunState
+from server.schemas import Schema
+from workers.reporting import EvaluationResult, EventLevel
+
+Id = Annotated[str, StringConstraints(pattern=r"^[0-9a-z]{1,16}$")]
+Text = Annotated[str, StringConstraints(pattern=r"^[^\x00]*$", max_length=100_000)]
+ShortLine = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=120)]
+Time = Annotated[float, Field(ge=0.0, le=1e11)]
+Step = Annotated[int, Field(ge=0, lt=2**62)]
+
+
+class ArchiveManifest(Schema):
+    """What an archive is."""
+
+    format: Literal[1] = 1
+    version: ShortLine
+    project: ShortLine
+
+
+class ArchivedExperiment(Schema):
+    """An experiment without its runs."""
+
+    id: Id
+    name: ShortLine
+    training: dict[str, Any]
+    created_at: Time
+    notes: Text | None
+    starred_at: Time | None
+    archived_at: Time | None
+    tags: list[Annotated[ShortLine, StringConstraints(max_length=40)]] = Field(max_length=100)
+
+
+class ArchivedEvent(Schema):
+    """A line of a run's events."""
+
+    at: Time
+    step: Step
+    level: EventLevel
+    message: Text
+
+
+class ArchivedCheckpoint(Schema):
+    """A checkpoint without its archive."""
+
+    id: Id
+    step: Step
+    created_at: Time
+    size: int = Field(ge=1)
+    sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+
+
+class ArchivedRun(Schema):
+    """A run without its points, and without its checkpoints' archives and evaluations."""
+
+    id: Id
+    seed: int = Field(ge=0, lt=2**63)
+    state: RunState
+    attempt: int = Field(ge=0, lt=2**31)
+    step: Step
+    last_seq: Step
+    error: Text | None
+    created_at: Time
+    started_at: Time | None
+    finished_at: Time | None
+    events: list[ArchivedEvent] = Field(max_length=100_000)
+    checkpoints: list[ArchivedCheckpoint] = Field(max_length=100_000)
+
+
+class ArchivedEvaluation(Schema):
+    """What a checkpoint achieved, episode by episode."""
+
+    created_at: Time
+    result: EvaluationResult
+
+
+class ArchivedPoints(Schema):
+    """A piece of one series."""
+
+    name: Annotated[ShortLine, StringConstraints(max_length=64)]
+    count: int = Field(ge=1, le=2**18)
+
+
+class ImportedRun(Schema):
+    """What came of a run."""
+
+    id: str
+    experiment_id: str
+    outcome: Literal["imported", "there", "refused"] = Field(
+        description="`there`: it had been imported before, and is left as it is."
+    )
+    why: str | None = Field(description="Why it was refused.")
+
+
+class ProjectImport(Schema):
+    """What came of an archive."""
+
+    project_id: str
+    runs: list[ImportedRun] = Field(max_length=10_000)
+    checkpoints: int = Field(description="That came with the imported runs.")

@@ -1,0 +1,248 @@
+"""A project leaves one server whole and comes to another one with the same ids, run by run."""
+
+import asyncio
+import io
+import tarfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+import mapless_client
+from server.app import create_app
+from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
+from server.files import StoredFile
+from server.ids import new_id
+from server.metrics.points import Points
+from server.metrics.repository import MetricRepository
+from server.services import Services
+from server.settings import Settings
+from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+
+SHIPPED = Path(__file__).parents[2] / "workers" / "shipped" / "policies" / "simple" / "policy.zip"
+
+
+class Server:
+    """A service of its own, and a client that speaks to it."""
+
+    def __init__(self, http: TestClient, services: Services) -> None:
+        self.http = http
+        self.services = services
+        self.client = mapless_client.Client(BASE_URL, http=http)
+        self.reports = Reports(http, services)
+
+
+@pytest.fixture
+def servers(tmp_path: Path) -> Iterator[tuple[Server, Server]]:
+    """Two that know nothing of one another."""
+    with ExitStack() as stack:
+
+        def server(name: str) -> Server:
+            folder = tmp_path / name
+            settings = Settings.model_validate(
+                {"data_dir": folder, "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": folder / "dist"}
+            )
+            app = create_app(settings)
+            headers = {"Authorization": f"Bearer {TOKEN}"}
+            return Server(stack.enter_context(TestClient(app, base_url=BASE_URL, headers=headers)), app.state.services)
+
+        yield server("here"), server("there")
+
+
+def checkpoint(server: Server, run: dict[str, Any], step: int, arrivals: int | None) -> str:
+    """A real archive: that of a policy that ships."""
+    content = SHIPPED.read_bytes()
+
+    async def archive() -> Any:
+        yield content
+
+    file: StoredFile = asyncio.run(server.services.files.write(new_id(), archive()))
+    with server.services.database.write() as session:
+        evaluation = None if arrivals is None else Reports.evaluation(arrivals)
+        CheckpointRepository(session).add(run["id"], step, file, evaluation)
+    return file.id
+
+
+@pytest.fixture
+def trained(servers: tuple[Server, Server]) -> dict[str, Any]:
+    """On the first server: two runs, one ended with points and checkpoints, one that goes on."""
+    here, _ = servers
+    experiment = here.reports.experiment("Corridor, once more", seeds=(3, 4), algorithm={"name": "ppo", "gamma": 0.97})
+    first, second = experiment["runs"]
+    points = Points.of(range(1, 5_001), [float(i) for i in range(5_000)], [i / 7 if i % 100 else None for i in range(5_000)])
+    with here.services.database.write() as session:
+        MetricRepository(session).add_series(first["id"], {"train/return": points, "loss/value": points[:10]})
+        session.add(tables.ExperimentTag(experiment_id=experiment["id"], tag="baseline"))
+        session.get_one(tables.Experiment, experiment["id"]).notes = "# It *works*"
+    checkpoint(here, first, 1_000, 8)
+    checkpoint(here, first, 2_000, None)
+    here.reports.state(first, "completed", attempt=2, step=5_000, started_at=1.5, finished_at=9.5)
+    here.reports.state(second, "running", attempt=1, worker="w")
+    return experiment
+
+
+def everything(server: Server, experiment: dict[str, Any]) -> list[Any]:
+    """What the API says of an experiment, its runs, points, checkpoints, episodes and files."""
+    get: Callable[[str], Any] = lambda path: server.http.get(path).raise_for_status().json()  # noqa: E731
+    run = experiment["runs"][0]["id"]
+    checkpoints = get(f"/api/runs/{run}/checkpoints")["items"]
+    shown = get(f"/api/experiments/{experiment['id']}")
+    return [
+        shown | {"runs": shown["runs"][:1], "state": None},
+        get(f"/api/experiments/{experiment['id']}/marks"),
+        get(f"/api/runs/{run}/metrics?points=5000"),
+        [{key: value for key, value in each.items() if key != "evaluation"} for each in checkpoints],
+        [each["evaluation"] and each["evaluation"]["success"] for each in checkpoints],
+        get(f"/api/checkpoints/{checkpoints[1]['id']}/episodes"),
+        [server.http.get(f"/api/checkpoints/{each['id']}/download").content for each in checkpoints],
+        [(event["at"], event["message"]) for event in get(f"/api/runs/{run}/events")],
+    ]
+
+
+def test_a_project_comes_over_whole_with_the_same_ids(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+
+    archive = here.client.export_project("default", tmp_path)
+    came = there.client.import_project(archive, "default")
+
+    assert [(run.outcome, run.why) for run in came.runs] == [("imported", None)] * 2
+    assert came.checkpoints == 2
+    assert everything(there, trained) == everything(here, trained)
+    # To the bit, what was not finite included.
+    with here.services.database.read() as mine, there.services.database.read() as theirs:
+        run = trained["runs"][0]["id"]
+        left, right = (MetricRepository(each).read(run)["train/return"] for each in (mine, theirs))
+    assert np.array_equal(left.values, right.values, equal_nan=True)
+    # Who went on there waits here, to be resumed.
+    second = there.http.get(f"/api/runs/{trained['runs'][1]['id']}").json()
+    assert second["state"] == "stopped"
+    assert there.http.post(f"/api/runs/{second['id']}/resume").status_code == 200
+    # It is found by its settings.
+    assert there.http.get("/api/experiments?query=algorithm.gamma%20%3D%200.97").json()["total"] == 1
+    actions = [each["action"] for each in here.http.get("/api/audit?action=project").json()["items"]]
+    assert actions == ["project.exported"]
+    (entry,) = there.http.get("/api/audit?action=project").json()["items"]
+    assert (entry["action"], entry["details"]) == ("project.imported", "runs: 2 imported")
+
+    again = there.client.import_project(archive, "default")
+    assert [run.outcome for run in again.runs] == ["there", "there"]
+
+
+def rewritten(archive: Path, change: Callable[[str, bytes], bytes | None]) -> bytes:
+    """The archive with some of its files changed, or left out."""
+    out = io.BytesIO()
+    with tarfile.open(archive) as old, tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as new:
+        for info in old:
+            file = old.extractfile(info)
+            assert file is not None
+            content = change(info.name, file.read())
+            if content is not None:
+                info.size = len(content)
+                new.addfile(info, io.BytesIO(content))
+    return out.getvalue()
+
+
+def send(server: Server, content: bytes) -> Any:
+    return server.http.post("/api/projects/default/import", content=content)
+
+
+def nothing_is_left(server: Server) -> None:
+    with server.services.database.read() as session:
+        for table in (tables.Run, tables.Checkpoint, tables.MetricChunk, tables.LooseArchive):
+            assert session.query(table).count() == 0
+    assert server.services.files.ids() == set()
+
+
+def test_a_run_that_is_damaged_or_not_complete_is_not_taken_and_leaves_nothing(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    archive = here.client.export_project("default", tmp_path)
+    first = trained["runs"][0]["id"]
+
+    def damaged(kind: str, change: Callable[[bytes], bytes | None]) -> str:
+        only_first = rewritten(
+            archive,
+            lambda name, content: (
+                None
+                if trained["runs"][1]["id"] in name
+                else change(content)
+                if name.endswith(kind) and first in name
+                else content
+            ),
+        )
+        (run,) = send(there, only_first).json()["runs"]
+        assert run["outcome"] == "refused", kind
+        nothing_is_left(there)
+        why: str = run["why"]
+        return why
+
+    assert "SHA-256" in damaged(".zip", lambda content: content[:-1] + b"x")
+    assert "is missing" in damaged(".zip", lambda _: None)
+    assert "does not hold" in damaged("0.points", lambda content: content[:-40])
+
+    # Cut off in the middle of the last run: what came before stays.
+    whole = archive.read_bytes()
+    response = send(there, whole[: len(whole) - 2 * 512 - 100])
+    assert response.status_code == 400
+    assert "ends too early" in response.json()["detail"]
+    with there.services.database.read() as session:
+        assert [run.id for run in session.query(tables.Run)] == [first]
+    # Sent again, it goes on.
+    assert [run["outcome"] for run in send(there, whole).json()["runs"]] == ["there", "imported"]
+
+
+def test_what_is_here_already_is_refused_in_clear_words(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    archive = here.client.export_project("default", tmp_path)
+    mine = there.reports.experiment("Mine")
+
+    before = there.http.get(f"/api/experiments/{mine['id']}").json()
+    answer = send(there, renamed(archive, trained["id"], mine["id"])).json()
+    assert {run["why"] for run in answer["runs"]} == {f"This server has another training of the id {mine['id']}."}
+    answer = send(there, renamed(archive, trained["runs"][0]["id"], mine["runs"][0]["id"])).json()
+    assert [run["why"] for run in answer["runs"]] == ["This server has another run of that id.", None]
+    assert there.http.get(f"/api/experiments/{mine['id']}").json() == before
+
+
+def renamed(archive: Path, old: str, new: str) -> bytes:
+    """The archive with another id of the same length everywhere."""
+    out = io.BytesIO()
+    with tarfile.open(archive) as source, tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as target:
+        for info in source:
+            file = source.extractfile(info)
+            assert file is not None
+            content = file.read()
+            if info.name.endswith(".json"):
+                content = content.replace(old.encode(), new.encode())
+            info.name = info.name.replace(old, new)
+            info.size = len(content)
+            target.addfile(info, io.BytesIO(content))
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive at all", bytes(10_000), b"x" * 10_000])
+def test_what_is_no_archive_is_refused(servers: tuple[Server, Server], content: bytes) -> None:
+    assert send(servers[1], content).status_code == 400
+
+
+def test_nothing_is_unpacked_beyond_what_was_promised(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    archive = here.client.export_project("default", tmp_path)
+    bomb = b'{"name": "a", "count": 1}\n' + zlib.compress(bytes(50_000_000))
+
+    answer = send(there, rewritten(archive, lambda name, content: bomb if name.endswith(".points") else content)).json()
+    assert answer["runs"][0]["outcome"] == "refused"
+    assert "does not hold 1 points" in answer["runs"][0]["why"]
