@@ -77,6 +77,32 @@ def test_a_verdict_and_its_latex_by_keyboard(compared: tuple[BrowserContext, str
     expect(offline.get_by_role("img", name="eval/success_rate")).to_be_visible()
 
 
+def test_charts_zoom_together_and_their_lines_are_hidden_by_name(compared: tuple[BrowserContext, str]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    chart = page.get_by_role("figure", name="Success rate").first
+    expect(chart).to_be_visible()
+    area = chart.locator(".u-over")
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    assert box is not None
+    reset = page.get_by_role("button", name="Reset zoom")
+    expect(reset).to_have_count(0)
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 52, steps=4)
+    page.mouse.up()
+    expect(chart.get_by_role("button", name="Reset zoom")).to_be_visible()
+    reset.first.click()
+    expect(reset).to_have_count(0)
+
+    name = chart.get_by_role("button", name="Short sight, 5 seeds")
+    name.focus()
+    page.keyboard.press("Space")
+    expect(name).to_have_attribute("aria-pressed", "false")
+
+
 def test_a_chart_leaves_as_numbers_and_as_pictures(compared: tuple[BrowserContext, str]) -> None:
     context, address = compared
     page = context.new_page()

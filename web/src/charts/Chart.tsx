@@ -1,11 +1,12 @@
 /** A line chart on uPlot with a legend that reads the values under the cursor, in both colour schemes. */
 import { useComputedColorScheme } from '@mantine/core'
-import { type CSSProperties, useEffect, useMemo, useRef } from 'react'
+import { useEffect, useMemo, useRef, useState } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
 import { roundTick } from './axis'
 import classes from './Chart.module.css'
+import { useLinkedCharts } from './LinkedCharts'
 import { lineColor } from './palette'
 import { type ChartData, type Line, lastValue, valueAt } from './series'
 
@@ -28,7 +29,10 @@ interface ChartProps {
   xFormat?: (value: number) => string
 }
 
-/** Draws `data`. Drag to zoom in, double-click to zoom out. */
+/**
+ * Draws `data`. Drag across, or up and down, to zoom in; a button appears that zooms out. Charts within `LinkedCharts` share
+ * their cursor and what they show of x. A name in the legend hides its lines and brings them back.
+ */
 export function Chart({
   data,
   label,
@@ -43,14 +47,26 @@ export function Chart({
   const frame = useRef<HTMLDivElement>(null)
   const plot = useRef<uPlot | null>(null)
   const readout = useRef<(index: number | null) => void>(() => {})
+  const linked = useLinkedCharts()
+  const link = useRef(linked)
+  link.current = linked
+  const [zoomed, setZoomed] = useState(false)
+  const [hidden, setHidden] = useState<readonly string[]>([])
   const labelled = data.lines.filter((line) => line.label !== undefined)
+  const all = data
+  const drawn = useMemo(
+    () => ({ x: all.x, lines: all.lines.filter((line) => !hidden.some((key) => isOf(line, key))) }),
+    [all, hidden],
+  )
 
   // A plot is made anew when its lines are others; new values of the same lines are only handed over.
-  const structure = JSON.stringify([data.lines.map((line) => [line.key, line.color, line.thin, !!line.band])])
+  const structure = JSON.stringify([
+    drawn.lines.map((line) => [line.key, line.color, line.thin, !!line.band]),
+  ])
   const [low, high] = yRange ?? [undefined, undefined]
-  const lines = useRef(data.lines)
-  lines.current = data.lines
-  const columns = useMemo(() => toColumns(data), [data])
+  const lines = useRef(drawn.lines)
+  lines.current = drawn.lines
+  const columns = useMemo(() => toColumns(drawn), [drawn])
   const newest = useRef(columns)
   newest.current = columns
 
@@ -70,8 +86,40 @@ export function Chart({
             low !== undefined && high !== undefined ? { range: [low, high] } : { distr: logarithmic ? 3 : 1 },
         },
         legend: { show: false },
-        cursor: { y: false, drag: { x: true, y: false, setScale: true }, points: { size: 6 } },
-        hooks: { setCursor: [(chart) => readout.current(chart.cursor.idx ?? null)] },
+        cursor: {
+          y: false,
+          drag: { x: true, y: true, uni: 24, setScale: true },
+          points: { size: 6 },
+          bind: {
+            dblclick: () => () => {
+              zoomOut.current()
+              return null
+            },
+          },
+          // Their zooms are linked by the range, not by the mouse: y is every chart's own.
+          ...(link.current
+            ? {
+                sync: {
+                  key: link.current.key,
+                  scales: ['x', null],
+                  filters: { pub: (event) => event === 'mousemove' || event === 'mouseleave' },
+                },
+              }
+            : {}),
+        },
+        hooks: {
+          setCursor: [(chart) => readout.current(chart.cursor.idx ?? null)],
+          setSelect: [
+            (chart) => {
+              if (chart.select.width === 0 && chart.select.height === 0) return
+              setZoomed(true)
+              const { left, width } = chart.select
+              // Up and down alone takes all of the width.
+              if (width < chart.over.clientWidth - 1)
+                link.current?.zoomTo([chart.posToVal(left, 'x'), chart.posToVal(left + width, 'x')])
+            },
+          ],
+        },
       },
       newest.current,
       element,
@@ -86,11 +134,36 @@ export function Chart({
     }
   }, [structure, dark, low, high, logarithmic, height, format, xTitle, xFormat])
 
+  const range = linked?.range ?? null
+  const inside = useRef(false)
+  inside.current = zoomed || range !== null
   useEffect(() => {
-    plot.current?.setData(columns)
+    // Newer values leave a reader where he has zoomed to.
+    const chart = plot.current
+    if (!chart) return
+    chart.setData(columns, !inside.current)
+    if (inside.current) chart.redraw()
   }, [columns])
 
-  const legend = useRef<HTMLDivElement>(null)
+  // biome-ignore lint/correctness/useExhaustiveDependencies: a plot that is made anew is shown what the others show.
+  useEffect(() => {
+    const chart = plot.current
+    if (!chart || !linked) return
+    const [from, to] = range ?? [data.x[0], data.x.at(-1)]
+    const [shownFrom, shownTo] = rangeOf(chart)
+    if (from === undefined || to === undefined || (from === shownFrom && to === shownTo)) return
+    chart.setScale('x', { min: from, max: to })
+  }, [range, structure, dark, logarithmic])
+
+  const zoomOut = useRef(() => {})
+  zoomOut.current = () => {
+    setZoomed(false)
+    linked?.zoomTo(null)
+    plot.current?.setData(newest.current)
+  }
+
+  const legend = useRef<HTMLDListElement>(null)
+  const where = useRef<HTMLSpanElement>(null)
   readout.current = (index) => {
     const cells = legend.current?.querySelectorAll('dd')
     if (!cells) return
@@ -99,7 +172,7 @@ export function Chart({
       const value = index === null ? lastValue(line.values) : valueAt(line.values, index)
       if (cell) cell.textContent = value === null ? '–' : format(value)
     })
-    const step = legend.current?.querySelector('[data-step]')
+    const step = where.current
     if (step) step.textContent = index === null ? '' : `${xTitle} ${xFormat(data.x[index] ?? 0)}`
   }
 
@@ -112,22 +185,56 @@ export function Chart({
       data-step={data.x.at(-1)}
     >
       <div ref={frame} style={{ height }} />
-      <div ref={legend} className={classes.legend}>
-        <dl>
+      <div className={classes.below}>
+        <dl ref={legend} className={classes.legend}>
           {labelled.map((line) => {
             const value = lastValue(line.values)
+            const off = hidden.includes(line.key)
             return (
               <div key={line.key} className={classes.entry}>
-                <dt style={{ '--line-color': lineColor(line.color, dark) } as CSSProperties}>{line.label}</dt>
+                <dt>
+                  <button
+                    type="button"
+                    className={classes.toggle}
+                    aria-pressed={!off}
+                    title={off ? 'Show' : 'Hide'}
+                    onClick={() =>
+                      setHidden(off ? hidden.filter((key) => key !== line.key) : [...hidden, line.key])
+                    }
+                  >
+                    <span className={classes.swatch} style={{ background: lineColor(line.color, dark) }} />
+                    {line.label}
+                  </button>
+                </dt>
                 <dd>{value === null ? '–' : format(value)}</dd>
               </div>
             )
           })}
         </dl>
-        <span data-step className={classes.step} />
+        <span ref={where} className={classes.step} />
+        {(zoomed || range !== null) && (
+          <button type="button" className={classes.reset} onClick={() => zoomOut.current()}>
+            Reset zoom
+          </button>
+        )}
       </div>
     </figure>
   )
+}
+
+/** Whether a line belongs to the one of a legend's entry: itself, its seeds, its raw values. */
+function isOf(line: Line, key: string): boolean {
+  return line.key === key || line.key.startsWith(`${key}:`)
+}
+
+function isAlone(column: uPlot.AlignedData[number] | undefined): boolean {
+  let found = 0
+  for (const value of column ?? []) if (value !== null && value !== undefined && ++found > 1) return false
+  return found === 1
+}
+
+function rangeOf(chart: uPlot): [number, number] {
+  return [chart.scales.x?.min ?? 0, chart.scales.x?.max ?? 0]
 }
 
 function toColumns({ x, lines }: ChartData): uPlot.AlignedData {
@@ -148,7 +255,8 @@ function seriesOf(lines: readonly Line[], dark: boolean): { series: uPlot.Series
       stroke: line.thin ? withAlpha(color, THIN_ALPHA) : color,
       width: line.thin ? 1 : 2,
       spanGaps: true,
-      points: { show: (chart, _index, from, to) => !line.thin && to - from < 2 && chart.data[0].length < 3 },
+      // One point is no line: it is drawn as what it is.
+      points: { show: (chart, index) => isAlone(chart.data[index]) },
     })
     if (line.band) {
       const edge: uPlot.Series = { stroke: 'transparent', width: 0, spanGaps: true, points: { show: false } }

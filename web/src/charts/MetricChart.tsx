@@ -1,13 +1,13 @@
 /** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
-import { Checkbox, Group, Title } from '@mantine/core'
+import { Checkbox, Group, Slider, Title } from '@mantine/core'
 import { type ReactNode, useMemo, useState } from 'react'
 import { compact, count } from '../lib/format'
 import { Chart } from './Chart'
 import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
-import { allPositive, type ChartData, smooth } from './series'
+import { allPositive, type ChartData, smoothed } from './series'
 
-const SMOOTHING = 0.85
+const MOST_SMOOTHING = 0.99
 
 interface MetricChartProps {
   title: string
@@ -40,15 +40,9 @@ export function MetricChart({
   xFormat = count,
   ...rest
 }: MetricChartProps) {
-  const [smoothed, setSmoothed] = useState(false)
+  const [strength, setStrength] = useState(0)
   const [logarithmic, setLogarithmic] = useState(false)
-  const shown = useMemo(
-    () =>
-      smoothed
-        ? { ...data, lines: data.lines.map((line) => ({ ...line, values: smooth(line.values, SMOOTHING) })) }
-        : data,
-    [data, smoothed],
-  )
+  const shown = useMemo(() => smoothed(data, strength), [data, strength])
   const loggable = scalable && allPositive(data.lines)
   return (
     <div className={classes.metric}>
@@ -59,12 +53,20 @@ export function MetricChart({
         </Title>
         <Group gap="sm">
           {smoothable && (
-            <Checkbox
-              size="xs"
-              label="Smooth"
-              checked={smoothed}
-              onChange={(event) => setSmoothed(event.currentTarget.checked)}
-            />
+            <div className={classes.smoothing}>
+              <span aria-hidden>Smoothing</span>
+              <Slider
+                size="xs"
+                w={72}
+                min={0}
+                max={MOST_SMOOTHING}
+                step={0.01}
+                value={strength}
+                onChange={setStrength}
+                label={(value) => value.toFixed(2)}
+                thumbLabel={`Smoothing of ${title}${note ? `, ${note}` : ''}`}
+              />
+            </div>
           )}
           {loggable && (
             <Checkbox

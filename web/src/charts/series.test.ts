@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
 import { curves } from '../testing/examples'
 import { MAIN_CHARTS, SECTIONS } from './metrics'
-import { alignSeries, allPositive, lastValue, smooth, valueAt } from './series'
+import { alignSeries, allPositive, lastValue, smooth, smoothed, valueAt } from './series'
 import { chartOf, chartOfCurves } from './shape'
 
 test('series of different steps share one x, with gaps where they have no point', () => {
@@ -31,6 +31,23 @@ test('what a legend reads', () => {
   expect(lastValue([])).toBeNull()
   expect(valueAt([1, null, 3], 1)).toBe(1)
   expect(valueAt([null, 2], 0)).toBeNull()
+})
+
+test('nothing is read beyond the end of a curve', () => {
+  expect(valueAt([1, null, 3, null], 2)).toBe(3)
+  expect(valueAt([1, null, 3, null], 3)).toBeNull()
+})
+
+test('a smoothed line keeps its raw values beneath it, and its own place in the legend', () => {
+  const line = { key: 'a', label: 'one', color: 2, values: [4, 8], band: { low: [3, 7], high: [5, 9] } }
+  const seed = { key: 'a:0', color: 2, thin: true, values: [4, 8] }
+  const soft = [4, 5 / 0.75]
+  expect(smoothed({ x: [1, 2], lines: [seed, line] }, 0.5).lines).toEqual([
+    { ...seed, values: [4, 5 / 0.75] },
+    { key: 'a:raw', color: 2, values: [4, 8], thin: true },
+    { key: 'a', label: 'one', color: 2, values: soft },
+  ])
+  expect(smoothed({ x: [1, 2], lines: [line] }, 0).lines).toEqual([line])
 })
 
 test('zero and below have no logarithm', () => {

@@ -57,6 +57,21 @@ export function smooth(values: Values, weight: number): (number | null)[] {
   })
 }
 
+/** Lines smoothed by `weight`, and beneath each that the legend names its raw values, thin. */
+export function smoothed({ x, lines }: ChartData, weight: number): ChartData {
+  if (weight === 0) return { x, lines }
+  return {
+    x,
+    lines: lines.flatMap((line) => {
+      const { band, ...own } = line
+      const soft = { ...own, values: smooth(line.values, weight) }
+      if (line.thin || line.label === undefined) return [soft]
+      const { label: _, ...raw } = own
+      return [{ ...raw, key: `${line.key}:raw`, thin: true }, soft]
+    }),
+  }
+}
+
 /** The last number of a series, or null. */
 export function lastValue(values: Values): number | null {
   for (let index = values.length - 1; index >= 0; index--) {
@@ -66,8 +81,14 @@ export function lastValue(values: Values): number | null {
   return null
 }
 
-/** The value at `index`, or else the nearest one before it: what a legend shows where a sparse series has no point. */
+/**
+ * The value at `index`, or else the nearest one before it: what a legend shows where a sparse series has no point. Beyond the
+ * last one there is none.
+ */
 export function valueAt(values: Values, index: number): number | null {
+  let last = values.length - 1
+  while (last >= 0 && (values[last] ?? null) === null) last--
+  if (index > last) return null
   for (let at = Math.min(index, values.length - 1); at >= 0; at--) {
     const value = values[at]
     if (value !== null && value !== undefined) return value

@@ -5,6 +5,7 @@ import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
+import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
@@ -205,11 +206,13 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               </Text>
             }
           >
-            <div className={charts.grid}>
-              {COMPARED.map((metric) => (
-                <CurveChart key={metric.name} metric={metric} experiments={chosen} />
-              ))}
-            </div>
+            <LinkedCharts>
+              <div className={charts.grid}>
+                {COMPARED.map((metric) => (
+                  <CurveChart key={metric.name} metric={metric} experiments={chosen} />
+                ))}
+              </div>
+            </LinkedCharts>
           </Panel>
           <Panel
             title="What differs in their settings"
