@@ -14,7 +14,7 @@ def test_a_range_in_the_form_is_a_study_of_real_trainings(context: BrowserContex
     page.get_by_label("Steps", exact=True).fill("2000")
     page.get_by_role("button", name="Advanced").click()
     page.get_by_role("textbox", name="Search these settings").fill("learning rate")
-    page.get_by_role("button", name="Search Learning rate", exact=True).click()
+    page.get_by_role("button", name="Try a range: Learning rate", exact=True).click()
     page.get_by_role("textbox", name="Learning rate, to").fill("0.02")
     page.get_by_label("Trials", exact=True).fill("2")
     page.get_by_label("Trials at once").fill("1")

@@ -46,7 +46,7 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
             type="button"
             inherit
             ml={6}
-            aria-label={`Search ${field.label}`}
+            aria-label={`${field.kind === 'number' ? 'Try a range' : 'Try several'}: ${field.label}`}
             onClick={() => search.set(freshSearch(field, value))}
           >
             {field.kind === 'number' ? 'Try a range' : 'Try several'}

@@ -151,7 +151,7 @@ test('a range in the form makes a study of the training, refused at its field', 
   const detail = [{ loc: ['body', 'training', 'steps'], msg: 'this is refused', type: 'refused' }]
   const server = startServer({ 'GET /api/training/form': form, 'POST /api/studies': refusal(422, detail) })
   const { user } = open('/new')
-  await user.click(await screen.findByRole('button', { name: 'Search Steps' }))
+  await user.click(await screen.findByRole('button', { name: 'Try a range: Steps' }))
   const high = screen.getByRole('textbox', { name: 'Steps, to' })
   await user.clear(high)
   await user.type(high, '400000')
