@@ -38,6 +38,7 @@ from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
 from server.people import endpoints as people
 from server.people.oidc import endpoints as oidc
+from server.playground import endpoints as playground
 from server.policies import endpoints as policies
 from server.printing import endpoints as printing
 from server.problems import UNAUTHORIZED, install_error_handlers
@@ -102,6 +103,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     studies.router,
     events.router,
     live.router,
+    playground.router,
     worker_api.router,
     worker_jobs.router,
     jobs.router,

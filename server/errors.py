@@ -10,6 +10,7 @@ ServiceError (a sim.errors.MaplessError)   500
 │   └── (server.runs.states.TransitionError)
 ├── TooLargeError                   413  a body over its cap
 ├── UnusableArenaError              422  an arena's files are refused, or it is not there to train on
+├── MisplacedError                  422  something can't be where a playground's owner wants it
 ├── RefusedFieldError               422  a field of a form, told as FastAPI tells its own
 ├── CorruptUploadError              422  the bytes are not what their checksum says
 ├── TooManyAttemptsError            429  too many wrong tokens
@@ -93,6 +94,12 @@ class TooLargeError(ServiceError):
 
 class UnusableArenaError(ServiceError):
     """An arena's files are refused, or it is not there to train on."""
+
+    status = 422
+
+
+class MisplacedError(ServiceError):
+    """Something can't be where a playground's owner wants it, or is not there."""
 
     status = 422
 

@@ -22,6 +22,7 @@ from server.metrics.cache import AnswerCache
 from server.monitoring.instruments import Instruments
 from server.people.gate import Gate
 from server.people.oidc.provider import Provider
+from server.playground.registry import Playgrounds
 from server.projects.repository import ProjectRepository
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
@@ -45,6 +46,7 @@ class Services:
     links: Links = field(default_factory=NoLinks)
     live: LiveHub = field(default_factory=lambda: LiveHub(open_view))
     drivers: PolicyDrivers = field(init=False)
+    playgrounds: Playgrounds = field(default_factory=Playgrounds)
     leases: Leases = field(init=False)
     job_leases: Leases = field(init=False)
     board: Board = field(default_factory=Board)

@@ -105,7 +105,8 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     broker_url, prefix = services.settings.resolved_broker_url, services.settings.queue_prefix
     await run_in_threadpool(prepare_broker, broker_url, prefix)
     # Nobody has a view open of a server that starts.
-    await run_in_threadpool(JobService(services).cancel_all, "view")
+    for kind in ("view", "play"):
+        await run_in_threadpool(JobService(services).cancel_all, kind)
     doorbell = CeleryDoorbell(broker_url, prefix)
     services.doorbell = doorbell
     ingest = Ingest(WorkerService(services).receive)

@@ -41,6 +41,12 @@ class Driver:
         actions, self._memory[rows] = cast("RecurrentPolicy", self.policy).step(observations, self._memory[rows])
         return actions
 
+    def copy(self) -> "Driver":
+        """One that goes on from what this one remembers."""
+        other = Driver(self.policy, len(self._memory))
+        other._memory[:] = self._memory
+        return other
+
     def forget(self, ended: NDArray[np.bool_]) -> None:
         """Forgets the robots (n,) whose episode has ended."""
         self._memory[ended] = 0.0

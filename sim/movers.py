@@ -107,6 +107,12 @@ class Movers:
         self._crowd.steps[0] = 0
         place_movers(self._crowd)
 
+    def put(self, slot: int, x: float, y: float) -> None:
+        """Put one of the first copy of the first arena somewhere else, metres; one that goes by the clock goes on by it."""
+        self._records[slot]["x"], self._records[slot]["y"] = x, y
+        self.discs[0, slot, :2] = x, y
+        self.discs[0, slot, 3:] = 0.0
+
     def write_places(self, state: NDArray[np.float64]) -> None:
         """Write where all of them are in the Space to their rows (tiles * K, 3) of `sim.physics.TiledSpace.state`."""
         places = np.stack([self._records["x"], self._records["y"]], axis=1)

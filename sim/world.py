@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.actions import action_layout, fastest_way
+from sim.actions import action_layout, fastest_way, twists
 from sim.added_parts import AddedParts
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import FreeSpace, free_space
@@ -461,6 +461,26 @@ class World:
         # The last number of an action is kept as `angular`, whatever it turns the robot by.
         names = (*action_layout(self.task.robot).names[:-1], "angular")
         return np.stack([self.robots.records[name] for name in names], axis=1)
+
+    def twists(self) -> NDArray[np.float32]:
+        """(N, 3) speeds forwards and to the left, m/s, and turning rate, rad/s, of the middle of each body in the last step.
+
+        Zero for robots that started anew in it.
+        """
+        fastest, turning = self.robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]].T
+        return twists(self.task.robot, self.followed(), fastest, turning).astype(np.float32)
+
+    def put_mover(self, slot: int, x: float, y: float) -> None:
+        """Put what moves somewhere else in the first copy of the first arena; it goes on from there.
+
+        Args:
+            slot: its row of `movers.discs`.
+            x: metres.
+            y: metres.
+        """
+        self.movers.put(slot, x, y)
+        self.movers.write_places(self._space.state[len(self) : -1])
+        self._space.put_all()
 
     def tiles(self) -> NDArray[np.int32]:
         """(N,) which copy of an arena each robot is in: a row of the movers' discs; modulo the arenas it is the arena."""

@@ -8,6 +8,7 @@ worker                                            server
   | GET   /jobs/{id}/archive                     ---> |  the policy's archive, where the job has one
   | POST  /jobs/{id}/report      JobReport       ---> |  renews the lease; 409 where the job is no longer wanted
   | POST  /jobs/{id}/frames      frames          ---> |  of a view, each after its length; answered as a report
+  | POST  /jobs/{id}/seen        PlaySeen        ---> |  of a playground; answered as a report
   | PUT   /jobs/{id}/result      the file's bytes ---> |
   | POST  /jobs/{id}/end         JobEnd          ---> |
 """
@@ -17,13 +18,14 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from sim.config import AnyArenaConfig, ArenaFile, Frozen, TaskConfig
+from workers.play_protocol import PlayOrders
 from workers.protocol import Extensions, Text, WorkerName
 from workers.reporting import EvaluationResult, Figure, WatchRequest
 
-JobKind = Literal["view", "replay", "export", "evaluate"]
+JobKind = Literal["view", "play", "replay", "export", "evaluate"]
 """What may be asked for; those that somebody waits for come first."""
 
-KINDS: tuple[JobKind, ...] = ("view", "replay", "export", "evaluate")
+KINDS: tuple[JobKind, ...] = ("view", "play", "replay", "export", "evaluate")
 """In the order in which they are taken up: who looks never waits behind what goes on unwatched."""
 
 Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[a-z0-9-]+$")]
@@ -86,6 +88,7 @@ class UploadedPolicy(Frozen):
 
 
 ArchivedPolicy = Annotated[CheckpointPolicy | ShippedPolicyName, Field(discriminator="source")]
+PlayedPolicy = Annotated[CheckpointPolicy | ShippedPolicyName | UploadedPolicy, Field(discriminator="source")]
 AnyPolicy = Annotated[CheckpointPolicy | ShippedPolicyName | BaselineName | UploadedPolicy, Field(discriminator="source")]
 
 
@@ -121,6 +124,19 @@ class ViewJob(Frozen):
     policy: ArchivedPolicy
 
 
+class PlayJob(Frozen):
+    """Drive by a policy in an arena that people change meanwhile.
+
+    Attributes:
+        policy: which one.
+        arena: as it was at first; orders say how it is now.
+    """
+
+    kind: Literal["play"] = "play"
+    policy: PlayedPolicy
+    arena: ArenaFile
+
+
 class ReplayJob(Frozen):
     """Drive an evaluation again, and record what every robot did (`workers.replays.recording`)."""
 
@@ -144,8 +160,10 @@ class EvaluateJob(Frozen):
     suite: SuiteChoice = OWN_SUITE
 
 
-JobSpec = Annotated[ViewJob | ReplayJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
-JOB_SPEC: TypeAdapter[ViewJob | ReplayJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
+WatchedJob = ViewJob | PlayJob
+"""What lasts for as long as somebody looks, and brings no file."""
+JobSpec = Annotated[ViewJob | PlayJob | ReplayJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
+JOB_SPEC: TypeAdapter[ViewJob | PlayJob | ReplayJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
 
 
 class Measurement(Frozen):
@@ -195,7 +213,7 @@ class JobClaimRequest(Frozen):
 
     worker: WorkerName
     claim_id: str = Field(pattern="^[0-9a-f]{32}$")
-    kinds: tuple[JobKind, ...] = Field(min_length=1, max_length=4)
+    kinds: tuple[JobKind, ...] = Field(min_length=1, max_length=len(KINDS))
     extensions: Extensions = ()
     wait_seconds: float = Field(10.0, ge=0.0, le=30.0)
 
@@ -233,9 +251,11 @@ class JobOrders(Frozen):
 
     Attributes:
         watch: of a view, what somebody wants to see; None while nobody looks.
+        play: of a playground, all of it; None where the worker has heard of that revision.
     """
 
     watch: WatchRequest | None = None
+    play: PlayOrders | None = None
 
 
 class JobEnd(Frozen):

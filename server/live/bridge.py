@@ -1,4 +1,6 @@
-"""Carries viser's WebSocket between a browser and the scene's own port: everything down, only the camera up.
+"""Carries viser's WebSocket between a browser and the scene's own port: everything down, little up.
+
+Up goes the camera, and of a playground what its owner clicks and drags.
 
 viser believes every message of a client: some write attributes of its controls unchecked, one opens a public tunnel. So
 what comes from browsers is let through by name.
@@ -7,6 +9,7 @@ what comes from browsers is let through by name.
 import contextlib
 from collections.abc import Awaitable, Callable
 from functools import partial
+from typing import Annotated, Any, Literal, TypeAlias
 
 import anyio
 import msgspec
@@ -18,25 +21,61 @@ from websockets.exceptions import ConnectionClosed
 from server.live.page import VISER_PROTOCOL
 from server.scene.gate import KEY
 
-ALLOWED_FROM_BROWSERS = frozenset({"ViewerCameraMessage"})
 # A camera's pose takes about 300 bytes.
 _MAX_MESSAGE = 4096
+_Number = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+_Point = tuple[_Number, _Number, _Number]
 
 
 # RuntimeError: Starlette's word for sending to a browser that has left.
 _GONE = (ConnectionClosed, WebSocketDisconnect, RuntimeError)
 
 
-class _Envelope(msgspec.Struct):
-    """The only field of a message that the bridge reads."""
-
-    type: str
+class _Camera(msgspec.Struct, tag="ViewerCameraMessage"):
+    """Where somebody looks from."""
 
 
-_envelopes = msgspec.msgpack.Decoder(_Envelope)
+class _Click(msgspec.Struct, tag="ScenePointerMessage", forbid_unknown_fields=True):
+    """Somebody clicked into the scene."""
+
+    event_type: Literal["click"]
+    ray_origin: _Point
+    ray_direction: _Point
+    screen_pos: Annotated[tuple[tuple[_Number, _Number], ...], msgspec.Meta(min_length=1, max_length=2)]
+    modifier: None = None
 
 
-async def bridge(browser: WebSocket, port: int) -> None:
+class _Drag(msgspec.Struct, tag="TransformControlsUpdateMessage", forbid_unknown_fields=True):
+    """Somebody drags what has handles."""
+
+    name: Literal["/world/handle"]
+    wxyz: tuple[_Number, _Number, _Number, _Number]
+    position: _Point
+    owner: Literal[""] = ""
+
+
+class _DragStart(msgspec.Struct, tag="TransformControlsDragStartMessage", forbid_unknown_fields=True):
+    """Somebody takes hold of them."""
+
+    name: Literal["/world/handle"]
+    owner: Literal[""] = ""
+
+
+class _DragEnd(msgspec.Struct, tag="TransformControlsDragEndMessage", forbid_unknown_fields=True):
+    """Somebody lets go of them."""
+
+    name: Literal["/world/handle"]
+    owner: Literal[""] = ""
+
+
+Allowed: TypeAlias = "msgspec.msgpack.Decoder[Any]"
+"""What a browser may send."""
+
+WATCH: Allowed = msgspec.msgpack.Decoder(_Camera)
+PLAY: Allowed = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _DragStart | _DragEnd)
+
+
+async def bridge(browser: WebSocket, port: int, allowed: Allowed = WATCH) -> None:
     """Connects an unaccepted WebSocket of a browser with the scene on a port of 127.0.0.1, until one of them leaves."""
     async with connect(
         f"ws://127.0.0.1:{port}",
@@ -50,7 +89,7 @@ async def bridge(browser: WebSocket, port: int) -> None:
         ping_interval=None,
     ) as scene:
         await browser.accept(subprotocol=VISER_PROTOCOL)
-        await until_one_ends(partial(_down, scene, browser), partial(_up, browser, scene))
+        await until_one_ends(partial(_down, scene, browser), partial(_up, browser, scene, allowed))
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):
         await browser.close()
 
@@ -68,14 +107,15 @@ async def until_one_ends(*ways: Callable[[], Awaitable[None]]) -> None:
             group.start_soon(run, way)
 
 
-def may_pass(message: bytes) -> bool:
+def may_pass(message: bytes, allowed: Allowed = WATCH) -> bool:
     """Whether a browser's message may reach the scene."""
     if len(message) > _MAX_MESSAGE:
         return False
     try:
-        return _envelopes.decode(message).type in ALLOWED_FROM_BROWSERS
-    except msgspec.MsgspecError:
+        allowed.decode(message)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
         return False
+    return True
 
 
 async def _down(scene: ClientConnection, browser: WebSocket) -> None:
@@ -83,8 +123,8 @@ async def _down(scene: ClientConnection, browser: WebSocket) -> None:
         await browser.send_bytes(message if isinstance(message, bytes) else message.encode())
 
 
-async def _up(browser: WebSocket, scene: ClientConnection) -> None:
+async def _up(browser: WebSocket, scene: ClientConnection, allowed: Allowed) -> None:
     while (message := await browser.receive())["type"] != "websocket.disconnect":
         data = message.get("bytes")
-        if data is not None and may_pass(data):
+        if data is not None and may_pass(data, allowed):
             await scene.send(data)

@@ -5,7 +5,7 @@ import contextlib
 import logging
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from server.errors import ServiceError
 from server.ids import new_id
@@ -14,7 +14,9 @@ from server.jobs.needed import nobody_for
 from server.jobs.repository import OPEN
 from server.live.hub import LiveHub, TooManyViewsError
 from workers.errors import FrameError
-from workers.job_protocol import FRAME_LENGTH_BYTES, ArchivedPolicy, ViewJob
+from workers.frames import Frame
+from workers.job_protocol import FRAME_LENGTH_BYTES, WatchedJob
+from workers.play_protocol import PlayOrders, PlaySeen
 from workers.reporting import WatchRequest
 
 if TYPE_CHECKING:
@@ -27,19 +29,34 @@ logger = logging.getLogger(__name__)
 _LOOK_SECONDS = 1.0
 
 
+class Player(Protocol):
+    """A playground: what its worker is to know, and what comes back."""
+
+    def orders(self, revision: int) -> PlayOrders | None:
+        """What a worker has to know that has those of `revision`; None where nothing is new."""
+
+    def take_frame(self, frame: Frame) -> None:
+        """A moment has arrived."""
+
+    def take_seen(self, seen: PlaySeen) -> None:
+        """What is about to happen has arrived."""
+
+
 @dataclass(frozen=True)
 class Driven:
     """A finished policy to look at.
 
     Attributes:
-        policy: where a worker gets it from.
-        sha256: of its archive.
+        job: what a worker is asked to do.
+        sha256: of the policy's archive.
         title: for people.
+        player: the playground that it is in; None where it drives as it likes.
     """
 
-    policy: ArchivedPolicy
+    job: WatchedJob
     sha256: str
     title: str
+    player: Player | None = None
 
 
 @dataclass(eq=False)
@@ -47,6 +64,7 @@ class _Driver:
     """One view job, and who has it."""
 
     subject: str
+    player: Player | None = None
     watchers: int = 0
     job_id: str | None = None
     failure: str | None = None
@@ -94,7 +112,7 @@ class PolicyDrivers:
         if driver is None or driver.ended:
             if (reason := self._full(subject)) is not None:
                 raise TooManyViewsError(reason)
-            driver = self._drivers[subject] = _Driver(subject)
+            driver = self._drivers[subject] = _Driver(subject, driven.player)
             driver.task = asyncio.create_task(self._keep(jobs, driver, driven))
         driver.watchers += 1
         try:
@@ -119,10 +137,22 @@ class PolicyDrivers:
             return None
         if driver.detach is None:
             driver.detach = self._hub.attach_driver(driver.subject, lambda wish: setattr(driver, "wish", wish))
-        for frame in _split(data or b""):
+        for encoded in _split(data or b""):
             with contextlib.suppress(FrameError):
+                frame = encoded if driver.player is None else Frame.decode(encoded)
+                if driver.player is not None and isinstance(frame, Frame):
+                    driver.player.take_frame(frame)
                 self._hub.driven_frames(driver.subject, frame)
         return driver.wish
+
+    def orders(self, job_id: str, revision: int, seen: PlaySeen | None = None) -> PlayOrders | None:
+        """What the worker of a playground has to know that has those of `revision`, and perhaps tells what it sees."""
+        driver = self._by_job.get(job_id)
+        if driver is None or driver.player is None:
+            return None
+        if seen is not None:
+            driver.player.take_seen(seen)
+        return driver.player.orders(revision)
 
     async def close(self) -> None:
         """Ends every view."""
@@ -149,7 +179,7 @@ class PolicyDrivers:
     async def _keep(self, jobs: "JobService", driver: _Driver, driven: Driven) -> None:
         """Asks for the job, waits for its end, and takes it back when nobody watches any more."""
         # Each view is a job of its own: what comes out of it is not kept.
-        asked = Asked(ViewJob(policy=driven.policy), f"view-{new_id()}", driven.title, driven.sha256)
+        asked = Asked(driven.job, f"view-{new_id()}", driven.title, driven.sha256)
         try:
             driver.job_id = await asyncio.shield(jobs.lane.run(jobs.ask, asked))
             self._by_job[driver.job_id] = driver

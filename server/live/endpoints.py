@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from server.errors import NotFoundError
 from server.jobs.service import JobService
-from server.live.bridge import bridge, until_one_ends
+from server.live.bridge import PLAY, WATCH, bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
@@ -107,9 +107,10 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
         async with AsyncExitStack() as stack:
             if subject.driven is not None:
                 await stack.enter_async_context(services.drivers.driving(JobService(services), run_id, subject.driven))
-            view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme))
+            view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme, subject.stage))
             await until_one_ends(
-                partial(bridge, websocket, view.port), partial(services.gate.until_changed, principal_of(websocket))
+                partial(bridge, websocket, view.port, PLAY if subject.stage is not None else WATCH),
+                partial(services.gate.until_changed, principal_of(websocket)),
             )
     except (TooManyViewsError, ArenaError) as error:
         await websocket.close(_TRY_AGAIN_LATER, str(error)[:_MAX_REASON])

@@ -17,7 +17,7 @@ import contextlib
 import time
 from collections.abc import AsyncGenerator, Callable, Coroutine
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from server.live.scoreboard import Score
 from server.live.settings import RECEIVING_SECONDS, LiveSettings, LiveStatus
@@ -26,6 +26,9 @@ from sim.config import TaskConfig
 from sim.errors import MaplessError
 from workers.frames import Frame
 from workers.reporting import WatchRequest
+
+if TYPE_CHECKING:
+    from server.scene.stage import Stage
 
 _T = TypeVar("_T")
 
@@ -64,7 +67,12 @@ class View(Protocol):
         """Stops the thread and the port; blocks until both are gone."""
 
 
-ViewFactory = Callable[[TaskConfig, Theme, LiveSettings], View]
+class ViewFactory(Protocol):
+    """Builds the scene of a run, or of a playground with its stage."""
+
+    def __call__(  # noqa: D102 - its class says it
+        self, task: TaskConfig, theme: Theme, settings: LiveSettings, stage: "Stage | None" = None, /
+    ) -> View: ...
 
 
 @dataclass
@@ -156,7 +164,7 @@ class LiveHub:
 
         return detach
 
-    def driven_frames(self, run_id: str, data: bytes) -> None:
+    def driven_frames(self, run_id: str, data: bytes | Frame) -> None:
         """A frame of the driver has arrived; see `frames`."""
         if not self._channel(run_id).callbacks:
             self.frames(run_id, data)
@@ -203,8 +211,16 @@ class LiveHub:
         )
 
     @contextlib.asynccontextmanager
-    async def watch(self, run_id: str, task: TaskConfig, theme: Theme = "light") -> AsyncGenerator[View]:
+    async def watch(
+        self, run_id: str, task: TaskConfig, theme: Theme = "light", stage: "Stage | None" = None
+    ) -> AsyncGenerator[View]:
         """Counts a watcher of this run for as long as the context lasts.
+
+        Args:
+            run_id: what is watched.
+            task: what to draw.
+            theme: light or dark.
+            stage: of a playground.
 
         Raises:
             TooManyViewsError: the cap on scenes is reached.
@@ -214,7 +230,7 @@ class LiveHub:
         screen.watchers += 1
         try:
             # Shielded: a browser that leaves meanwhile must not leave a scene behind that nobody knows of.
-            yield await asyncio.shield(self._start(self._open(channel, screen, task, theme)))
+            yield await asyncio.shield(self._start(self._open(channel, screen, task, theme, stage)))
         finally:
             screen.watchers -= 1
             self._apply(channel)
@@ -279,14 +295,14 @@ class LiveHub:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    async def _open(self, channel: _Channel, screen: _Screen, task: TaskConfig, theme: Theme) -> View:
+    async def _open(self, channel: _Channel, screen: _Screen, task: TaskConfig, theme: Theme, stage: "Stage | None") -> View:
         async with screen.lock:
             if screen.view is None:
                 if self._open_scenes >= self._capacity:
                     raise TooManyViewsError(self._full)
                 self._open_scenes += 1
                 try:
-                    screen.view = await asyncio.to_thread(self._view_factory, task, theme, channel.settings)
+                    screen.view = await asyncio.to_thread(self._view_factory, task, theme, channel.settings, stage)
                 except BaseException:
                     self._open_scenes -= 1
                     raise

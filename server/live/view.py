@@ -10,6 +10,7 @@ from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
 from server.scene.camera import CameraRig
 from server.scene.quiet import start_viser, stop_viser
 from server.scene.scene import Scene
+from server.scene.stage import Stage
 from server.scene.themes import Theme
 from sim.config import MAX_MOVERS, ArenaPool, TaskConfig
 from workers.errors import FrameError
@@ -30,13 +31,15 @@ class LiveView:
         task: arena, robot and LiDAR to draw.
         theme: light or dark.
         settings: what to show.
+        stage: of a playground, which draws what stands in the arena.
     """
 
-    def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings) -> None:
+    def __init__(self, task: TaskConfig, theme: Theme, settings: LiveSettings, stage: Stage | None = None) -> None:
         self._server = start_viser()
         self._rays = task.lidar.scan_size
         self._arenas = task.arena.maps if isinstance(task.arena, ArenaPool) else 1
         self._scene = Scene(self._server, task, theme)
+        self._stage = None if stage is None else self._scene.add_stage(stage)
         self._camera = CameraRig(self._server, self._scene.half_size)
         self._scoreboard = Scoreboard()
         self._lock = threading.Lock()
@@ -117,4 +120,6 @@ class LiveView:
             if frame is not None:
                 self._positions = [(float(x), float(y)) for x, y, _ in frame.poses]
                 self._scene.update(frame, now)
+            if self._stage is not None:
+                self._stage.update(frame)
             self._scene.centre_on(*self._camera.centre(self._positions, now))

@@ -1,4 +1,4 @@
-"""What a live view may be of: a run, or a policy that ships under 'policy-NAME'."""
+"""What a live view may be of: a run, a policy that ships under 'policy-NAME', or a playground under 'play-ID'."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,15 @@ from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.experiments.stored import training_of
 from server.live.drivers import Driven
+from server.playground.registry import PLAY_PREFIX
 from server.policies.service import find, shipped_hash
 from server.runs.repository import RunRepository
 from server.runs.states import FINISHED
+from server.scene.stage import Stage
 from server.services import Services
 from sim.arenas import with_maps_of
 from sim.config import TaskConfig
-from workers.job_protocol import CheckpointPolicy, ShippedPolicyName
+from workers.job_protocol import CheckpointPolicy, ShippedPolicyName, ViewJob
 
 POLICY_PREFIX = "policy-"
 """Of what is no run: no run's id has a hyphen."""
@@ -28,17 +30,19 @@ def policy_view(name: str) -> str:
 
 @dataclass(frozen=True)
 class Watched:
-    """A run or a policy to look at.
+    """A run, a policy or a playground to look at.
 
     Attributes:
         id: of its live view.
         task: the place, and the geometry of robot and LiDAR.
         driven: the policy that drives after the training; None while its worker sends the frames.
+        stage: what a playground draws; None of everything else.
     """
 
     id: str
     task: TaskConfig
     driven: Driven | None
+    stage: Stage | None = None
 
 
 def watched(services: Services, identifier: str) -> Watched:
@@ -47,11 +51,14 @@ def watched(services: Services, identifier: str) -> Watched:
     Raises:
         NotFoundError: there is nothing of that id.
     """
+    if identifier.startswith(PLAY_PREFIX):
+        ground = services.playgrounds.get(identifier)
+        return Watched(identifier, ground.empty_task, ground.driven, ground)
     if identifier.startswith(POLICY_PREFIX):
         policy = find(identifier.removeprefix(POLICY_PREFIX))
         task = with_maps_of(policy.card.training.task, policy.card.seed)
         name = policy.card.name
-        driven = Driven(ShippedPolicyName(name=name), shipped_hash(name), policy.card.title)
+        driven = Driven(ViewJob(policy=ShippedPolicyName(name=name)), shipped_hash(name), policy.card.title)
         return Watched(identifier, task, driven)
     with services.database.read() as session:
         run = RunRepository(session).get(identifier)
@@ -61,7 +68,7 @@ def watched(services: Services, identifier: str) -> Watched:
     task = with_maps_of(with_geometry(training, services.arenas).task, seed)
     if best is None:
         return Watched(identifier, task, None)
-    return Watched(identifier, task, Driven(CheckpointPolicy(id=best.id), best.sha256, title))
+    return Watched(identifier, task, Driven(ViewJob(policy=CheckpointPolicy(id=best.id)), best.sha256, title))
 
 
 def _best(session: Session, run_id: str) -> tables.Checkpoint | None:

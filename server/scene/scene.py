@@ -5,6 +5,8 @@ import viser
 
 from server.scene.movers import MoverNodes
 from server.scene.robots import RobotNodes
+from server.scene.stage import Stage
+from server.scene.stage_nodes import OBSTACLE_HEIGHT, StageNodes
 from server.scene.themes import COLOURS, Colours, Theme
 from sim.arenas import Arena, arena_clearance, build_arena
 from sim.config import TaskConfig
@@ -15,7 +17,6 @@ _WORLD = "/world"
 _ARENA = f"{_WORLD}/arena"
 _WALL_HEIGHT = 0.3
 _WALL_THICKNESS = 0.1
-_OBSTACLE_HEIGHT = 0.45
 
 
 class Scene:
@@ -38,6 +39,10 @@ class Scene:
         self._world = server.scene.add_frame(_WORLD, show_axes=False)
         _light(server, theme, self._colours)
         self._enter(0)
+
+    def add_stage(self, stage: Stage) -> StageNodes:
+        """Nodes for what a playground draws, below the world that moves under the camera."""
+        return StageNodes(self._server, self._world, stage, self._task, self._colours)
 
     @property
     def half_size(self) -> float:
@@ -133,16 +138,16 @@ def _build(server: viser.ViserServer, arena: Arena, colours: Colours) -> None:
         scene.add_cylinder(
             f"{_ARENA}/circles/{index}",
             float(radius),
-            _OBSTACLE_HEIGHT,
+            OBSTACLE_HEIGHT,
             colours.obstacle,
             radial_segments=40,
-            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+            position=(float(x), float(y), OBSTACLE_HEIGHT / 2),
         )
     for index, (x, y, half_x, half_y, angle) in enumerate(arena.boxes):
         scene.add_box(
             f"{_ARENA}/boxes/{index}",
             colours.obstacle,
-            (2 * float(half_x), 2 * float(half_y), _OBSTACLE_HEIGHT),
-            position=(float(x), float(y), _OBSTACLE_HEIGHT / 2),
+            (2 * float(half_x), 2 * float(half_y), OBSTACLE_HEIGHT),
+            position=(float(x), float(y), OBSTACLE_HEIGHT / 2),
             wxyz=(float(np.cos(angle / 2)), 0.0, 0.0, float(np.sin(angle / 2))),
         )

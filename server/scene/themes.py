@@ -30,6 +30,7 @@ class Colours:
     ground: Rgb
     ambient: float
     ray_strength: float
+    arrow: Rgb
 
 
 COLOURS: dict[Theme, Colours] = {
@@ -50,6 +51,7 @@ COLOURS: dict[Theme, Colours] = {
         ground=(90, 98, 122),
         ambient=2.6,
         ray_strength=0.34,
+        arrow=(132, 146, 176),
     ),
     "light": Colours(
         floor=(250, 251, 253),
@@ -68,6 +70,7 @@ COLOURS: dict[Theme, Colours] = {
         ground=(205, 212, 224),
         ambient=2.2,
         ray_strength=0.5,
+        arrow=(96, 110, 138),
     ),
 }
 

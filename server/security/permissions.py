@@ -16,6 +16,7 @@ from starlette.requests import HTTPConnection
 from server.database.tables import Role
 from server.errors import ForbiddenError, NotFoundError, ServiceError, UnauthorizedError
 from server.live.watched import POLICY_PREFIX
+from server.playground.registry import PLAY_PREFIX
 from server.projects.repository import ProjectRepository
 from server.security.principal import Principal, principal_of
 from server.services import Services, ServicesDep
@@ -107,6 +108,14 @@ class _OwnAlerts(Permission):
             raise ForbiddenError("This takes somebody who is signed in with a browser.")
 
 
+class _OwnPlayground(Permission):
+    """Who opened it: to everybody else it is not there."""
+
+    async def check(self, principal: Principal, connection: HTTPConnection, services: Services) -> None:
+        _somebody(principal)
+        services.playgrounds.of(connection.path_params["playground_id"], principal)
+
+
 class _Kind(Permission):
     """A program with a door of its own; `administrates` lets administrators in as well."""
 
@@ -155,10 +164,13 @@ class InProject(Permission):
     async def check(self, principal: Principal, connection: HTTPConnection, services: Services) -> None:
         """As `Permission.check`."""
         _somebody(principal)
+        given = connection.path_params.get(self._parameter)
+        if given is not None and given.startswith(PLAY_PREFIX):
+            services.playgrounds.of(given, principal)
+            return
         # Nothing to look up for who may do everything, which is everybody on a laptop.
         if principal.everywhere == "admin":
             return
-        given = connection.path_params.get(self._parameter)
         identifiers = [given] if given is not None else connection.query_params.getlist(self._parameter)
         identifiers = [each for each in dict.fromkeys(identifiers) if not each.startswith(POLICY_PREFIX)][:200]
         if identifiers:
@@ -199,6 +211,7 @@ SIGNED_IN = _dependency(_SignedIn("signed in"))
 LAUNCH = _dependency(_Anywhere("launch", "editor"))
 INVITE = _dependency(_Anywhere("invite", "admin"))
 ADMINISTRATE = _dependency(_Installation("administrate"))
+OWN_PLAYGROUND = _dependency(_OwnPlayground("own playground"))
 OWN_ACCOUNT = _dependency(_OwnAccount("own account"))
 OWN_ALERTS = _dependency(_OwnAlerts("own alerts"))
 WORK = _dependency(_Kind("work", "worker"))

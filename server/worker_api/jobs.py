@@ -18,6 +18,7 @@ from server.security.permissions import WORK
 from server.services import Services, ServicesDep
 from server.worker_api.errors import MalformedUploadError
 from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport, Measurement
+from workers.play_protocol import PlaySeen
 from workers.protocol import MAX_INTEGER
 
 router = APIRouter(prefix="/api/worker/jobs", tags=["worker"], include_in_schema=False)
@@ -32,6 +33,8 @@ def _service(services: ServicesDep) -> JobService:
 
 JobServiceDep = Annotated[JobService, Depends(_service)]
 AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
+RevisionQuery = Annotated[int, Query(ge=-1, le=MAX_INTEGER)]
+"""Of a playground's orders: the newest that the worker has."""
 
 
 @router.post("/claim", response_model=None, dependencies=[WORK])
@@ -78,21 +81,51 @@ async def get_archive(
 
 @router.post("/{job_id}/report", dependencies=[WORK])
 async def report_job(
-    job_id: str, attempt: AttemptQuery, body: JobReport, service: JobServiceDep, services: ServicesDep
+    job_id: str,
+    attempt: AttemptQuery,
+    body: JobReport,
+    service: JobServiceDep,
+    services: ServicesDep,
+    revision: RevisionQuery = -1,
 ) -> JobOrders:
     """A sign of life; 409 where the job is no longer this attempt's."""
     await services.lanes.jobs.run(service.report, job_id, attempt, body.progress)
-    return JobOrders(watch=services.drivers.frames(job_id))
+    return _orders(services, job_id, revision)
 
 
 @router.post("/{job_id}/frames", dependencies=[WORK])
 async def take_frames(
-    job_id: str, attempt: AttemptQuery, request: Request, service: JobServiceDep, services: ServicesDep
+    job_id: str,
+    attempt: AttemptQuery,
+    request: Request,
+    service: JobServiceDep,
+    services: ServicesDep,
+    revision: RevisionQuery = -1,
 ) -> JobOrders:
     """Moments of a view; answered as a report."""
     frames = await request.body()
     await services.lanes.jobs.run(service.report, job_id, attempt, 0.0)
-    return JobOrders(watch=services.drivers.frames(job_id, frames))
+    return _orders(services, job_id, revision, frames)
+
+
+@router.post("/{job_id}/seen", dependencies=[WORK])
+async def take_seen(
+    job_id: str,
+    attempt: AttemptQuery,
+    seen: PlaySeen,
+    service: JobServiceDep,
+    services: ServicesDep,
+    revision: RevisionQuery = -1,
+) -> JobOrders:
+    """What a playground's worker sees coming; answered as a report."""
+    await services.lanes.jobs.run(service.report, job_id, attempt, 0.0)
+    play = services.drivers.orders(job_id, revision, seen)
+    return JobOrders(watch=services.drivers.frames(job_id), play=play)
+
+
+def _orders(services: Services, job_id: str, revision: int, frames: bytes | None = None) -> JobOrders:
+    watch = services.drivers.frames(job_id, frames)
+    return JobOrders(watch=watch, play=services.drivers.orders(job_id, revision))
 
 
 # The store has a cap of its own.

@@ -9,11 +9,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.actions import action_layout, twists
+from sim.actions import action_layout
 from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
 from sim.envs.render import render_robot
-from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.observations import observation_layout
 from sim.rewards import term_names
 from sim.world import Restart, World
@@ -167,9 +166,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
 
     def twists(self) -> Floats:
         """(N, 3) speeds forwards and to the left, m/s, and turning rate, rad/s, of the middle of each body; likewise."""
-        robots = self._world.robots
-        fastest, turning = robots.drawn[:, [MAX_LINEAR, MAX_ANGULAR]].T
-        return twists(self.task.robot, self._world.followed(), fastest, turning).astype(np.float32)
+        return self._world.twists()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode for every robot.

@@ -71,6 +71,7 @@ TABLE = {
         GET /api/policies/{name}/bundle
         GET /api/policies/{name}/live
         PUT /api/policies/{name}/live
+        POST /api/playgrounds
         GET /api/policies/{name}/suites/{suite}/replays/{episode}
         GET /replays/policies/{name}/{suite}/{episode}/{theme}/
     """,
@@ -80,6 +81,7 @@ TABLE = {
         DELETE /api/workbench/views/{view_id}
         POST /api/experiments
         POST /api/evaluations
+        POST /api/playgrounds/{playground_id}/arena
         POST /api/uploads
         POST /api/reproduction
         POST /api/studies
@@ -181,6 +183,12 @@ TABLE = {
         GET /api/audit
         GET /api/audit/csv
     """,
+    "own playground": """
+        GET /api/playgrounds/{playground_id}
+        DELETE /api/playgrounds/{playground_id}
+        PUT /api/playgrounds/{playground_id}/settings
+        POST /api/playgrounds/{playground_id}/changes
+    """,
     "own account": """
         PUT /api/account/password
         GET /api/account/sessions
@@ -211,6 +219,7 @@ TABLE = {
         GET /api/worker/jobs/{job_id}/archive
         POST /api/worker/jobs/{job_id}/report
         POST /api/worker/jobs/{job_id}/frames
+        POST /api/worker/jobs/{job_id}/seen
         PUT /api/worker/jobs/{job_id}/result
         POST /api/worker/jobs/{job_id}/end
     """,
@@ -237,6 +246,8 @@ ANSWERS: dict[str, dict[str, int]] = {
         "launch token": 403,
     },
     "administrate": {"administrator": OK, "owner": OK, "administrator's token": OK},
+    # The one in these tests was opened with the owner's token.
+    "own playground": {"owner": OK},
     "own account": {
         "owner": 403,
         "read token": 403,
@@ -283,6 +294,8 @@ def expected(permission: str, role: str) -> int:
         return ANSWERS["work"].get(role, 401)
     if role in ANSWERS["signed in"]:
         return ANSWERS["signed in"][role]
+    if permission == "own playground":
+        return ANSWERS[permission].get(role, 404)
     return ANSWERS[permission].get(role, 403 if permission in ("administrate", "scrape") else OK)
 
 
@@ -371,6 +384,7 @@ def everybody(
             searched = {"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}
             wanted = {"name": "Search", "project_id": here, "training": {}, "settings": [searched]}
             study = client.post("/api/studies", json=wanted).json()
+            ground = client.post("/api/playgrounds", json={"policy": {"source": "shipped", "name": "simple"}}).json()
             del client.headers["Authorization"]
             people = {role: lab.person(role, {here: role}) for role in get_args(Role)}
             people["foreigner"] = lab.person("foreigner", {elsewhere: "admin"})
@@ -399,6 +413,7 @@ def everybody(
                 "upload_id": upload["id"],
                 "evaluation_id": evaluation["id"],
                 "study_id": study["id"],
+                "playground_id": ground["id"],
                 "campaign_id": campaign.json()["campaign"]["id"],
                 "theme": "light",
                 "step": "1",

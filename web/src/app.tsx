@@ -70,6 +70,10 @@ export const routes: RouteObject[] = [
             lazy: async () => ({ Component: (await import('./pages/StudyPage')).StudyPage }),
           },
           {
+            path: 'playground/:playgroundId?',
+            lazy: async () => ({ Component: (await import('./pages/PlaygroundPage')).PlaygroundPage }),
+          },
+          {
             path: 'reproduction',
             lazy: async () => ({ Component: (await import('./pages/ReproductionPage')).ReproductionPage }),
           },

@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actions import action_layout, twists
+from sim.arenas import build_task_arenas
 from sim.arrays import PolicyFunction
 from sim.config import ArenaPool, TaskConfig
 from sim.drivers import Driver
-from sim.envs.vector import NavigationVectorEnv
 from sim.scan import scan
+from sim.world import World
 from workers.frames import Frame
 
 
@@ -58,38 +59,47 @@ class Showcase:
     Args:
         task: environment of the training.
         robots: how many.
+
+    Attributes:
+        world: where they drive; another one of as many robots may take its place between two steps.
+        driver: who drives; None before the first step.
     """
 
     def __init__(self, task: TaskConfig, robots: int) -> None:
-        self._env = NavigationVectorEnv(_in_first_map(task), robots)
+        task = _in_first_map(task)
+        self.world = World(task, build_task_arenas(task), robots)
+        self.world.reset()
         self._lidar = task.lidar
         self._period = task.control_period
         self._robot = task.robot
         self._lows = np.array(action_layout(task.robot).lows, np.float32)
-        self._observations, _ = self._env.reset()
-        self._driver: Driver | None = None
+        self.driver: Driver | None = None
         self._sim_time = 0.0
         # Time into the control step that is being shown; the first one is yet to be made.
         self._into = self._period
         self._last_outcomes = np.zeros(robots, np.uint8)
-        self._begin()
-        self._velocities = np.zeros((robots, 3), np.float32)
-        self._moved = np.zeros_like(self._discs[:, :2])
+        self.look()
 
     @property
     def robots(self) -> int:
         """How many robots drive."""
-        return self._env.num_envs
+        return len(self.world)
+
+    def look(self) -> None:
+        """Show the world as it stands, at rest until the next control step: somebody has changed it."""
+        self._begin()
+        self._velocities = np.zeros((self.robots, 3), np.float32)
+        self._moved = np.zeros_like(self._discs[:, :2])
 
     def advance(self, policy: PolicyFunction, seconds: float) -> None:
         """Lets simulated time pass; at every control step the policy chooses anew."""
         self._sim_time += seconds
         self._into += seconds
-        self._driver = self._driver or Driver(policy, self.robots)
-        self._driver.policy = policy
+        self.driver = self.driver or Driver(policy, self.robots)
+        self.driver.policy = policy
         while self._into >= self._period:
             self._into -= self._period
-            self._step(self._driver)
+            self._step(self.driver)
 
     def frame(self, step: int, speed: float) -> Frame:
         """This moment.
@@ -109,7 +119,7 @@ class Showcase:
             speed=speed,
             poses=poses,
             targets=self._targets,
-            ranges=scan(self._env.arenas[0], poses, self._lidar, movers=movers, fields_of_view=self._fields),
+            ranges=scan(self.world.arenas[0], poses, self._lidar, movers=movers, fields_of_view=self._fields),
             fields_of_view=self._fields,
             rewards=self._rewards,
             outcomes=self._outcomes,
@@ -119,22 +129,22 @@ class Showcase:
     def _step(self, driver: Driver) -> None:
         """One control step. What is shown during it is how things stood when it began."""
         self._begin()
-        actions = np.clip(driver(self._observations), self._lows, 1.0).astype(np.float32)
-        self._observations, _, terminations, truncations, _ = self._env.step(actions)
+        world, robots = self.world, self.world.robots
+        actions = np.clip(driver(robots.observations), self._lows, 1.0).astype(np.float32)
+        world.step(actions)
         # Late or slow, robots drive otherwise than commanded; of those that stand at a new start, that is all we know.
-        driver.forget(terminations | truncations)
-        anew = (terminations | truncations)[:, None]
-        self._velocities = np.where(anew, twists(self._robot, actions).astype(np.float32), self._env.twists())
-        self._moved = self._env.discs[0, :, 3:].copy()
-        ended = self._env.outcomes > 0
-        self._last_outcomes[ended] = self._env.outcomes[ended]
+        ended = robots.terminations | robots.truncations
+        driver.forget(ended)
+        self._velocities = np.where(ended[:, None], twists(self._robot, actions).astype(np.float32), world.twists())
+        self._moved = world.movers.discs[0, :, 3:].copy()
+        self._last_outcomes = np.where(robots.outcomes > 0, robots.outcomes, self._last_outcomes)
 
     def _begin(self) -> None:
-        env = self._env
-        self._poses = env.poses.copy()
-        self._targets = env.targets.copy()
-        self._fields = env.fields_of_view.astype(np.float32)
+        robots = self.world.robots
+        self._poses = robots.poses.copy()
+        self._targets = robots.targets.copy()
+        self._fields = self.world.fields_of_view.astype(np.float32)
         # A reward that belongs to an attempt that has just ended is history.
-        self._rewards = np.where(env.outcomes > 0, 0.0, env.attempt_rewards).astype(np.float32)
+        self._rewards = np.where(robots.outcomes > 0, 0.0, robots.records["attempt_reward"]).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()
-        self._discs = env.discs[0, :, :3].copy()
+        self._discs = self.world.movers.discs[0, :, :3].copy()

@@ -1277,6 +1277,110 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/playgrounds": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Open Playground
+         * @description Let a policy drive somewhere; it does while somebody watches.
+         */
+        post: operations["open_playground_api_playgrounds_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/playgrounds/{playground_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Playground
+         * @description Everything in it as it is now.
+         */
+        get: operations["get_playground_api_playgrounds__playground_id__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Close Playground
+         * @description Forget it.
+         */
+        delete: operations["close_playground_api_playgrounds__playground_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/playgrounds/{playground_id}/arena": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep Arena
+         * @description Put the arena as it stands into the gallery, the robot's place as its start: it can be trained on at once.
+         */
+        post: operations["keep_arena_api_playgrounds__playground_id__arena_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/playgrounds/{playground_id}/changes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Change Playground
+         * @description Put something somewhere, push the robot, or let a paused one make its next steps.
+         */
+        post: operations["change_playground_api_playgrounds__playground_id__changes_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/playgrounds/{playground_id}/settings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Playground Settings
+         * @description How it drives, what it perceives and what is shown.
+         */
+        put: operations["change_playground_settings_api_playgrounds__playground_id__settings_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/policies": {
         parameters: {
             query?: never;
@@ -3849,6 +3953,45 @@ export interface components {
             step: number;
         };
         /**
+         * Choose
+         * @description What has handles in the 3D view; nothing where `thing` is null.
+         */
+        "Choose-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "choose";
+            /**
+             * Index
+             * @description Among those of its kind.
+             * @default 0
+             */
+            index: number;
+            /** Thing */
+            thing?: ("robot" | "target" | "mover" | "circle" | "box") | null;
+        };
+        /**
+         * Choose
+         * @description What has handles in the 3D view; nothing where `thing` is null.
+         */
+        "Choose-Output": {
+            /**
+             * Act
+             * @default choose
+             * @constant
+             */
+            act: "choose";
+            /**
+             * Index
+             * @description Among those of its kind.
+             * @default 0
+             */
+            index: number;
+            /** Thing */
+            thing: ("robot" | "target" | "mover" | "circle" | "box") | null;
+        };
+        /**
          * Circle
          * @description A round obstacle.
          */
@@ -5832,7 +5975,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "view" | "replay" | "export" | "evaluate";
+            kind: "view" | "play" | "replay" | "export" | "evaluate";
             /**
              * Progress
              * @description Share of the work that is done, 0 to 1.
@@ -5943,6 +6086,22 @@ export interface components {
              * @description So many newest ones; null for all, and then nothing goes.
              */
             last: number | null;
+        };
+        /**
+         * KeptArena
+         * @description An arena that is in the gallery now.
+         */
+        KeptArena: {
+            /** @description What a task's `arena` must be to train on it. */
+            config: components["schemas"]["ImportedArenaConfig-Output"];
+        };
+        /**
+         * KeptArenaName
+         * @description What an arena is to be called.
+         */
+        KeptArenaName: {
+            /** Name */
+            name: string;
         };
         /**
          * Keyframe
@@ -7419,6 +7578,205 @@ export interface components {
             name: string;
         };
         /**
+         * Playground
+         * @description One of a person's playgrounds, as it is at the moment.
+         */
+        Playground: {
+            /** Arrivals */
+            arrivals: number;
+            chosen: components["schemas"]["Choose-Output"];
+            /** Collisions */
+            collisions: number;
+            /**
+             * Driving
+             * @description Whether a worker drives; it does while somebody watches.
+             */
+            driving: boolean;
+            /** @description What stands in it now, and what moves. */
+            geometry: components["schemas"]["ArenaFile-Output"];
+            /** Id */
+            id: string;
+            /**
+             * Movers
+             * @description Those that found room.
+             */
+            movers: components["schemas"]["Standing"][];
+            /**
+             * Outcome
+             * @description How its attempt is about to end; null where that takes longer.
+             */
+            outcome: ("arrival" | "collision" | "timeout") | null;
+            /**
+             * Policy
+             * @description For people.
+             */
+            policy: string;
+            /**
+             * Problem
+             * @description What could not be done.
+             */
+            problem: string | null;
+            /**
+             * Reward
+             * @description Since the last target.
+             */
+            reward: number;
+            /** @description Null until it drives. */
+            robot: components["schemas"]["Standing"] | null;
+            /**
+             * Seconds
+             * @description Until then, simulated.
+             */
+            seconds: number | null;
+            settings: components["schemas"]["PlaygroundSettings-Output"];
+            /**
+             * Sim Time
+             * @description Simulated seconds since it began.
+             */
+            sim_time: number;
+            target: components["schemas"]["Standing"] | null;
+            /** Timeouts */
+            timeouts: number;
+            /**
+             * Value
+             * @description Discounted sum of the rewards that it is about to collect, driven ahead.
+             */
+            value: number | null;
+        };
+        /**
+         * PlaygroundRequest
+         * @description A policy, and where it is to drive.
+         */
+        PlaygroundRequest: {
+            /**
+             * Arena
+             * @description Of a family the first map; null for the policy's own.
+             */
+            arena?: (components["schemas"]["ArenaConfig-Input"] | components["schemas"]["GeneratedArenaConfig-Input"] | components["schemas"]["ImportedArenaConfig-Input"]) | null;
+            /** Policy */
+            policy: components["schemas"]["CheckpointPolicy-Input"] | components["schemas"]["ShippedPolicyName-Input"] | components["schemas"]["UploadedPolicy-Input"];
+        };
+        /**
+         * PlaygroundSettings
+         * @description How it drives, what it perceives and what is shown.
+         *
+         *     Attributes:
+         *         rays: whether LiDAR rays are drawn.
+         *         follow: whether the camera stays with the robot.
+         */
+        "PlaygroundSettings-Input": {
+            /**
+             * Blind Direction
+             * @default 0
+             */
+            blind_direction: number;
+            /**
+             * Blind Width
+             * @default 0
+             */
+            blind_width: number;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay: number;
+            /**
+             * Dropout
+             * @default 0
+             */
+            dropout: number;
+            /**
+             * Field
+             * @default false
+             */
+            field: boolean;
+            /**
+             * Follow
+             * @default false
+             */
+            follow: boolean;
+            /**
+             * Noise
+             * @default 0
+             */
+            noise: number;
+            /**
+             * Paused
+             * @default false
+             */
+            paused: boolean;
+            /**
+             * Rays
+             * @default true
+             */
+            rays: boolean;
+            /**
+             * Speed
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
+         * PlaygroundSettings
+         * @description How it drives, what it perceives and what is shown.
+         *
+         *     Attributes:
+         *         rays: whether LiDAR rays are drawn.
+         *         follow: whether the camera stays with the robot.
+         */
+        "PlaygroundSettings-Output": {
+            /**
+             * Blind Direction
+             * @default 0
+             */
+            blind_direction: number;
+            /**
+             * Blind Width
+             * @default 0
+             */
+            blind_width: number;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay: number;
+            /**
+             * Dropout
+             * @default 0
+             */
+            dropout: number;
+            /**
+             * Field
+             * @default false
+             */
+            field: boolean;
+            /**
+             * Follow
+             * @default false
+             */
+            follow: boolean;
+            /**
+             * Noise
+             * @default 0
+             */
+            noise: number;
+            /**
+             * Paused
+             * @default false
+             */
+            paused: boolean;
+            /**
+             * Rays
+             * @default true
+             */
+            rays: boolean;
+            /**
+             * Speed
+             * @default 1
+             */
+            speed: number;
+        };
+        /**
          * PolicyEpisodes
          * @description Every episode of a shipped policy on a suite, in the suite's order.
          */
@@ -7860,6 +8218,141 @@ export interface components {
              * @default -5
              */
             weight: number;
+        };
+        /**
+         * Push
+         * @description The robot is shoved aside, as far as there is room.
+         */
+        Push: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "push";
+            /**
+             * Direction
+             * @description Against its heading, to the left.
+             * @default 90
+             */
+            direction: number;
+            /**
+             * Distance
+             * @description Metres.
+             * @default 0.3
+             */
+            distance: number;
+        };
+        /**
+         * PutBox
+         * @description A rectangular obstacle stands here now.
+         */
+        PutBox: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "put box";
+            /**
+             * Angle
+             * @default 0
+             */
+            angle: number;
+            /**
+             * Index
+             * @description Among the rectangular ones; null for a new one.
+             */
+            index?: number | null;
+            /**
+             * Length
+             * @default 1
+             */
+            length: number;
+            /**
+             * Width
+             * @default 0.4
+             */
+            width: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * PutCircle
+         * @description A round obstacle stands here now.
+         */
+        PutCircle: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "put circle";
+            /**
+             * Index
+             * @description Among the round ones; null for a new one.
+             */
+            index?: number | null;
+            /**
+             * Radius
+             * @default 0.3
+             */
+            radius: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * PutMover
+         * @description Somebody who moves stands somewhere else, and goes on from there.
+         */
+        PutMover: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "put mover";
+            /**
+             * Index
+             * @description Among those that are there.
+             */
+            index: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * PutRobot
+         * @description The robot stands somewhere else, at rest; its attempt begins anew.
+         */
+        PutRobot: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "put robot";
+            /** Heading */
+            heading: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * PutTarget
+         * @description The robot is to go somewhere else; its attempt begins anew.
+         */
+        PutTarget: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "put target";
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
         };
         /**
          * QueuePage
@@ -8357,6 +8850,24 @@ export interface components {
              * @default 0.4
              */
             width: number;
+        };
+        /**
+         * Remove
+         * @description An obstacle is gone; those after it move up.
+         */
+        Remove: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "remove";
+            /** Index */
+            index: number;
+            /**
+             * Thing
+             * @enum {string}
+             */
+            thing: "circle" | "box";
         };
         /**
          * Replay
@@ -9489,6 +10000,26 @@ export interface components {
             mean: number;
         };
         /**
+         * Standing
+         * @description Where something is now; heading in degrees.
+         */
+        Standing: {
+            /**
+             * Heading
+             * @default 0
+             */
+            heading: number;
+            /**
+             * Radius
+             * @default 0
+             */
+            radius: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
          * Start
          * @description Where a robot starts; heading in degrees against the x axis, anticlockwise.
          */
@@ -9629,6 +10160,22 @@ export interface components {
             version: string;
             /** Workers */
             workers: components["schemas"]["WorkerStatus"][];
+        };
+        /**
+         * Steps
+         * @description While it is paused: the next control steps.
+         */
+        Steps: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            act: "step";
+            /**
+             * Count
+             * @default 1
+             */
+            count: number;
         };
         /**
          * Storage
@@ -14897,6 +15444,321 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["NewInvitation"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    open_playground_api_playgrounds_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PlaygroundRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Playground"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_playground_api_playgrounds__playground_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                playground_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Playground"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    close_playground_api_playgrounds__playground_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                playground_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    keep_arena_api_playgrounds__playground_id__arena_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                playground_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["KeptArenaName"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptArena"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_playground_api_playgrounds__playground_id__changes_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                playground_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PutRobot"] | components["schemas"]["PutTarget"] | components["schemas"]["PutMover"] | components["schemas"]["Push"] | components["schemas"]["Steps"] | components["schemas"]["PutCircle"] | components["schemas"]["PutBox"] | components["schemas"]["Remove"] | components["schemas"]["Choose-Input"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Playground"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_playground_settings_api_playgrounds__playground_id__settings_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                playground_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PlaygroundSettings-Input"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Playground"];
                 };
             };
             /** @description No valid login */

@@ -4,7 +4,7 @@ import { Link } from 'react-router'
 import type { Checkpoint } from '../api/types'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
-import { evaluate, policyKey } from './evaluations/choices'
+import { evaluate, play, policyKey } from './evaluations/choices'
 import { IconDownload } from './icons'
 import { SuccessEstimate } from './MeasuredEstimate'
 import { Message } from './ui'
@@ -138,6 +138,16 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                     aria-label={`Fine-tune step ${checkpoint.step}`}
                   >
                     Fine-tune
+                  </Button>
+                  <Button
+                    component={Link}
+                    to={play(policyKey('checkpoint', checkpoint.id))}
+                    size="compact-sm"
+                    variant="default"
+                    visibleFrom="sm"
+                    aria-label={`Play with step ${checkpoint.step}`}
+                  >
+                    Play
                   </Button>
                   <Button
                     component={Link}

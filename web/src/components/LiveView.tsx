@@ -95,44 +95,51 @@ interface LiveViewProps extends LiveControlsProps {
 }
 
 function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {
+  return (
+    <div>
+      <LiveFrame page={page} overlay={overlay} receiving={live?.status.receiving ?? false} />
+      <LiveControls live={live} change={change} driven={driven} />
+    </div>
+  )
+}
+
+interface LiveFrameProps extends Pick<LiveViewProps, 'page' | 'overlay'> {
+  /** Whether pictures come. */
+  receiving: boolean
+}
+
+/** The page in 3D, what stands in its place, and the way to see it as large as the screen. */
+export function LiveFrame({ page, overlay, receiving }: LiveFrameProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const box = useRef<HTMLDivElement>(null)
   return (
-    <div>
-      <div
-        ref={box}
-        className={classes.view}
-        data-testid="live-view"
-        data-receiving={live?.status.receiving ?? false}
-      >
-        {page && (
-          <iframe
-            key={`${dark}`}
-            title="The robots in 3D"
-            src={`${page}${dark ? '?darkMode' : ''}`}
-            allow="fullscreen"
-            data-testid="live-frame"
-          />
-        )}
-        {overlay && (
-          <div className={classes.overlay} role="status" data-testid="live-overlay">
-            {overlay}
-          </div>
-        )}
-        {page && (
-          <Tooltip label="Full screen">
-            <ActionIcon
-              className={classes.full}
-              variant="default"
-              aria-label="Full screen"
-              onClick={() => void box.current?.requestFullscreen()}
-            >
-              <IconMaximize size={16} />
-            </ActionIcon>
-          </Tooltip>
-        )}
-      </div>
-      <LiveControls live={live} change={change} driven={driven} />
+    <div ref={box} className={classes.view} data-testid="live-view" data-receiving={receiving}>
+      {page && (
+        <iframe
+          key={`${dark}`}
+          title="The robots in 3D"
+          src={`${page}${dark ? '?darkMode' : ''}`}
+          allow="fullscreen"
+          data-testid="live-frame"
+        />
+      )}
+      {overlay && (
+        <div className={classes.overlay} role="status" data-testid="live-overlay">
+          {overlay}
+        </div>
+      )}
+      {page && (
+        <Tooltip label="Full screen">
+          <ActionIcon
+            className={classes.full}
+            variant="default"
+            aria-label="Full screen"
+            onClick={() => void box.current?.requestFullscreen()}
+          >
+            <IconMaximize size={16} />
+          </ActionIcon>
+        </Tooltip>
+      )}
     </div>
   )
 }
@@ -201,7 +208,7 @@ function changing(
 }
 
 /** False once the tab has been hidden for a while: then nothing is sent. */
-function useWatching(): boolean {
+export function useWatching(): boolean {
   const [watching, setWatching] = useState(true)
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined

@@ -3,7 +3,7 @@ import { Button, Menu } from '@mantine/core'
 import { Link } from 'react-router'
 import type { ShippedPolicy } from '../api/types'
 import { fileSize } from '../lib/format'
-import { evaluate, policyKey } from './evaluations/choices'
+import { evaluate, play, policyKey } from './evaluations/choices'
 import { IconCopy, IconDownload, IconPencil } from './icons'
 
 interface PolicyActionsProps {
@@ -35,6 +35,15 @@ export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
           </Menu.Item>
         </Menu.Dropdown>
       </Menu>
+      <Button
+        component={Link}
+        to={play(policyKey('shipped', policy.name))}
+        variant="default"
+        size={size}
+        aria-label={`Play with ${policy.title}`}
+      >
+        Play
+      </Button>
       <Button
         component={Link}
         to={evaluate([policyKey('shipped', policy.name)])}

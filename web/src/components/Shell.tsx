@@ -55,6 +55,7 @@ export function Shell() {
             </NavLink>
             <NavLink to="/policies">Policies</NavLink>
             <NavLink to="/arenas">Arenas</NavLink>
+            <NavLink to="/playground">Play</NavLink>
             <NavLink to="/reproduction">Paper</NavLink>
             <NavLink to="/queue">Queue</NavLink>
           </nav>

@@ -22,10 +22,10 @@ from workers.runtime.jobs.place import Place, forkserver
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.supervised import end_with_supervisor
 
-_VIEWS: tuple[JobKind, ...] = ("view",)
+_VIEWS: tuple[JobKind, ...] = ("view", "play")
 _WAITED_FOR: tuple[JobKind, ...] = ("replay", "export")
-_ALL_BUT_VIEWS: tuple[JobKind, ...] = tuple(kind for kind in KINDS if kind != "view")
-# Of finished policies that are watched at a time; each takes a few per cent of a core.
+_ALL_BUT_VIEWS: tuple[JobKind, ...] = tuple(kind for kind in KINDS if kind not in _VIEWS)
+# Of finished policies that are watched or played with at a time; each takes a few per cent of a core.
 VIEW_PLACES = 4
 # Time to hand back what is under way.
 _END_SECONDS = 3.0

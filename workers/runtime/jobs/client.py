@@ -8,6 +8,7 @@ import httpx
 
 from workers.errors import ArchiveIntegrityError
 from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobKind, JobOrders, JobReport
+from workers.play_protocol import PlaySeen
 from workers.protocol import found_extensions
 from workers.runtime.client import ServerClient, check, read_answer, unavailable
 
@@ -25,14 +26,19 @@ class JobClient(ServerClient):
         response = self._send("POST", "/api/worker/jobs/claim", content=request.model_dump_json())
         return None if response.status_code == httpx.codes.NO_CONTENT else read_answer(JobClaim, response)
 
-    def report_job(self, job_id: str, attempt: int, progress: float) -> JobOrders:
-        """A sign of life."""
+    def report_job(self, job_id: str, attempt: int, progress: float, revision: int = -1) -> JobOrders:
+        """A sign of life; `revision` is that of a playground's orders that the worker has."""
         content = JobReport(progress=progress).model_dump_json()
-        return read_answer(JobOrders, self._job("POST", job_id, "report", attempt, content))
+        return read_answer(JobOrders, self._job("POST", job_id, "report", attempt, content, revision=str(revision)))
 
-    def send_frames(self, job_id: str, attempt: int, frames: bytes) -> JobOrders:
-        """Moments of a view, each after its length."""
-        return read_answer(JobOrders, self._job("POST", job_id, "frames", attempt, frames))
+    def send_frames(self, job_id: str, attempt: int, frames: bytes, revision: int = -1) -> JobOrders:
+        """Moments of a view, each after its length; see `report_job`."""
+        return read_answer(JobOrders, self._job("POST", job_id, "frames", attempt, frames, revision=str(revision)))
+
+    def send_seen(self, job_id: str, attempt: int, seen: PlaySeen, revision: int) -> JobOrders:
+        """What a playground's worker makes of the moment; see `report_job`."""
+        content = seen.model_dump_json()
+        return read_answer(JobOrders, self._job("POST", job_id, "seen", attempt, content, revision=str(revision)))
 
     def fetch_archive(self, job_id: str, attempt: int, sha256: str, path: Path) -> None:
         """The archive of the job's policy.

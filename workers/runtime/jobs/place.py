@@ -21,9 +21,9 @@ from workers.job_protocol import (
     JobEnd,
     JobKind,
     JobOrders,
-    ViewJob,
+    WatchedJob,
 )
-from workers.reporting import WatchRequest
+from workers.play_protocol import PlaySeen
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.process import ARCHIVE, RESULT, Done, Failed, Progressed, Said, main
@@ -34,7 +34,7 @@ _CLAIM_WAIT_SECONDS = 10.0
 _RETRY_SECONDS = 0.5
 _REPORT_SECONDS = 1.0
 _LOOK_SECONDS = 0.05
-# Of all but views: a policy from elsewhere may compute for ever.
+# Of all but what is watched: a policy from elsewhere may compute for ever.
 MAX_SECONDS = 3_600.0
 # Two frames in one request: half the requests, and a thirtieth of a second that nobody sees.
 _FRAMES_AT_ONCE = 2
@@ -42,7 +42,7 @@ _ERROR_CHARACTERS = 9_000
 # A process that has said its last word has nothing left to do.
 _EXIT_SECONDS = 2.0
 
-Pipe: TypeAlias = "Connection[WatchRequest | None, Said]"
+Pipe: TypeAlias = "Connection[JobOrders, Said]"
 
 
 def forkserver() -> ForkServerContext:
@@ -149,7 +149,7 @@ class Place:
                 process.join(_EXIT_SECONDS if not self._ending.is_set() else 0.0)
                 process.kill()
                 process.join()
-        if end.outcome == "done" and not isinstance(claim.spec, ViewJob):
+        if end.outcome == "done" and not isinstance(claim.spec, WatchedJob):
             result = directory / RESULT
             self._patiently(lambda: self._client.bring_result(claim.id, claim.attempt, result), claim.lease_seconds)
         return end
@@ -179,9 +179,10 @@ class _Watch:
         self._ending = ending
         self._progress = 0.0
         self._frames: list[bytes] = []
-        self._told: WatchRequest | None = None
-        self._said = False
-        self._deadline = math.inf if isinstance(claim.spec, ViewJob) else time.monotonic() + MAX_SECONDS
+        self._told: JobOrders | None = None
+        # The newest orders of a playground that its process has.
+        self._revision = -1
+        self._deadline = math.inf if isinstance(claim.spec, WatchedJob) else time.monotonic() + MAX_SECONDS
 
     def until_ended(self) -> JobEnd:
         """How the process ended.
@@ -212,6 +213,8 @@ class _Watch:
                     if len(self._frames) >= _FRAMES_AT_ONCE:
                         due = time.monotonic() + _REPORT_SECONDS
                         self._send_frames()
+                case PlaySeen():
+                    self._send_seen(said)
                 case Progressed():
                     self._progress = said.share
                 case Failed():
@@ -222,7 +225,7 @@ class _Watch:
 
     def _report(self) -> None:
         try:
-            self._obey(self._client.report_job(self._claim.id, self._claim.attempt, self._progress))
+            self._obey(self._client.report_job(self._claim.id, self._claim.attempt, self._progress, self._revision))
         except ServerUnavailableError as error:
             # It may be back before the lease is over; if not, the next report is refused.
             logger.warning("job %s: %s", self._claim.id, error)
@@ -233,17 +236,26 @@ class _Watch:
         if len(packed) > MAX_FRAMES_BYTES:
             return
         try:
-            self._obey(self._client.send_frames(self._claim.id, self._claim.attempt, packed))
+            self._obey(self._client.send_frames(self._claim.id, self._claim.attempt, packed, self._revision))
+        except ServerUnavailableError as error:
+            logger.warning("job %s: %s", self._claim.id, error)
+
+    def _send_seen(self, seen: PlaySeen) -> None:
+        try:
+            self._obey(self._client.send_seen(self._claim.id, self._claim.attempt, seen, self._revision))
         except ServerUnavailableError as error:
             logger.warning("job %s: %s", self._claim.id, error)
 
     def _obey(self, orders: JobOrders) -> None:
-        if isinstance(self._claim.spec, ViewJob) and (orders.watch != self._told or not self._said):
-            self._told, self._said = orders.watch, True
-            try:
-                self._pipe.send(orders.watch)
-            except BrokenPipeError:
-                return  # it has ended, and whoever waits for it notices
+        if not isinstance(self._claim.spec, WatchedJob) or orders == self._told:
+            return
+        self._told = orders.model_copy(update={"play": None})
+        if orders.play is not None:
+            self._revision = orders.play.revision
+        try:
+            self._pipe.send(orders)
+        except BrokenPipeError:
+            return  # it has ended, and whoever waits for it notices
 
     def _died(self) -> JobEnd:
         self._process.join(_EXIT_SECONDS)

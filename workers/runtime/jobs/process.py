@@ -4,6 +4,7 @@ Processes are forked from one that has imported all that they need (`workers.run
 of a view comes in a fraction of a second. Each does one job and ends; a crash takes nothing else along.
 """
 
+import contextlib
 import os
 import signal
 import threading
@@ -16,7 +17,18 @@ from pathlib import Path
 from sim.errors import SimError
 from workers.errors import WorkerError
 from workers.frames import Frame
-from workers.job_protocol import JOB_SPEC, BaselineName, EvaluateJob, ExportJob, Measurement, ReplayJob, ViewJob
+from workers.job_protocol import (
+    JOB_SPEC,
+    BaselineName,
+    EvaluateJob,
+    ExportJob,
+    JobOrders,
+    Measurement,
+    PlayJob,
+    ReplayJob,
+    ViewJob,
+)
+from workers.play_protocol import PlaySeen
 from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
@@ -47,34 +59,40 @@ class Done:
     """All is done, and the result, where there is one, is complete on disk."""
 
 
-Said = Progressed | Failed | Done | bytes
-"""What a job's process says; bytes are an encoded frame of a view."""
+Said = Progressed | Failed | Done | PlaySeen | bytes
+"""What a job's process says; bytes are an encoded frame of a view or a playground."""
 
 
-def main(spec: str, directory: str, connection: "Connection[Said, WatchRequest | None]") -> None:
+def main(spec: str, directory: str, connection: "Connection[Said, JobOrders]") -> None:
     """Do a job.
 
     Args:
         spec: a `JobSpec` as JSON.
         directory: the job's folder.
-        connection: to the place; what comes in are the wishes of whoever watches.
+        connection: to the place; what comes in are the orders of whoever watches.
     """
     die_with_parent(os.getppid())
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    last: Said
     try:
         _do(spec, Path(directory), connection)
     except (WorkerError, SimError, OSError, ValueError, KeyError) as error:
-        connection.send(Failed(str(error.args[0]) if error.args else type(error).__name__))
+        last = Failed(str(error.args[0]) if error.args else type(error).__name__)
     else:
-        connection.send(Done())
+        last = Done()
+    # The place may have stopped listening: nobody wants the job any more.
+    with contextlib.suppress(BrokenPipeError):
+        connection.send(last)
 
 
-def _do(text: str, directory: Path, connection: "Connection[Said, WatchRequest | None]") -> None:
+def _do(text: str, directory: Path, connection: "Connection[Said, JobOrders]") -> None:
     spec = JOB_SPEC.validate_json(text)
     archive, result = directory / ARCHIVE, directory / RESULT
     match spec:
         case ViewJob():
             _drive(archive, connection)
+        case PlayJob():
+            _play(archive, spec, connection)
         case ReplayJob():
             from workers.replays.record import record
 
@@ -87,7 +105,7 @@ def _do(text: str, directory: Path, connection: "Connection[Said, WatchRequest |
             result.write_text(_evaluate(spec, archive, connection).model_dump_json(), encoding="utf-8")
 
 
-def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, WatchRequest | None]") -> Measurement:
+def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, JobOrders]") -> Measurement:
     from workers.training.measuring import measure
 
     told = time.monotonic()
@@ -108,7 +126,7 @@ def _archive_of(spec: EvaluateJob | ReplayJob, archive: Path) -> Path | None:
 class _Screen:
     """A reporter that sends frames over a pipe."""
 
-    def __init__(self, connection: "Connection[Said, WatchRequest | None]") -> None:
+    def __init__(self, connection: "Connection[Said, JobOrders]") -> None:
         self._connection = connection
         self._lock = threading.Lock()
         self.watch: WatchRequest | None = None
@@ -136,7 +154,7 @@ class _Screen:
         return False
 
 
-def _drive(archive: Path, connection: "Connection[Said, WatchRequest | None]") -> None:
+def _drive(archive: Path, connection: "Connection[Said, JobOrders]") -> None:
     """Drive for whoever watches, until nobody is left to say what to show."""
     from sim.arenas import with_maps_of
     from workers.checkpoints import read_policy
@@ -147,7 +165,7 @@ def _drive(archive: Path, connection: "Connection[Said, WatchRequest | None]") -
     viewer = LiveViewer(with_maps_of(manifest.training.task, manifest.seed), screen)
     try:
         while True:
-            wish = connection.recv()
+            wish = connection.recv().watch
             # There are no training robots any more.
             screen.watch = None if wish is None else wish.model_copy(update={"mode": "policy"})
             viewer.on_weights(lambda: policy, manifest.step)
@@ -155,3 +173,25 @@ def _drive(archive: Path, connection: "Connection[Said, WatchRequest | None]") -
         return
     finally:
         viewer.close()
+
+
+class _Audience:
+    """Hears of a playground at the other end of a pipe."""
+
+    def __init__(self, connection: "Connection[Said, JobOrders]") -> None:
+        self._connection = connection
+
+    def frame(self, frame: bytes) -> None:
+        """See `workers.live.playing.Audience`."""
+        self._connection.send(frame)
+
+    def seen(self, seen: PlaySeen) -> None:
+        """See `workers.live.playing.Audience`."""
+        self._connection.send(seen)
+
+
+def _play(archive: Path, job: PlayJob, connection: "Connection[Said, JobOrders]") -> None:
+    """Drive as whoever plays says, until nobody is left to."""
+    from workers.live.playing import open_playground, play
+
+    play(open_playground(archive, job), connection, _Audience(connection))

@@ -3,6 +3,7 @@
 import numpy as np
 
 import workers.export.bundle
+import workers.live.playing
 import workers.live.viewer
 import workers.replays.record
 import workers.training.evaluation  # noqa: F401 - each is needed by a job

@@ -90,3 +90,6 @@ export function evaluate(policies: readonly string[], suites: readonly string[] 
   for (const each of suites) query.append('suite', each)
   return `/evaluations?${query}`
 }
+
+/** The address of the form that opens a playground, with a policy chosen. */
+export const play = (policy: string): string => `/playground?${new URLSearchParams({ policy })}`

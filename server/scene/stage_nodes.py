@@ -1,0 +1,229 @@
+"""The nodes of a playground: obstacles that move, the way ahead, arrows, and handles to drag things by.
+
+A click chooses what it meets, or puts the target where it meets the floor; what is chosen has handles. Both come from
+browsers, and are checked before they are believed: by the bridge as messages, by the playground as wishes.
+"""
+
+import math
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from server.scene.stage import Stage, StagePicture
+from server.scene.themes import OUTCOMES, Colours, linear
+from sim.config import TaskConfig
+from workers.frames import Frame
+
+HANDLE = "/world/handle"
+"""The node with the handles."""
+
+_WORLD = "/world"
+OBSTACLE_HEIGHT = 0.45
+_WAY_HEIGHT = 0.03
+_ARROW_HEIGHT = 0.015
+_ARROW_HEAD = 0.35
+_HEAD_ANGLE = 2.6
+# What a click may miss something by, metres.
+_REACH = 0.12
+# Heights at which a click's ray is looked at, from the top of an obstacle to the floor, metres.
+_HEIGHTS = np.linspace(OBSTACLE_HEIGHT, 0.0, 10)
+_NAMES: dict[str | None, int] = {None: 0, "arrival": 1, "collision": 2, "timeout": 3}
+
+
+class StageNodes:
+    """The nodes of a stage in one scene.
+
+    Args:
+        server: where they live.
+        world: the node below which everything hangs.
+        stage: whose.
+        task: for the robot's size.
+        colours: of the theme.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, world: viser.FrameHandle, stage: Stage, task: TaskConfig, colours: Colours
+    ) -> None:
+        self._server, self._world, self._stage, self._colours = server, world, stage, colours
+        self._robot_radius = task.robot.circumscribed_radius
+        self._obstacles: dict[tuple[str, int], tuple[tuple[float, ...], viser.SceneNodeHandle]] = {}
+        self._way: viser.LineSegmentsHandle | None = None
+        self._arrows: viser.LineSegmentsHandle | None = None
+        self._drawn: tuple[bytes, bytes] = b"", b""
+        self._chosen: tuple[str, int] | None = None
+        self._handle: viser.TransformControlsHandle | None = None
+        self._dragging = False
+        self._frame: Frame | None = None
+        server.scene.on_click()(self._clicked)
+
+    def update(self, frame: Frame | None) -> None:
+        """Draws how things stand; None where nothing drives yet."""
+        self._frame = frame or self._frame
+        picture = self._stage.picture()
+        self._draw_obstacles(picture)
+        self._draw_lines(picture)
+        self._draw_handle(picture)
+
+    # -- drawing ----------------------------------------------------------------------------------------------------------
+
+    def _draw_obstacles(self, picture: StagePicture) -> None:
+        rows = [(("circle", index), tuple(row)) for index, row in enumerate(picture.circles.tolist())]
+        rows += [(("box", index), tuple(row)) for index, row in enumerate(picture.boxes.tolist())]
+        for key in self._obstacles.keys() - {key for key, _ in rows}:
+            self._obstacles.pop(key)[1].remove()
+        for key, row in rows:
+            shape, node = self._obstacles.get(key, ((), None))
+            if row == shape:
+                continue
+            if node is None or row[2:4] != shape[2:4]:
+                node = self._add(key, row)
+            node.position = (row[0], row[1], OBSTACLE_HEIGHT / 2)
+            if key[0] == "box":
+                node.wxyz = _turned(row[4])
+            self._obstacles[key] = row, node
+
+    def _add(self, key: tuple[str, int], row: tuple[float, ...]) -> viser.SceneNodeHandle:
+        """A node of that name; one that was there goes."""
+        name, colour = f"{_WORLD}/{key[0]}/{key[1]}", self._colours.obstacle
+        if key[0] == "circle":
+            return self._server.scene.add_cylinder(name, row[2], OBSTACLE_HEIGHT, colour, radial_segments=40)
+        return self._server.scene.add_box(name, colour, (2 * row[2], 2 * row[3], OBSTACLE_HEIGHT))
+
+    def _draw_lines(self, picture: StagePicture) -> None:
+        told = picture.way.tobytes() + str(picture.outcome).encode(), picture.arrows.tobytes()
+        if told[0] != self._drawn[0]:
+            line = np.column_stack([picture.way, np.full(len(picture.way), _WAY_HEIGHT)])
+            colour = linear(OUTCOMES[_NAMES[picture.outcome]])
+            self._way = self._lines("way", self._way, np.stack([line[:-1], line[1:]], axis=1), colour, 4.0)
+        if told[1] != self._drawn[1]:
+            colour = linear(self._colours.arrow)
+            self._arrows = self._lines("arrows", self._arrows, _arrow_lines(picture.arrows), colour, 2.0)
+        self._drawn = told
+
+    def _lines(
+        self,
+        name: str,
+        node: viser.LineSegmentsHandle | None,
+        lines: NDArray[np.float64],
+        colour: NDArray[np.uint8],
+        thickness: float,
+    ) -> viser.LineSegmentsHandle | None:
+        if node is not None:
+            node.remove()
+        if not len(lines):
+            return None
+        colours = np.broadcast_to(colour, (len(lines), 2, 3)).copy()
+        return self._server.scene.add_line_segments(
+            f"{_WORLD}/{name}", lines.astype(np.float32), colours, thickness=thickness, thickness_units="screen"
+        )
+
+    def _draw_handle(self, picture: StagePicture) -> None:
+        place = self._place(picture, picture.chosen)
+        if picture.chosen != self._chosen or place is None:
+            if self._handle is not None:
+                self._handle.remove()
+            self._handle, self._dragging = None, False
+            self._chosen = picture.chosen if place is not None else None
+        if place is None or self._chosen is None or self._dragging:
+            return
+        x, y, angle = place
+        if self._handle is None:
+            turns = self._chosen[0] in ("robot", "box")
+            self._handle = self._server.scene.add_transform_controls(
+                HANDLE,
+                scale=0.7,
+                line_width=4.0,
+                active_axes=(True, True, False),
+                disable_rotations=not turns,
+                depth_test=False,
+            )
+            self._handle.on_update(self._dragged)
+        position, turn = (x, y, 0.05), _turned(angle)
+        if not np.allclose(self._handle.position, position, atol=1e-3):
+            self._handle.position = position
+        if not np.allclose(self._handle.wxyz, turn, atol=1e-3):
+            self._handle.wxyz = turn
+
+    def _place(self, picture: StagePicture, chosen: tuple[str, int] | None) -> tuple[float, float, float] | None:
+        """x, y and angle of a thing; None where it is not there."""
+        thing, index = chosen or ("", 0)
+        frame = self._frame
+        if thing == "circle" and index < len(picture.circles):
+            return float(picture.circles[index, 0]), float(picture.circles[index, 1]), 0.0
+        if thing == "box" and index < len(picture.boxes):
+            x, y, _, _, angle = picture.boxes[index].tolist()
+            return x, y, angle
+        if frame is None:
+            return None
+        if thing == "robot":
+            x, y, angle = frame.poses[0].tolist()
+            return x, y, angle
+        if thing == "target":
+            return float(frame.targets[0, 0]), float(frame.targets[0, 1]), 0.0
+        if thing == "mover" and index < len(frame.movers):
+            return float(frame.movers[index, 0]), float(frame.movers[index, 1]), 0.0
+        return None
+
+    # -- what people do ---------------------------------------------------------------------------------------------------
+
+    def _dragged(self, event: viser.TransformControlsEvent) -> None:
+        self._dragging = event.phase != "end"
+        chosen = self._chosen
+        if chosen is None or event.phase == "start":
+            return
+        x, y, _ = event.target.position
+        w, _, _, z = event.target.wxyz
+        self._stage.put(*chosen, float(x), float(y), math.degrees(2.0 * math.atan2(float(z), float(w))) % 360.0)
+
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
+        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        if not (np.isfinite(origin).all() and np.isfinite(direction).all()) or abs(direction[2]) < 1e-6:
+            return
+        points = origin + ((_HEIGHTS - origin[2]) / direction[2])[:, None] * direction - np.array(self._world.position)
+        found = self._met(points)
+        if found is not None:
+            self._stage.choose(*found)
+            return
+        x, y, _ = points[-1].tolist()
+        self._stage.put("target", 0, x, y, 0.0)
+
+    def _met(self, points: NDArray[np.float64]) -> tuple[str, int] | None:
+        """The first thing on a ray's way (n, 3) down to the floor."""
+        picture, frame = self._stage.picture(), self._frame
+        rows = picture.boxes
+        for x, y, _ in points.tolist():
+            if frame is not None:
+                if math.hypot(*(frame.poses[0, :2] - (x, y)).tolist()) < self._robot_radius + _REACH:
+                    return "robot", 0
+                for index, (mx, my, radius) in enumerate(frame.movers.tolist()):
+                    if math.hypot(mx - x, my - y) < radius:
+                        return "mover", index
+            for index, (cx, cy, radius) in enumerate(picture.circles.tolist()):
+                if math.hypot(cx - x, cy - y) < radius:
+                    return "circle", index
+            for index, (bx, by, length, width, angle) in enumerate(rows.tolist()):
+                along = (x - bx) * math.cos(angle) + (y - by) * math.sin(angle)
+                across = (y - by) * math.cos(angle) - (x - bx) * math.sin(angle)
+                if abs(along) < length and abs(across) < width:
+                    return "box", index
+        return None
+
+
+def _turned(angle: float) -> tuple[float, float, float, float]:
+    return math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)
+
+
+def _arrow_lines(arrows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3 A, 2, 3) shafts and the two sides of each head."""
+    tails, tips = arrows[:, :2], arrows[:, 2:]
+    shafts = tips - tails
+    lines = [np.stack([tails, tips], axis=1)]
+    for turn in (_HEAD_ANGLE, -_HEAD_ANGLE):
+        cos, sin = math.cos(turn), math.sin(turn)
+        side = _ARROW_HEAD * np.column_stack(
+            [cos * shafts[:, 0] - sin * shafts[:, 1], sin * shafts[:, 0] + cos * shafts[:, 1]]
+        )
+        lines.append(np.stack([tips, tips + side], axis=1))
+    flat = np.concatenate(lines)
+    return np.concatenate([flat, np.full((*flat.shape[:2], 1), _ARROW_HEIGHT)], axis=2)

@@ -1,0 +1,63 @@
+"""A person puts a disc into a robot's way, by keyboard alone, and the robot goes round it."""
+
+import re
+
+import pytest
+from playwright.sync_api import BrowserContext, Page, expect
+
+pytestmark = pytest.mark.browser
+
+# Milliseconds: two busy cores, and rendering in software.
+SOON = 90_000
+
+
+def take(page: Page, thing: str) -> None:
+    """Chooses what is to be put somewhere."""
+    things = page.get_by_role("combobox", name="Handles on")
+    things.fill(thing)
+    things.press("ArrowDown")
+    things.press("Enter")
+    expect(things).to_have_value(thing)
+
+
+def type_places(page: Page, **places: float) -> None:
+    """Types where the chosen thing is to stand."""
+    for label, value in places.items():
+        page.get_by_role("textbox", name=re.compile(f"^{label}")).fill(f"{value}")
+    page.wait_for_timeout(500)
+
+
+def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) -> None:
+    page = context.new_page()
+    page.goto("/policies/complex")
+    page.get_by_role("link", name=re.compile("^Play with")).click()
+    page.get_by_role("combobox", name="Arena").click()
+    page.get_by_role("option", name="Simple").click()
+    page.get_by_role("button", name="Let it drive").click()
+    expect(page.get_by_test_id("outcome")).to_contain_text("It", timeout=SOON)
+    address = f"/api/playgrounds/{page.url.rsplit('/', 1)[1]}"
+
+    page.get_by_role("button", name="Pause").click()
+    take(page, "Robot")
+    type_places(page, x=-2, y=0, Heading=0)
+    take(page, "Target")
+    type_places(page, x=1.5, y=0)
+    expect(page.get_by_test_id("outcome")).to_contain_text("It arrives in", timeout=SOON)
+    straight = float(re.findall(r"[\d.]+", page.get_by_test_id("outcome").inner_text())[0])
+
+    # Into its way: what it sees coming is a longer way at once, before it has moved.
+    page.get_by_role("button", name="Add a disc").press("Enter")
+    expect(page.get_by_role("combobox", name="Handles on")).to_have_value("Disc 1")
+    type_places(page, x=-0.3, y=0.05, Radius=0.4)
+    expect(page.get_by_test_id("outcome")).not_to_contain_text(f"{straight:g} s", timeout=SOON)
+
+    ways = []
+    page.get_by_text("5×", exact=True).click()
+    page.get_by_role("button", name="Go on").click()
+    while "0 arrived" in page.get_by_test_id("tally").inner_text():
+        robot = context.request.get(address).json()["robot"]
+        ways.append((robot["x"], robot["y"]))
+        page.wait_for_timeout(100)
+    expect(page.get_by_test_id("tally")).to_contain_text("0 collided")
+    # The disc's edge is 0.35 m from the straight line on one side, 0.45 m on the other; the robot is 0.1 m wide.
+    assert max(abs(y) for x, y in ways if abs(x + 0.3) < 0.4) > 0.4

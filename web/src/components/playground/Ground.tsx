@@ -1,0 +1,102 @@
+/** An open playground: the picture, what time does, what stands where, what the robot perceives and makes of it. */
+import { Button, Group, SegmentedControl, Text } from '@mantine/core'
+import type { Playground } from '../../api/types'
+import { count, significant } from '../../lib/format'
+import { LiveFrame, useWatching } from '../LiveView'
+import { Notice, Panel } from '../ui'
+import classes from './Ground.module.css'
+import { KeepArena } from './KeepArena'
+import { Perception } from './Perception'
+import { Things } from './Things'
+import { useGround } from './useGround'
+
+const SPEEDS = [0.1, 0.5, 1, 2, 5]
+
+const ENDS = { arrival: 'arrives', collision: 'collides', timeout: 'runs out of time' } as const
+
+export function Ground({ ground }: { ground: Playground }) {
+  const watching = useWatching()
+  const actions = useGround(ground)
+  const { paused, speed } = ground.settings
+  return (
+    <div className={classes.ground} data-testid="playground" data-sim-time={ground.sim_time}>
+      <div className={classes.stage}>
+        <Panel flush>
+          <LiveFrame
+            page={watching ? `/live/${ground.id}/` : null}
+            overlay={watching ? null : 'It stands still while nobody looks.'}
+            receiving={ground.driving}
+          />
+          <fieldset className={classes.time} aria-label="Time">
+            <Group gap="xs">
+              <Button size="xs" variant="default" onClick={() => actions.configure({ paused: !paused })}>
+                {paused ? 'Go on' : 'Pause'}
+              </Button>
+              <Button
+                size="xs"
+                variant="default"
+                disabled={!paused}
+                onClick={() => actions.change({ act: 'step', count: 1 })}
+              >
+                One step
+              </Button>
+              <SegmentedControl
+                size="xs"
+                aria-label="Speed"
+                value={String(speed)}
+                onChange={(next) => actions.configure({ speed: Number(next) })}
+                data={SPEEDS.map((each) => ({ value: String(each), label: `${each}×` }))}
+              />
+            </Group>
+            <Text size="xs" c="dimmed" mt={6}>
+              Click the floor: the target goes there. Click a thing: it gets handles to drag it by.
+            </Text>
+          </fieldset>
+        </Panel>
+        <Panel title="What it sees coming">
+          <dl className={classes.facts} data-testid="foresight">
+            <div>
+              <dt>Ahead</dt>
+              <dd data-testid="outcome">
+                {ground.seconds === null
+                  ? '–'
+                  : ground.outcome
+                    ? `It ${ENDS[ground.outcome]} in ${significant(ground.seconds, 3)} s`
+                    : `It drives on for more than ${significant(ground.seconds, 3)} s`}
+              </dd>
+            </div>
+            <div>
+              <dt>Value</dt>
+              <dd>{ground.value === null ? '–' : significant(ground.value, 4)}</dd>
+            </div>
+            <div>
+              <dt>Reward since the last target</dt>
+              <dd>{significant(ground.reward, 3)}</dd>
+            </div>
+            <div>
+              <dt>So far</dt>
+              <dd data-testid="tally">
+                {count(ground.arrivals)} arrived, {count(ground.collisions)} collided,{' '}
+                {count(ground.timeouts)} timed out
+              </dd>
+            </div>
+          </dl>
+          <Text size="xs" c="dimmed" mt={8}>
+            A copy of this moment is driven ahead: the line in the picture is where it goes if nobody
+            interferes, the value its discounted reward until then.
+          </Text>
+          {ground.problem && (
+            <Notice title="Not done" bad role="alert">
+              {ground.problem}
+            </Notice>
+          )}
+        </Panel>
+      </div>
+      <div className={classes.stage}>
+        <Things ground={ground} actions={actions} />
+        <Perception settings={ground.settings} configure={actions.configure} />
+        <KeepArena ground={ground} />
+      </div>
+    </div>
+  )
+}
