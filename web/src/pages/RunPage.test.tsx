@@ -113,12 +113,14 @@ test('its policies, the newest first, the best marked, each to take away', async
   expect(links.map((row) => row.map((link) => link.getAttribute('href')))).toEqual([
     [
       '/new?checkpoint=cp2',
+      '/playground?policy=checkpoint%3Acp2',
       '/evaluations?policy=checkpoint%3Acp2',
       '/api/checkpoints/cp2/bundle',
       '/api/checkpoints/cp2/download',
     ],
     [
       '/new?checkpoint=cp1',
+      '/playground?policy=checkpoint%3Acp1',
       '/evaluations?policy=checkpoint%3Acp1',
       '/api/checkpoints/cp1/bundle',
       '/api/checkpoints/cp1/download',
