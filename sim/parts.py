@@ -13,11 +13,13 @@ Part = Literal["server", "worker"]
 # What tells, by its absence alone, that a part was not installed; pyproject.toml lists all that each brings.
 _MODULES: dict[str, Part] = {
     "alembic": "server",
+    "authlib": "server",
     "argon2": "server",
     "celery": "server",
     "fastapi": "server",
     "fsspec": "server",
     "msgspec": "server",
+    "optuna": "server",
     "prometheus_client": "server",
     "psycopg": "server",
     "pydantic_settings": "server",

@@ -4,6 +4,8 @@ import ipaddress
 import socket
 from urllib.parse import SplitResult, urlsplit
 
+from sim.errors import MaplessError
+
 _PORTS = {"http": 80, "https": 443}
 # Through these networks an IPv6 address leads to the IPv4 address in its last 32 bits.
 _NAT64 = ipaddress.ip_network("64:ff9b::/96")
@@ -11,7 +13,7 @@ _NAT64 = ipaddress.ip_network("64:ff9b::/96")
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
-class RefusedAddressError(ValueError):
+class RefusedAddressError(MaplessError, ValueError):
     """A webhook must not go there."""
 
 

@@ -14,6 +14,7 @@ from server.alerts.messages import Letter, body, signature
 from server.database.tables import AlertFormat
 from server.lanes import Lane
 from server.settings import Settings
+from sim.errors import MaplessError
 
 # A receiver that has not answered by then is tried again later.
 SECONDS = 15.0
@@ -22,7 +23,7 @@ _LATER = frozenset({408, 425, 429})
 _LONGEST_WAIT = 3_600.0
 
 
-class UndeliveredError(Exception):
+class UndeliveredError(MaplessError):
     """It did not arrive.
 
     Args:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from server.schemas import Schema
+from sim.errors import MaplessError
 from workers.config import TrainingConfig
 
 Value = bool | int | float | str
@@ -66,7 +67,7 @@ class ListedSetting(Schema):
 SearchedSetting = Annotated[RangedSetting | ListedSetting, Field(discriminator="kind")]
 
 
-class UnusableSettingError(ValueError):
+class UnusableSettingError(MaplessError, ValueError):
     """A setting can't be searched.
 
     Args:
