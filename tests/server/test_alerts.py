@@ -328,6 +328,7 @@ def test_mail_goes_to_ones_own_address(client: TestClient, services: Services) -
 
 async def sent(services: Services, clock: Clock, waits: tuple[float, ...] = ()) -> None:
     sender = AlertSender(services, clock)
+    clock.now = max(clock.now, time.time())  # what was asked for by HTTP is due by the server's own clock
     for wait in (0.0, *waits):
         clock.now += wait
         await sender.send_due()
