@@ -40,9 +40,12 @@ def test_what_others_do_appears_where_it_is_shown(browser: Browser, url: str) ->
 
     row.first.click()
     expect(page.get_by_role("heading", name=re.compile("Launched elsewhere"))).to_be_visible(timeout=SOON)
-    page.wait_for_timeout(1_000)
-    assert f"experiment={experiment['id']}" in streams[-1]
-    assert "since=" in streams[-1]
+    for _ in range(SOON // 100):
+        if f"experiment={experiment['id']}" in streams[-1] and "since=" in streams[-1]:
+            break
+        page.wait_for_timeout(100)
+    else:
+        pytest.fail(f"the page asks for {streams[-1]}")
     others.patch(f"/api/experiments/{experiment['id']}", json={"name": "Renamed elsewhere"}).raise_for_status()
     expect(page.get_by_role("heading", name=re.compile("Renamed elsewhere"))).to_be_visible(timeout=SOON)
     context.close()
