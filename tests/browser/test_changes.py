@@ -23,6 +23,15 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield url
 
 
+def until_followed(page: Page, streams: list[str], *parts: str) -> None:
+    """Wait until the newest stream that the page has opened asks for all of these."""
+    for _ in range(SOON // 100):
+        if streams and all(part in streams[-1] for part in parts):
+            return
+        page.wait_for_timeout(100)
+    pytest.fail(f"the page asks for {streams[-1:]}, not for {parts}")
+
+
 def test_what_others_do_appears_where_it_is_shown(browser: Browser, url: str) -> None:
     base, _, token = url.partition("/?token=")
     others = httpx.Client(base_url=base, headers={"Authorization": f"Bearer {token}"}, timeout=30)
@@ -36,16 +45,11 @@ def test_what_others_do_appears_where_it_is_shown(browser: Browser, url: str) ->
     experiment = others.post("/api/experiments", json={"name": "Launched elsewhere", "seeds": [0]}).json()
     row = page.get_by_role("link", name=re.compile("Launched elsewhere"))
     expect(row.first).to_be_visible(timeout=SOON)
-    assert any("follow=shown" in stream and "reports=true" in stream for stream in streams)
+    until_followed(page, streams, "follow=shown", "reports=true")
 
     row.first.click()
     expect(page.get_by_role("heading", name=re.compile("Launched elsewhere"))).to_be_visible(timeout=SOON)
-    for _ in range(SOON // 100):
-        if f"experiment={experiment['id']}" in streams[-1] and "since=" in streams[-1]:
-            break
-        page.wait_for_timeout(100)
-    else:
-        pytest.fail(f"the page asks for {streams[-1]}")
+    until_followed(page, streams, f"experiment={experiment['id']}", "since=")
     others.patch(f"/api/experiments/{experiment['id']}", json={"name": "Renamed elsewhere"}).raise_for_status()
     expect(page.get_by_role("heading", name=re.compile("Renamed elsewhere"))).to_be_visible(timeout=SOON)
     context.close()
