@@ -1,5 +1,5 @@
 /** Which policies are to be measured on which suites. */
-import { Button, Group, MultiSelect, Slider, Stack, Text } from '@mantine/core'
+import { Button, Group, MultiSelect, Stack, Text } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
@@ -7,6 +7,7 @@ import { useSearchParams } from 'react-router'
 import { $api } from '../../api/client'
 import type { ArenaConfig } from '../../api/types'
 import { plural, words } from '../../lib/format'
+import { DifficultySlider } from '../DifficultySlider'
 import { useChange } from '../people/useChange'
 import {
   BASELINES,
@@ -178,25 +179,7 @@ export function AskForm() {
         />
       </Group>
       {families && (
-        <Group gap="sm" maw={420} wrap="nowrap">
-          <Text size="sm" component="span" aria-hidden>
-            Difficulty of families
-          </Text>
-          <Slider
-            flex={1}
-            miw={120}
-            thumbLabel="Difficulty of families"
-            min={0}
-            max={1}
-            step={0.05}
-            label={null}
-            value={difficulty}
-            onChange={setDifficulty}
-          />
-          <Text size="sm" component="span" w={34}>
-            {difficulty.toFixed(2)}
-          </Text>
-        </Group>
+        <DifficultySlider label="Difficulty of families" value={difficulty} onChange={setDifficulty} />
       )}
       <Group gap="sm">
         <Button type="submit" disabled={policies.length === 0} loading={ask.isPending}>

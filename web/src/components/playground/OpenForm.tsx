@@ -1,10 +1,11 @@
 /** Which policy is to drive where. */
-import { Button, Group, Select, Slider, Stack, Text } from '@mantine/core'
+import { Button, Group, Select, Stack } from '@mantine/core'
 import { useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../../api/client'
 import { messageOf } from '../../api/errors'
 import type { ArenaConfig } from '../../api/types'
+import { DifficultySlider } from '../DifficultySlider'
 import { isFamily, policyKey, policyOf } from '../evaluations/choices'
 import { Notice } from '../ui'
 
@@ -88,25 +89,7 @@ export function OpenForm() {
         />
       </Group>
       {chosen && isFamily(chosen) && (
-        <Group gap="sm" maw={420} wrap="nowrap">
-          <Text size="sm" component="span" aria-hidden>
-            Difficulty
-          </Text>
-          <Slider
-            flex={1}
-            miw={120}
-            thumbLabel="Difficulty"
-            min={0}
-            max={1}
-            step={0.05}
-            label={null}
-            value={difficulty}
-            onChange={setDifficulty}
-          />
-          <Text size="sm" component="span" w={34}>
-            {difficulty.toFixed(2)}
-          </Text>
-        </Group>
+        <DifficultySlider label="Difficulty" value={difficulty} onChange={setDifficulty} />
       )}
       {open.error && (
         <Notice title="Not opened" bad role="alert">
