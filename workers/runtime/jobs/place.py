@@ -27,12 +27,12 @@ from workers.play_protocol import PlaySeen
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.process import ARCHIVE, RESULT, Done, Failed, Progressed, Said, main
+from workers.runtime.jobs.pulse import REPORT_SECONDS, pulse
 
 logger = logging.getLogger(__name__)
 
 _CLAIM_WAIT_SECONDS = 10.0
 _RETRY_SECONDS = 0.5
-_REPORT_SECONDS = 1.0
 _LOOK_SECONDS = 0.05
 # Of all but what is watched: a policy from elsewhere may compute for ever.
 MAX_SECONDS = 3_600.0
@@ -89,7 +89,7 @@ class Place:
         waited = False
         while not self._ending.is_set():
             if self._fitness.trouble is not None:
-                self._ending.wait(_REPORT_SECONDS)
+                self._ending.wait(REPORT_SECONDS)
                 continue
             try:
                 claim = self._client.claim_job(self.name, self._kinds, claim_id, _CLAIM_WAIT_SECONDS)
@@ -129,10 +129,11 @@ class Place:
         if claim.sha256 is not None:
             sha256 = claim.sha256
             try:
-                self._patiently(
-                    lambda: self._client.fetch_archive(claim.id, claim.attempt, sha256, directory / ARCHIVE),
-                    claim.lease_seconds,
-                )
+                with pulse(self._client, claim, 0.0):
+                    self._patiently(
+                        lambda: self._client.fetch_archive(claim.id, claim.attempt, sha256, directory / ARCHIVE),
+                        claim.lease_seconds,
+                    )
             except (ArchiveIntegrityError, RequestRefusedError) as error:
                 return JobEnd(outcome="failed", error=str(error))
         ours, theirs = self._context.Pipe()
@@ -140,7 +141,9 @@ class Place:
             target=main, args=(claim.spec.model_dump_json(), str(directory), theirs), daemon=True
         )
         try:
-            process.start()
+            # Under load what it is forked from may still be at its imports.
+            with pulse(self._client, claim, 0.0):
+                process.start()
             theirs.close()
             end = _Watch(self._client, claim, process, ours, self._ending).until_ended()
         finally:
@@ -151,7 +154,8 @@ class Place:
                 process.join()
         if end.outcome == "done" and not isinstance(claim.spec, WatchedJob):
             result = directory / RESULT
-            self._patiently(lambda: self._client.bring_result(claim.id, claim.attempt, result), claim.lease_seconds)
+            with pulse(self._client, claim, 1.0):
+                self._patiently(lambda: self._client.bring_result(claim.id, claim.attempt, result), claim.lease_seconds)
         return end
 
     def _patiently(self, request: Callable[[], None], seconds: float) -> None:
@@ -197,7 +201,7 @@ class _Watch:
                     outcome="failed", error=f"It took longer than {MAX_SECONDS / 60.0:.0f} minutes, and was ended."
                 )
             if time.monotonic() >= due:
-                due = time.monotonic() + _REPORT_SECONDS
+                due = time.monotonic() + REPORT_SECONDS
                 self._report()
             if not self._pipe.poll(_LOOK_SECONDS):
                 if not self._process.is_alive() and not self._pipe.poll():
@@ -211,7 +215,7 @@ class _Watch:
                 case bytes():
                     self._frames.append(said)
                     if len(self._frames) >= _FRAMES_AT_ONCE:
-                        due = time.monotonic() + _REPORT_SECONDS
+                        due = time.monotonic() + REPORT_SECONDS
                         self._send_frames()
                 case PlaySeen():
                     self._send_seen(said)
