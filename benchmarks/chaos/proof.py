@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 from benchmarks.chaos.recorder import Attempt
 from server.database import tables
 from server.database.engine import Database
-from server.metrics.points import Points
+from server.metrics.axes import AxisRepository
 from server.runs.repository import RunRepository
 from workers.checkpoints import read_checkpoint
 from workers.errors import ArchiveError
@@ -101,8 +101,8 @@ class Proof:
         # The tables as they are: whoever reads curves sees one point a step, and would hide what is there twice.
         for row in session.scalars(select(tables.MetricRow).where(tables.MetricRow.run_id == run_id)):
             found.update(_point(name, row.step, row.wall_time, value) for name, value in row.values.items())
-        for chunk in session.scalars(select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id)):
-            points = Points.decode(chunk.points, chunk.count)
+        chunks = session.scalars(select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id))
+        for chunk, points in AxisRepository(session).decoded(chunks):
             rows = zip(points.steps.tolist(), points.times.tolist(), points.values.tolist(), strict=True)
             found.update(_point(chunk.name, step, at, value) for step, at, value in rows)
         compare(expected, found, self.verdict)

@@ -262,10 +262,27 @@ class MetricRow(Base):
     values: Mapped[dict[str, float | None]] = mapped_column(JSON)
 
 
+class MetricAxis(Base):
+    """Steps and wall times of points, which the chunks of a run's series that were reported together have in common.
+
+    `id` is a digest of what they are, so that equal ones are found to be one (`server.metrics.points`).
+    """
+
+    __tablename__ = "metric_axes"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class MetricChunk(Base):
-    """Compacted points of one series: zlib over int64 step deltas, float64 wall times and float32 values."""
+    """Compacted points of one series: their values, which lie where `axis` says.
+
+    Those from before there were axes have none: they are zlib over int64 step deltas, float64 wall times and float32 values.
+    """
 
     __tablename__ = "metric_chunks"
+    __table_args__ = (Index("metric_chunks_by_axis", "run_id", "axis"),)
 
     run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
@@ -273,6 +290,7 @@ class MetricChunk(Base):
     last_step: Mapped[int] = mapped_column(BigInteger)
     count: Mapped[int] = mapped_column(Integer)
     points: Mapped[bytes] = mapped_column(LargeBinary)
+    axis: Mapped[str | None] = mapped_column(String(16))
 
 
 class MetricSummary(Base):

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from server.abandoned import stop_if_abandoned
 from server.database import tables
+from server.metrics.axes import AxisRepository
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized
@@ -19,7 +20,9 @@ from server.metrics.summaries import SummaryRepository, summarized
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
 COMPACT_AFTER = 500
 # Points of a full chunk; a smaller one is grown by the next compaction.
-_CHUNK_POINTS = 4_096
+_CHUNK_POINTS = 8_192
+# A series of more points has a summary.
+_LONG = 4_096
 # Rows in one INSERT; SQLite takes at most 32,766 parameters.
 _INSERT_ROWS = 1_000
 _RUNS_A_QUERY = 1_000
@@ -41,6 +44,7 @@ class MetricRepository:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._summaries = SummaryRepository(session)
+        self._axes = AxisRepository(session)
         backend = session.get_bind().dialect.name
         # Both databases know ON CONFLICT; SQLAlchemy has it in each one's own insert.
         self._insert = postgresql.insert if backend == "postgresql" else sqlite.insert
@@ -99,12 +103,13 @@ class MetricRepository:
         straddling = select(tables.MetricChunk).where(
             tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step > step
         )
-        for chunk in self._session.scalars(straddling).all():
+        for chunk, points in self._axes.decoded(self._session.scalars(straddling)):
             # Counting them out is enough: packing a run's last chunks anew would take many times as long.
-            kept = _decode(chunk).steps
+            kept = points.steps
             chunk.count = int(np.searchsorted(kept, step, side="right"))
             chunk.last_step = int(kept[chunk.count - 1])
         self._session.flush()
+        self._axes.drop_unused(run_id)
         self._summaries.cut(run_id, step)
         beyond = [tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step]
         lost = set(self._session.scalars(select(tables.LatestMetric.name).where(*beyond)))
@@ -126,10 +131,10 @@ class MetricRepository:
             if len(newest) == len(names):
                 return newest
         last_chunks = self._last_chunks(run_id, [name for name in names if name not in newest])
-        for name, chunk in last_chunks.items():
-            found = _last_finite(_decode(chunk)) or _last_finite(self.read(run_id, [name])[name])
+        for chunk, points in self._axes.decoded(last_chunks.values()):
+            found = _last_finite(points) or _last_finite(self.read(run_id, [chunk.name])[chunk.name])
             if found is not None:
-                newest[name] = found
+                newest[chunk.name] = found
         return newest
 
     def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
@@ -157,9 +162,10 @@ class MetricRepository:
                 ).where(
                     tables.MetricSummary.run_id.is_(None) | (tables.MetricChunk.last_step > tables.MetricSummary.last_step)
                 )
-            for chunk in self._session.scalars(chunks.order_by(tables.MetricChunk.run_id, tables.MetricChunk.first_step)):
+            found = self._session.scalars(chunks.order_by(tables.MetricChunk.run_id, tables.MetricChunk.first_step))
+            for chunk, points in self._axes.decoded(found):
                 stop_if_abandoned()
-                parts[chunk.run_id][chunk.name].append(_decode(chunk))
+                parts[chunk.run_id][chunk.name].append(points)
             for run_id, rows in self._rows_of(some).items():
                 for name, points in _series(rows).items():
                     if names is None or name in names:
@@ -187,7 +193,7 @@ class MetricRepository:
             .order_by(tables.MetricChunk.first_step)
             .limit(limit)
         )
-        return [(chunk.first_step, _decode(chunk)) for chunk in self._session.scalars(query)]
+        return [(chunk.first_step, points) for chunk, points in self._axes.decoded(self._session.scalars(query))]
 
     def curves(self, run_ids: Collection[str], names: Collection[str] | None, limit: int) -> dict[str, dict[str, Buckets]]:
         """The series of several runs at most `limit` (at least 2) buckets wide, by run and name.
@@ -212,17 +218,20 @@ class MetricRepository:
 
     def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
         last_chunks = self._last_chunks(run_id, fresh)
+        grown = {chunk.name: points for chunk, points in self._axes.decoded(last_chunks.values())}
         known = {summary.name: summary for summary in self._summaries.of([run_id], fresh)}
         for name, points in fresh.items():
             last, began = last_chunks.get(name), int(points.steps[0])
             # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
             if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
-                points = Points.joined([_decode(last), points])
+                points = Points.joined([grown[name], points])
                 self._session.delete(last)
                 self._session.flush()
             self._add_chunks(run_id, name, points)
-            if name in known or len(points) > _CHUNK_POINTS or (last is not None and last.count >= _CHUNK_POINTS):
+            if name in known or len(points) > _LONG or (last is not None and last.count >= _CHUNK_POINTS):
                 self._summarize(run_id, name, known.get(name), began)
+        self._session.flush()
+        self._axes.drop_unused(run_id)
 
     def _summarize(self, run_id: str, name: str, known: tables.MetricSummary | None, began: int) -> None:
         """Bring a series' summary up to its chunks, to which points from the step `began` on were added."""
@@ -234,12 +243,11 @@ class MetricRepository:
         if known is not None:
             chunks = chunks.where(tables.MetricChunk.last_step > known.last_step)
         self._session.flush()
-        points = Points.joined(
-            [_decode(chunk) for chunk in self._session.scalars(chunks.order_by(tables.MetricChunk.first_step))]
-        )
+        found = self._session.scalars(chunks.order_by(tables.MetricChunk.first_step))
+        points = Points.joined([points for _, points in self._axes.decoded(found)])
         if known is not None:
             points = points[int(np.searchsorted(points.steps, known.last_step, side="right")) :]
-        if is_long or len(points) > _CHUNK_POINTS:
+        if is_long or len(points) > _LONG:
             self._summaries.write(run_id, name, known, points)
 
     def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
@@ -281,7 +289,8 @@ class MetricRepository:
                     first_step=int(part.steps[0]),
                     last_step=int(part.steps[-1]),
                     count=len(part),
-                    points=part.encode(),
+                    points=part.encode_values(),
+                    axis=self._axes.keep(run_id, part),
                 )
             )
 
@@ -295,10 +304,6 @@ class MetricRepository:
             ),
             [{"run_id": run_id, "name": name, "step": step, "value": value} for name, (step, value) in newest.items()],
         )
-
-
-def _decode(chunk: tables.MetricChunk) -> Points:
-    return Points.decode(chunk.points, chunk.count)
 
 
 def _portions(run_ids: Collection[str]) -> Iterator[list[str]]:

@@ -64,14 +64,21 @@ class StorageRepository:
 
     def curve_bytes(self, experiment_ids: Collection[str]) -> dict[str, int]:
         """Bytes of their compacted curves."""
-        chunk, run = tables.MetricChunk, tables.Run
-        query = (
-            select(run.experiment_id, func.sum(func.length(chunk.points)))
-            .join(run, run.id == chunk.run_id)
-            .where(run.experiment_id.in_(experiment_ids))
-            .group_by(run.experiment_id)
+        run, found = tables.Run, dict.fromkeys(experiment_ids, 0)
+        parts = (
+            (tables.MetricChunk.run_id, tables.MetricChunk.points),
+            (tables.MetricAxis.run_id, tables.MetricAxis.data),
         )
-        return {row[0]: int(row[1]) for row in self._session.execute(query)}
+        for of_run, content in parts:
+            query = (
+                select(run.experiment_id, func.sum(func.length(content)))
+                .join(run, run.id == of_run)
+                .where(run.experiment_id.in_(experiment_ids))
+                .group_by(run.experiment_id)
+            )
+            for experiment_id, size in self._session.execute(query):
+                found[experiment_id] += int(size)
+        return {experiment_id: size for experiment_id, size in found.items() if size}
 
     def of_experiment(self, experiment_id: str) -> dict[str, list[tables.Checkpoint]]:
         """Its checkpoints by step, by run."""

@@ -1,21 +1,23 @@
 """Curves: appended once, compacted without loss, cut back to a checkpoint, downsampled without losing extremes."""
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from alembic import command
 from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
-from sqlalchemy import event
+from sqlalchemy import delete, event, func, select
 
 from server.database import tables
 from server.database.engine import Database
-from server.database.migrate import upgrade
+from server.database.migrate import migration_config, upgrade
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
-from server.metrics.points import Points
+from server.metrics.points import Axis, Points
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.metrics.service import json_numbers
 from server.services import Services
@@ -100,14 +102,103 @@ def test_compaction_leaves_the_curve_as_it_was(database: Database) -> None:
 
 
 def test_a_chunk_that_is_full_is_followed_by_another(database: Database) -> None:
-    append(database, rows(*range(1, 5_001)))
+    append(database, rows(*range(1, 9_001)))
     compact(database)
-    append(database, rows(5_001, first_seq=5_001))
+    append(database, rows(9_001, first_seq=9_001))
     compact(database)
 
-    assert steps(database) == list(range(1, 5_002))
+    assert steps(database) == list(range(1, 9_002))
     with database.read() as session:
-        assert sorted(count for (count,) in session.query(tables.MetricChunk.count)) == [905, 4_096]
+        assert sorted(count for (count,) in session.query(tables.MetricChunk.count)) == [809, 8_192]
+
+
+def together(first: int, last: int) -> list[ReportedRow]:
+    """Rows of three series, the third of which is rare."""
+    return [
+        ReportedRow(
+            step,
+            step,
+            1_000.0 + step / 3,
+            {"a": step / 7, "b": -1.0 / step} | ({"rare": math.sqrt(step)} if step % 50 == 0 else {}),
+        )
+        for step in range(first, last + 1)
+    ]
+
+
+def axes(database: Database) -> int:
+    with database.read() as session:
+        return session.query(tables.MetricAxis).count()
+
+
+def same(database: Database, last: int) -> None:
+    """Every point is as it was reported, bit for bit."""
+    with database.read() as session:
+        found = MetricRepository(session).read("r")
+    for name in ("a", "b", "rare"):
+        wanted = [row for row in together(1, last) if name in row.values]
+        expected = Points.of(
+            [row.step for row in wanted], [row.wall_time for row in wanted], [row.values[name] for row in wanted]
+        )
+        assert np.array_equal(found[name].steps, expected.steps)
+        assert found[name].times.tobytes() == expected.times.tobytes()
+        assert found[name].values.tobytes() == expected.values.tobytes()
+
+
+def test_series_that_are_reported_together_share_their_steps_and_times(database: Database) -> None:
+    for first in range(1, 9_001, 500):
+        append(database, together(first, first + 499))
+        compact(database)
+        same(database, first + 499)
+    # Two chunks of the first two series, one of the third; what grew has left nothing behind.
+    assert axes(database) == 3
+    drop_beyond(database, 8_500)
+    same(database, 8_500)
+    assert axes(database) == 3
+    drop_beyond(database, 4_000)
+    same(database, 4_000)
+    assert axes(database) == 2
+    with database.write() as session:
+        session.execute(delete(tables.Experiment))
+    assert axes(database) == 0
+
+
+def test_points_of_a_database_from_before_axes_are_read_and_grown(database: Database) -> None:
+    config = migration_config(database)
+    append(database, together(1, 700))
+    compact(database)
+    append(database, together(701, 900))
+    # Back and up again: what was there before the migration has its steps and times in its chunks.
+    command.downgrade(config, "0018")
+    command.upgrade(config, "head")
+    assert axes(database) == 0
+    same(database, 900)
+    drop_beyond(database, 650)
+    same(database, 650)
+    append(database, [dataclasses.replace(row, seq=row.seq + 1_000) for row in together(651, 800)])
+    compact(database)
+    same(database, 800)
+    assert axes(database) == 2
+
+
+def test_rates_take_three_and_a_half_bytes_a_point_with_their_summaries(database: Database) -> None:
+    random, count, names = np.random.default_rng(0), 50_000, [f"s{index}" for index in range(20)]
+    steps = np.arange(1, count + 1, dtype=np.int64) * 512
+    times = 1.7e9 + np.cumsum(random.gamma(20.0, 0.035, count))
+    walks = 0.5 + 0.4 * np.tanh(np.cumsum(random.standard_normal((20, count)), axis=1) / math.sqrt(count))
+    values = (walks + 0.05 * random.standard_normal((20, count))).astype(np.float32)
+    with database.write() as session:
+        repository = MetricRepository(session)
+        repository.add_series("r", {name: Points(steps, times, values[at]) for at, name in enumerate(names)})
+        session.flush()
+        stored = sum(
+            session.scalar(select(func.sum(func.length(column)))) or 0
+            for column in (tables.MetricChunk.points, tables.MetricAxis.data, tables.MetricSummary.data)
+        )
+        read = repository.read("r")
+    assert stored / (20 * count) < 3.5
+    for at, name in enumerate(names):
+        assert read[name].values.tobytes() == values[at].tobytes()
+        assert read[name].times.tobytes() == times.tobytes()
 
 
 @pytest.mark.parametrize("compacted", [False, True])
@@ -241,7 +332,7 @@ def test_a_curve_of_an_older_database_has_no_summary_and_is_read_all_the_same(da
     agrees(database)
 
 
-def test_many_runs_are_read_in_two_queries(database: Database) -> None:
+def test_many_runs_are_read_in_three_queries(database: Database) -> None:
     with database.write() as session:
         experiment = tables.Experiment(id="many", name="many", training={})
         experiment.runs = [tables.Run(id=f"m{seed}", seed=seed) for seed in range(30)]
@@ -260,7 +351,7 @@ def test_many_runs_are_read_in_two_queries(database: Database) -> None:
 
     with database.read() as session:
         read = MetricRepository(session).read_many([f"m{seed}" for seed in range(30)], ["a"])
-    assert len([query for query in asked if query.startswith("SELECT")]) == 2
+    assert len([query for query in asked if query.startswith("SELECT")]) == 3
     assert {run_id: series["a"].values.tolist() for run_id, series in read.items()} == {
         f"m{seed}": [1.0, float(seed)] for seed in range(30)
     }
@@ -302,6 +393,11 @@ def test_a_chunk_gives_back_exactly_what_was_put_in(points: list[tuple[int, floa
     assert decoded.steps.tolist() == [p[0] for p in points]
     assert decoded.times.tolist() == [p[1] for p in points]
     assert decoded.values.tolist() == [p[2] for p in points]
+    parts = Points.decode_parts(Axis.decode(original.encode_axis()), original.encode_values(), len(points))
+    for again in (decoded, parts):
+        assert again.steps.tobytes() == original.steps.tobytes()
+        assert again.times.tobytes() == original.times.tobytes()
+        assert again.values.tobytes() == original.values.tobytes()
 
 
 def test_of_several_values_at_one_step_the_last_counts() -> None:

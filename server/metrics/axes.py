@@ -1,0 +1,59 @@
+"""Axes in SQL: steps and times of points, once for all series of a run that were reported together."""
+
+from collections.abc import Iterable, Iterator
+from hashlib import blake2b
+
+from sqlalchemy import delete, select, tuple_
+from sqlalchemy.orm import Session
+
+from server.database import tables
+from server.metrics.points import Axis, Points
+
+_AXES_A_QUERY = 500
+
+
+class AxisRepository:
+    """Reads and writes axes within the caller's transaction."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        # Those that this transaction knows to be there.
+        self._kept: set[tuple[str, str]] = set()
+
+    def keep(self, run_id: str, points: Points) -> str:
+        """The id of the axis on which the points lie, which is written where it is new."""
+        digest = blake2b(points.steps.tobytes() + points.times.tobytes(), digest_size=8).hexdigest()
+        if (run_id, digest) not in self._kept:
+            if self._session.get(tables.MetricAxis, (run_id, digest)) is None:
+                self._session.add(tables.MetricAxis(run_id=run_id, id=digest, data=points.encode_axis()))
+            self._kept.add((run_id, digest))
+        return digest
+
+    def decoded(self, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, Points]]:
+        """The chunks with their points, in order; an axis that many lie on is read and decoded once."""
+        found = list(chunks)
+        axes = self._axes({(chunk.run_id, chunk.axis) for chunk in found if chunk.axis is not None})
+        for chunk in found:
+            if chunk.axis is None:
+                yield chunk, Points.decode(chunk.points, chunk.count)
+            else:
+                yield chunk, Points.decode_parts(axes[chunk.run_id, chunk.axis], chunk.points, chunk.count)
+
+    def drop_unused(self, run_id: str) -> None:
+        """Forget the axes of a run on which nothing lies any more."""
+        used = select(tables.MetricChunk.axis).where(
+            tables.MetricChunk.run_id == run_id, tables.MetricChunk.axis.is_not(None)
+        )
+        axis = tables.MetricAxis
+        self._session.execute(delete(axis).where(axis.run_id == run_id, axis.id.not_in(used)))
+        self._kept.clear()
+
+    def _axes(self, keys: set[tuple[str, str]]) -> dict[tuple[str, str], Axis]:
+        axis = tables.MetricAxis
+        wanted = sorted(keys)
+        axes: dict[tuple[str, str], Axis] = {}
+        for start in range(0, len(wanted), _AXES_A_QUERY):
+            some = wanted[start : start + _AXES_A_QUERY]
+            query = select(axis.run_id, axis.id, axis.data).where(tuple_(axis.run_id, axis.id).in_(some))
+            axes |= {(run_id, key): Axis.decode(data) for run_id, key, data in self._session.execute(query)}
+        return axes
