@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from server.metrics.schemas import Metrics
-from server.metrics.service import MetricService
+from server.metrics.service import Known, MetricService
 from server.problems import NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
@@ -19,8 +19,20 @@ def get_metrics(
     services: ServicesDep,
     names: Annotated[str, Query(max_length=4_000, description="Comma-separated; all if empty.")] = "",
     points: Annotated[int, Query(ge=2, le=100_000, description="Points of a series at most.")] = 1_000,
+    since: Annotated[
+        int | None,
+        Query(ge=0, le=2**62, description="The newest step that is known: only the points from there on are wanted."),
+    ] = None,
+    attempt: Annotated[
+        int | None, Query(ge=0, le=2**31, description="Whose points are known; with another one's `since` is of no use.")
+    ] = None,
 ) -> Response:
-    """The run's series, by name."""
+    """The run's series, by name.
+
+    Who follows a run that goes on asks with the newest step and the attempt of the answer before: what is known from that
+    step on gives way to what comes.
+    """
     wanted = {name.strip() for name in names.split(",") if name.strip()}
-    curves = MetricService(services).of_run(run_id, wanted or None, points)
+    known = None if since is None or attempt is None else Known(since, attempt)
+    curves = MetricService(services).of_run(run_id, wanted or None, points, known)
     return Response(curves, media_type="application/json")

@@ -216,6 +216,22 @@ class MetricRepository:
                 curves[run_id][name] = buckets.cut(limit)
         return curves
 
+    def since(self, run_id: str, names: Collection[str] | None, step: int) -> dict[str, Points] | None:
+        """The points of a run from `step` on, by series; None where they are too many to be read one by one."""
+        beyond = [tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step >= step]
+        if names is not None:
+            beyond.append(tables.MetricChunk.name.in_(names))
+        counted = select(func.count()).where(*beyond).group_by(tables.MetricChunk.name)
+        if max(self._session.scalars(counted), default=0) > 1:
+            return None
+        parts: dict[str, list[Points]] = defaultdict(list)
+        for chunk, points in self._axes.decoded(self._session.scalars(select(tables.MetricChunk).where(*beyond))):
+            parts[chunk.name].append(points[int(np.searchsorted(points.steps, step)) :])
+        for name, points in _series([row for row in self._rows(run_id) if row.step >= step]).items():
+            if names is None or name in names:
+                parts[name].append(points)
+        return {name: Points.joined(parts[name]) for name in sorted(parts)}
+
     def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
         last_chunks = self._last_chunks(run_id, fresh)
         grown = {chunk.name: points for chunk, points in self._axes.decoded(last_chunks.values())}

@@ -23,3 +23,7 @@ class Metrics(Schema):
     """The series of a run, by name."""
 
     series: list[Series]
+    attempt: int = Field(description="Whose points they are: the next attempt drops what lies beyond its checkpoint.")
+    since: int | None = Field(
+        description="From which step on; null where the series are whole, whatever was asked for: what is known is old then."
+    )

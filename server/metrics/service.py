@@ -1,11 +1,13 @@
 """A run's curves."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from server.metrics.buckets import Buckets
+from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.schemas import Metrics, Series
 from server.runs.repository import RunRepository
@@ -15,14 +17,22 @@ from server.services import Services
 _POWERS = np.array([float(f"1e{power}") for power in range(23)])
 
 
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What whoever asks has been told: the newest step of all series, and the attempt whose points they were."""
+
+    step: int
+    attempt: int
+
+
 class MetricService:
     """Reads curves."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def of_run(self, run_id: str, names: Collection[str] | None, points: int) -> bytes:
-        """`Metrics` as JSON: the run's series, all or those named, each of at most `points` points.
+    def of_run(self, run_id: str, names: Collection[str] | None, points: int, known: Known | None = None) -> bytes:
+        """`Metrics` as JSON: the run's series, all or those named, each of at most `points` points, beyond what is known.
 
         Raises:
             NotFoundError: there is no such run.
@@ -31,13 +41,23 @@ class MetricService:
             run = RunRepository(session).get(run_id)
 
             def read() -> bytes:
-                series = MetricRepository(session).curves([run_id], names, points)[run_id]
-                metrics = Metrics(series=[_view(name, buckets) for name, buckets in series.items()])
+                repository, since = MetricRepository(session), None
+                fresh: Mapping[str, Points] | None = None
+                # What a damaged checkpoint took back is beyond the run's step.
+                if known is not None and known.attempt == run.attempt and known.step <= run.step:
+                    fresh = repository.since(run_id, names, known.step)
+                if known is not None and fresh is not None:
+                    series, since = {name: Buckets.of(each).cut(points) for name, each in fresh.items()}, known.step
+                else:
+                    series = repository.curves([run_id], names, points)[run_id]
+                metrics = Metrics(
+                    series=[_view(name, buckets) for name, buckets in series.items()], attempt=run.attempt, since=since
+                )
                 return metrics.model_dump_json().encode()
 
             # Reports move the last item's number; what cuts a run back moves its step, and its next attempt's number.
             state = (run_id, run.attempt, run.last_seq, run.step)
-            return self._services.curves.get((*state, frozenset(names or ()), points), read)
+            return self._services.curves.get((*state, frozenset(names or ()), points, known), read)
 
 
 def _view(name: str, buckets: Buckets) -> Series:

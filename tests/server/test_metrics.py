@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -462,7 +463,69 @@ def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None
         "min": [0.25, 1.25],
         "max": [1.0, 1.25],
     }
-    assert client.get(f"/api/runs/{run_id}/metrics", params={"names": "nothing"}).json() == {"series": []}
+    nothing = client.get(f"/api/runs/{run_id}/metrics", params={"names": "nothing"}).json()
+    assert nothing == {"series": [], "attempt": 0, "since": None}
+
+
+def test_who_follows_a_run_is_told_what_is_new(client: TestClient, services: Services) -> None:
+    run_id = run_of(client)
+
+    def report(first: int, last: int, *, compacted: bool = False) -> None:
+        with services.database.write() as session:
+            # An evaluation comes with a step of which something was reported before.
+            reported = [ReportedRow(2 * i, i * 10, 0.0, {"a": float(i)}) for i in range(first, last + 1)]
+            reported += [ReportedRow(2 * last + 1, last * 10, 0.0, {"rare": float(last)})]
+            MetricRepository(session).append_rows(run_id, reported)
+            run = session.get_one(tables.Run, run_id)
+            run.attempt, run.step, run.last_seq = 1, last * 10, 2 * last + 1
+            if compacted:
+                MetricRepository(session).compact(run_id)
+
+    def ask(since: int, attempt: int = 1) -> Any:
+        params = {"since": since, "attempt": attempt, "points": 100}
+        return client.get(f"/api/runs/{run_id}/metrics", params=params).raise_for_status().json()
+
+    def told(since: int) -> dict[str, list[int]]:
+        answer = ask(since)
+        assert (answer["since"], answer["attempt"]) == (since, 1)
+        return {series["name"]: series["steps"] for series in answer["series"]}
+
+    report(1, 5)
+    assert told(30) == {"a": [30, 40, 50], "rare": [50]}
+    report(6, 8)
+    assert told(50) == {"a": [50, 60, 70, 80], "rare": [50, 80]}
+    report(9, 10, compacted=True)
+    assert told(80) == {"a": [80, 90, 100], "rare": [80, 100]}
+    report(11, 11)
+    assert told(90) == {"a": [90, 100, 110], "rare": [100, 110]}
+    assert told(110) == {"a": [110], "rare": [110]}
+    # Much that is new comes as a curve does: at the width that was asked for.
+    report(12, 400)
+    (series, _) = ask(110)["series"]
+    assert len(series["steps"]) == 100
+    assert (series["steps"][-1], series["max"][-1]) == (4_000, 400.0)
+
+    # What another attempt has dropped is not known any more, nor what lies beyond the step that a run was taken back to.
+    for since, attempt in ((110, 0), (5_000, 1)):
+        whole = ask(since, attempt)
+        assert whole["since"] is None
+        assert whole["series"][0]["steps"][0] <= 40
+
+
+def test_who_knows_little_of_a_long_run_is_told_all_of_it(client: TestClient, services: Services) -> None:
+    run_id = run_of(client)
+    steps = np.arange(1, 20_001, dtype=np.int64)
+    with services.database.write() as session:
+        points = Points(steps, steps.astype(float), steps.astype(np.float32))
+        MetricRepository(session).add_series(run_id, {"a": points})
+        session.get_one(tables.Run, run_id).step = 20_000
+
+    told = client.get(f"/api/runs/{run_id}/metrics", params={"since": 7, "attempt": 0, "points": 50}).json()
+    assert told["since"] is None
+    assert len(told["series"][0]["steps"]) == 50
+    told = client.get(f"/api/runs/{run_id}/metrics", params={"since": 19_999, "attempt": 0}).json()
+    assert told["since"] == 19_999
+    assert told["series"][0]["steps"] == [19_999, 20_000]
 
 
 def test_curves_of_no_run_and_in_no_width(client: TestClient) -> None:

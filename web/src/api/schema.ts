@@ -1971,6 +1971,9 @@ export interface paths {
         /**
          * Get Metrics
          * @description The run's series, by name.
+         *
+         *     Who follows a run that goes on asks with the newest step and the attempt of the answer before: what is known from that
+         *     step on gives way to what comes.
          */
         get: operations["get_metrics_api_runs__run_id__metrics_get"];
         put?: never;
@@ -6698,8 +6701,18 @@ export interface components {
          * @description The series of a run, by name.
          */
         Metrics: {
+            /**
+             * Attempt
+             * @description Whose points they are: the next attempt drops what lies beyond its checkpoint.
+             */
+            attempt: number;
             /** Series */
             series: components["schemas"]["Series"][];
+            /**
+             * Since
+             * @description From which step on; null where the series are whole, whatever was asked for: what is known is old then.
+             */
+            since: number | null;
         };
         /**
          * MlpNetwork
@@ -17536,10 +17549,14 @@ export interface operations {
     get_metrics_api_runs__run_id__metrics_get: {
         parameters: {
             query?: {
+                /** @description Whose points are known; with another one's `since` is of no use. */
+                attempt?: number | null;
                 /** @description Comma-separated; all if empty. */
                 names?: string;
                 /** @description Points of a series at most. */
                 points?: number;
+                /** @description The newest step that is known: only the points from there on are wanted. */
+                since?: number | null;
             };
             header?: never;
             path: {

@@ -20,6 +20,8 @@ const routes = {
   'GET /api/runs/run1': runDetail,
   'GET /api/runs/run1/metrics': {
     series: [{ name: 'train/success_rate', steps: [4096, 8192], values: [0.1, 0.4], min: null, max: null }],
+    attempt: 1,
+    since: null,
   },
   'GET /api/runs/run1/checkpoints': checkpoints,
   'GET /api/runs/run1/log': {
@@ -69,6 +71,27 @@ test('a running run: how far it is, its curves, its robots', async () => {
   expect(await screen.findByRole('figure', { name: 'Success rate' })).toHaveTextContent(/training\s*40\.0\s%/)
   expect(screen.getByTitle('The robots in 3D')).toHaveAttribute('src', '/live/run1/')
   await waitFor(() => expect(screen.queryByTestId('live-overlay')).not.toBeInTheDocument())
+})
+
+test('of a run that goes on only new points are asked for', async () => {
+  const server = startServer(routes)
+  open('/runs/run1')
+  const chart = await screen.findByRole('figure', { name: 'Success rate' })
+  expect(chart).toHaveTextContent(/training\s*40\.0\s%/)
+  await waitFor(() => expect(FakeEventSource.open).toHaveLength(1))
+  server.routes['GET /api/runs/run1/metrics'] = (request: Request) => {
+    expect(new URL(request.url).search).toBe('?points=600&since=8192&attempt=1')
+    const news = {
+      name: 'train/success_rate',
+      steps: [8192, 12_288],
+      values: [0.4, 0.7],
+      min: null,
+      max: null,
+    }
+    return { series: [news], attempt: 1, since: 8192 }
+  }
+  FakeEventSource.open[0]?.send({ experiment_id: 'exp1', run_id: 'run1', kind: 'metrics' })
+  await waitFor(() => expect(chart).toHaveTextContent(/training\s*70\.0\s%/), { timeout: 4_000 })
 })
 
 test('a completed run went to the end of its last rollout: so many steps, of no number', async () => {

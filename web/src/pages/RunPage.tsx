@@ -7,6 +7,7 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Checkpoint, CheckpointPage, RunDetail, Series } from '../api/types'
+import { useCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
@@ -61,12 +62,7 @@ export function RunPage() {
 
 function LoadedRun({ run }: { run: RunDetail }) {
   const init = { params: { path: { run_id: run.id } } }
-  const metrics = $api.useQuery(
-    'get',
-    '/api/runs/{run_id}/metrics',
-    { params: { ...init.params, query: { points: POINTS } } },
-    { placeholderData: keepPreviousData },
-  )
+  const metrics = useCurves(run.id, POINTS)
   const [page, setPage] = useState(1)
   const checkpoints = $api.useQuery(
     'get',

@@ -1,0 +1,64 @@
+/** A run's curves while it goes on: after the first answer only what is new is asked for. */
+import { keepPreviousData, useQuery } from '@tanstack/react-query'
+import { api } from '../api/client'
+import type { Metrics, Series } from '../api/types'
+
+/** A series grows to so many times the width that was asked for; then it is asked for whole, in fewer points. */
+const MOST_WIDTHS = 2
+
+/** What is known, up to the step from which on the news tells; the news from there on. */
+export function followed(known: Metrics, news: Metrics): Metrics {
+  const { since } = news
+  if (since === null) return news
+  const fresh = new Map(news.series.map((one) => [one.name, one]))
+  const grown = known.series.map((one) => {
+    const next = fresh.get(one.name)
+    fresh.delete(one.name)
+    return next ? joined(one, next, since) : one
+  })
+  const series = [...grown, ...fresh.values()].sort((a, b) => (a.name < b.name ? -1 : 1))
+  return { ...news, series }
+}
+
+function joined(known: Series, next: Series, since: number): Series {
+  let kept = known.steps.length
+  while (kept > 0 && (known.steps[kept - 1] ?? 0) >= since) kept--
+  const edge = (name: 'min' | 'max') =>
+    known[name] === null && next[name] === null
+      ? null
+      : [...(known[name] ?? known.values).slice(0, kept), ...(next[name] ?? next.values)]
+  return {
+    name: known.name,
+    steps: [...known.steps.slice(0, kept), ...next.steps],
+    values: [...known.values.slice(0, kept), ...next.values],
+    min: edge('min'),
+    max: edge('max'),
+  }
+}
+
+/** The newest step of what is known; undefined where all should be asked for anew. */
+export function newest(known: Metrics | undefined, points: number): number | undefined {
+  if (!known || known.series.some(({ steps }) => steps.length > MOST_WIDTHS * points)) return undefined
+  const steps = known.series.flatMap((one) => one.steps.at(-1) ?? [])
+  return steps.length > 0 ? Math.max(...steps) : undefined
+}
+
+/** All series of a run, each of some `points` points. */
+export function useCurves(runId: string, points: number) {
+  const path = '/api/runs/{run_id}/metrics'
+  const params = { path: { run_id: runId }, query: { points } }
+  return useQuery({
+    // As the typed client's own, by which the stream of changes finds it.
+    queryKey: ['get', path, { params }],
+    queryFn: async ({ client, queryKey, signal }) => {
+      const known = client.getQueryData<Metrics>(queryKey)
+      const since = newest(known, points)
+      const query = known && since !== undefined ? { points, since, attempt: known.attempt } : { points }
+      const { data } = await api.GET(path, { params: { path: params.path, query }, signal })
+      // A refusal has been thrown.
+      const news = data as Metrics
+      return known ? followed(known, news) : news
+    },
+    placeholderData: keepPreviousData,
+  })
+}
