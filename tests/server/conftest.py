@@ -1,6 +1,7 @@
 """A service on a database of its own, and a browser that is logged in to it."""
 
 import math
+import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +11,8 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from server.app import create_app
+from server.database.engine import Database
+from server.database.migrate import upgrade
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
@@ -23,8 +26,22 @@ def settings(tmp_path: Path) -> Settings:
     )
 
 
+@pytest.fixture(scope="session")
+def new_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A SQLite database with this version's tables and nothing in them."""
+    path = tmp_path_factory.mktemp("database") / "mapless.db"
+    database = Database(f"sqlite:///{path}")
+    upgrade(database)
+    database.dispose()
+    return path
+
+
 @pytest.fixture
-def app(settings: Settings) -> FastAPI:
+def app(settings: Settings, new_database: Path) -> FastAPI:
+    """Its migrations were run once, for all tests."""
+    if settings.database_url is None:
+        settings.data_dir.mkdir()
+        shutil.copy(new_database, settings.data_dir)
     return create_app(settings)
 
 
