@@ -3,13 +3,18 @@
     python -m benchmarks.threads --check
 
 Seconds of the clock, so the machine has to be idle. The results are the same bit for bit
-(`tests/workers/test_threads.py`). What two threads can give at most is printed beside: the update is what they share, so
-1 / (1 - u / 2) with its share u of the time on one thread.
+(`tests/workers/test_threads.py`). Beside it stand two bounds. What is shared is the update, so two threads can give
+1 / (1 - u / 2) at most, with its share u of the time on one thread. And what the machine's two cores give at all: twice the
+rate on one thread while another process trains the same on the other core, over the rate alone.
 """
 
+import multiprocessing
 import statistics
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import torch
@@ -38,31 +43,68 @@ def rate(training: Training) -> tuple[float, float]:
     return (training.step - first) / seconds, learning / seconds
 
 
+def training_of(case: str, directory: Path) -> Training:
+    """A new training of a case that never ends."""
+    algorithm = PpoConfig(network=CASES[case])
+    config = TrainingConfig(algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER), threads="1")
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
+    return Training(config, 0, Silent(), directory, Unwatched(), REPORT_INTERVAL)
+
+
+def train_while(case: str, wanted: Event, running: Event) -> None:
+    """What the other process does: trains whenever it is `wanted`, and says when it does."""
+    with tempfile.TemporaryDirectory() as directory:
+        training = training_of(case, Path(directory))
+        while wanted.wait():
+            training.collect()
+            training.update()
+            running.set()
+
+
+@contextmanager
+def neighbour(case: str) -> Iterator[tuple[Event, Event]]:
+    """Another process that trains the same when it is asked to."""
+    context = multiprocessing.get_context("spawn")
+    wanted, running = context.Event(), context.Event()
+    process = context.Process(target=train_while, args=(case, wanted, running), daemon=True)
+    process.start()
+    try:
+        yield wanted, running
+    finally:
+        process.kill()
+        process.join()
+
+
 def main() -> None:
     """Measure both cases and report."""
     options = parser(__doc__)
     options.add_argument("--segments", type=int, default=8, help="measurements of each; the median counts")
     arguments = options.parse_args()
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
     figures: dict[str, float] = {}
-    for case, network in CASES.items():
-        algorithm = PpoConfig(network=network)
-        config = TrainingConfig(algorithm=algorithm, steps=NEVER, evaluation=EvaluationConfig(every_steps=NEVER))
-        with tempfile.TemporaryDirectory() as directory:
-            training = Training(config, 0, Silent(), Path(directory), Unwatched(), REPORT_INTERVAL)
-            rates: dict[str, list[tuple[float, float]]] = {"1": [], "2": []}
+    for case in CASES:
+        with tempfile.TemporaryDirectory() as directory, neighbour(case) as (wanted, running):
+            training = training_of(case, Path(directory))
+            rates: dict[str, list[tuple[float, float]]] = {"one": [], "two": [], "beside another": []}
             for _ in range(arguments.segments + 1):
-                for threads, found in rates.items():
-                    training.threads = ThreadCount("2" if threads == "2" else "1")
+                for how, found in rates.items():
+                    training.threads = ThreadCount("2" if how == "two" else "1")
+                    if how == "beside another":
+                        running.clear()
+                        wanted.set()
+                        running.wait()
                     found.append(rate(training))
+                    wanted.clear()
+                # It ends the update that it is in.
+                time.sleep(0.5)
         # The first of each warms caches and allocators up.
-        one, two = (statistics.median(each for each, _ in found[1:]) for found in rates.values())
-        learning = statistics.median(share for _, share in rates["1"][1:])
+        one, two, beside = (statistics.median(each for each, _ in found[1:]) for found in rates.values())
+        learning = statistics.median(share for _, share in rates["one"][1:])
         figures[f"{case}_steps_per_second"] = round(one)
         figures[f"{case}_steps_per_second_on_two"] = round(two)
         figures[f"{case}_ratio"] = round(two / one, 2)
         figures[f"{case}_at_most"] = round(1.0 / (1.0 - learning / 2.0), 2)
+        figures[f"{case}_two_trainings"] = round(2.0 * beside / one, 2)
     finish("threads", figures, at_least={f"{case}_ratio": TARGET for case in CASES}, check=arguments.check)
 
 
