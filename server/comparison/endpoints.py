@@ -49,6 +49,12 @@ def compare_curves(
     services: ServicesDep,
     name: Metric = "eval/success_rate",
     points: GridSteps = 400,
+    lines: Annotated[
+        int | None,
+        Query(
+            ge=0, le=2_500, description="Single runs at most, as many of each experiment; all without it. Means are of all."
+        ),
+    ] = None,
 ) -> Curves:
     """One metric of every run on one grid, and each experiment's mean and interval."""
-    return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points)
+    return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points, lines)

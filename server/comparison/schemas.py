@@ -112,7 +112,7 @@ class ExperimentCurves(Schema):
 
     id: str
     name: str
-    seeds: list[SeedCurve]
+    seeds: list[SeedCurve] = Field(description="Of the first ones, where no more lines were asked for.")
     mean: list[float | None]
     low: list[float | None]
     high: list[float | None]

@@ -81,8 +81,14 @@ class ComparisonService:
             _, figures = _final(session, experiment_ids)
         return Profiles(thresholds=_THRESHOLDS.tolist(), experiments=[_profile(one) for one in figures])
 
-    def curves(self, experiment_ids: Sequence[str], name: str, points: int) -> Curves:
+    def curves(self, experiment_ids: Sequence[str], name: str, points: int, lines: int | None = None) -> Curves:
         """One metric of all runs on one grid of at most `points` steps.
+
+        Args:
+            experiment_ids: what is compared, in order.
+            name: of the metric.
+            points: of the grid at most.
+            lines: single seeds at most, of all experiments together; None for all. Means and intervals are over all of them.
 
         Raises:
             NotFoundError: one of the experiments is missing.
@@ -96,10 +102,11 @@ class ComparisonService:
             final = CheckpointRepository(session).final_evaluations(run_ids)
             episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
         grid = common_grid(list(series.values()), points)
+        shown = None if lines is None else lines // len(experiments)
         return Curves(
             name=name,
             steps=grid.tolist(),
-            experiments=[_curves(experiment, series, grid, name, episodes) for experiment in experiments],
+            experiments=[_curves(experiment, series, grid, name, episodes, shown) for experiment in experiments],
         )
 
 
@@ -164,6 +171,7 @@ def _curves(
     grid: NDArray[np.int64],
     name: str,
     episodes: Mapping[str, int],
+    shown: int | None,
 ) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
@@ -175,7 +183,10 @@ def _curves(
     return ExperimentCurves(
         id=experiment.id,
         name=experiment.name,
-        seeds=[SeedCurve(seed=run.seed, values=json_numbers(row)) for run, row in zip(experiment.runs, values, strict=True)],
+        seeds=[
+            SeedCurve(seed=run.seed, values=json_numbers(row))
+            for run, row in zip(experiment.runs[:shown], values[:shown], strict=True)
+        ],
         mean=json_numbers(mean),
         low=json_numbers(low),
         high=json_numbers(high),

@@ -63,6 +63,7 @@ QueryText = Annotated[
 Columns = Annotated[
     list[str], Query(max_length=_MAX_COLUMNS, description="Keys of settings and metrics that the rows should have.")
 ]
+OfProject = Annotated[str | None, Query(max_length=16, description="Id of the project; all without it.")]
 KeyName = Annotated[str, Query(min_length=1, max_length=160)]
 
 
@@ -73,7 +74,7 @@ def list_experiments(
     window: WindowDep,
     query: QueryText = "",
     state: ExperimentState | None = None,
-    project: Annotated[str | None, Query(max_length=16, description="Id of the project; all without it.")] = None,
+    project: OfProject = None,
     place: Place = "live",
     sort: Annotated[
         str, Query(min_length=1, max_length=161, description="A key; with a minus before it the largest first.")
@@ -94,19 +95,25 @@ def list_groups(
     principal: PrincipalDep,
     by: KeyName,
     query: QueryText = "",
+    project: OfProject = None,
     place: Place = "live",
     column: Columns = [],  # noqa: B006
 ) -> Groups:
     """The experiments that a query finds by the values of one key, with intervals over all runs of each group."""
-    return service.groups(Wanted(query=query, place=place, visible=principal.visible), by=by, columns=column)
+    wanted = Wanted(query=query, project_id=project, place=place, visible=principal.visible)
+    return service.groups(wanted, by=by, columns=column)
 
 
 @router.get("/api/workbench/ids", dependencies=[SIGNED_IN])
 def list_ids(
-    service: WorkbenchServiceDep, principal: PrincipalDep, query: QueryText = "", place: Place = "live"
+    service: WorkbenchServiceDep,
+    principal: PrincipalDep,
+    query: QueryText = "",
+    project: OfProject = None,
+    place: Place = "live",
 ) -> MatchingIds:
     """The ids of what a query finds, as many as one action may be about."""
-    return service.ids(Wanted(query=query, place=place, visible=principal.visible))
+    return service.ids(Wanted(query=query, project_id=project, place=place, visible=principal.visible))
 
 
 @router.get("/api/workbench/keys", dependencies=[SIGNED_IN])

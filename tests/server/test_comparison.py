@@ -358,6 +358,21 @@ def test_seeds_that_all_arrive_still_have_a_band(client: TestClient, reports: Re
     assert (curve["low"], curve["high"]) == ([pytest.approx(0.025 ** (1 / 20))], [1.0])
 
 
+def test_a_chart_asks_for_so_many_lines_and_means_are_of_all_runs(client: TestClient, reports: Reports) -> None:
+    one, other = (reports.experiment(name, seeds=(0, 1, 2)) for name in ("one", "other"))
+    for seed, run in enumerate(one["runs"]):
+        reports.metrics(run, "train/return", {100: float(seed)})
+    ids = [one["id"], other["id"]]
+    parameters = {"experiment": ids, "name": "train/return", "lines": 4}
+
+    first, second = client.get("/api/compare/curves", params=parameters).json()["experiments"]
+
+    assert [len(each["seeds"]) for each in (first, second)] == [2, 2]
+    assert (first["mean"], first["count"]) == ([1.0], [3])
+    everything = client.get("/api/compare/curves", params={"experiment": ids, "name": "train/return"}).json()
+    assert [len(each["seeds"]) for each in everything["experiments"]] == [3, 3]
+
+
 def test_long_curves_are_resampled(client: TestClient, reports: Reports) -> None:
     experiment = reports.experiment()
     reports.metrics(experiment["runs"][0], "train/return", {step: float(step) for step in range(0, 1_001, 10)})

@@ -201,6 +201,9 @@ def test_a_group_carries_the_interval_over_all_of_its_runs(client: TestClient, t
     assert sac["metrics"]["train/return"] == {"value": 40.0, "low": None, "high": None, "runs": 1}
     for group in answer["items"]:
         assert len(names(client, group["query"])) == group["experiments"]
+    elsewhere = {"by": "algorithm", "project": "none"}
+    assert client.get("/api/workbench/groups", params=elsewhere).json()["items"] == []
+    assert client.get("/api/workbench/ids", params={"project": "none"}).json()["ids"] == []
     by_gae = client.get("/api/workbench/groups", params={"by": "gae_lambda", "query": "algorithm = *"}).json()["items"]
     assert [(group["value"], names(client, group["query"])) for group in by_gae] == [
         (0.95, ["Beta", "Alpha"]),

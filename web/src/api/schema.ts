@@ -5249,7 +5249,10 @@ export interface components {
             mean: (number | null)[];
             /** Name */
             name: string;
-            /** Seeds */
+            /**
+             * Seeds
+             * @description Of the first ones, where no more lines were asked for.
+             */
             seeds: components["schemas"]["SeedCurve"][];
         };
         /**
@@ -13210,6 +13213,8 @@ export interface operations {
             query: {
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
+                /** @description Single runs at most, as many of each experiment; all without it. Means are of all. */
+                lines?: number | null;
                 /** @description Of the metric. */
                 name?: string;
                 /** @description Steps of the grid at most. */
@@ -18754,6 +18759,8 @@ export interface operations {
                 /** @description Keys of settings and metrics that the rows should have. */
                 column?: string[];
                 place?: "live" | "archived" | "trash";
+                /** @description Id of the project; all without it. */
+                project?: string | null;
                 /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
                 query?: string;
             };
@@ -18796,6 +18803,8 @@ export interface operations {
         parameters: {
             query?: {
                 place?: "live" | "archived" | "trash";
+                /** @description Id of the project; all without it. */
+                project?: string | null;
                 /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
                 query?: string;
             };

@@ -63,9 +63,10 @@ export function chartOfCurves(
       : experiment.seeds.map(
           ({ seed, values }): Line => ({ key: `${experiment.id}:${seed}`, color, thin: true, values }),
         )
+    const drawn = thin.length > 0 && thin.length < seeds ? `, ${thin.length} drawn` : ''
     const mean: Line = {
       key: experiment.id,
-      label: `${name}, ${plural(seeds, 'seed')}`,
+      label: `${name}, ${plural(seeds, 'seed')}${drawn}`,
       color,
       values: experiment.mean,
       ...(single ? {} : { band: { low: experiment.low, high: experiment.high } }),

@@ -43,8 +43,19 @@ export function TableExport({ table, title, query }: TableExportProps) {
   )
 }
 
-/** The whole comparison: a file of its own, and the address of this page. */
-export function WholeExport({ query }: { query: string }) {
+const DATA = [
+  { format: 'csv', label: 'Figures and curves, CSV' },
+  { format: 'json', label: 'Figures and curves, JSON' },
+]
+
+interface WholeExportProps {
+  query: string
+  /** What is compared, and the margin, as the API takes it. */
+  data: string
+}
+
+/** The whole comparison: a file of its own, its data, and the address of this page. */
+export function WholeExport({ query, data }: WholeExportProps) {
   return (
     <>
       <CopyButton value={window.location.href}>
@@ -57,6 +68,24 @@ export function WholeExport({ query }: { query: string }) {
       <Button component="a" variant="default" href={`/api/compare/report?${query}`} download>
         Report (HTML)
       </Button>
+      <Menu position="bottom-end" width={230}>
+        <Menu.Target>
+          <Button variant="default">Export data</Button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          {DATA.map(({ format, label }) => (
+            <Menu.Item
+              key={format}
+              leftSection={<IconDownload size={16} />}
+              component="a"
+              href={`/api/compare/export?${data}&format=${format}`}
+              download
+            >
+              {label}
+            </Menu.Item>
+          ))}
+        </Menu.Dropdown>
+      </Menu>
     </>
   )
 }

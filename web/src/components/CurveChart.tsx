@@ -7,6 +7,8 @@ import { chartOfCurves } from '../charts/shape'
 import { compact, percent } from '../lib/format'
 
 const POINTS = 400
+/** Single seeds, of all experiments together: more lines are a blur, and slow. */
+const LINES = 100
 
 /** The curves in which experiments are compared. */
 export const COMPARED = [
@@ -40,7 +42,7 @@ export function CurveChart({
   const { data, error } = $api.useQuery(
     'get',
     '/api/compare/curves',
-    { params: { query: { experiment: [...experiments], name, points: POINTS } } },
+    { params: { query: { experiment: [...experiments], name, points: POINTS, lines: LINES } } },
     { placeholderData: keepPreviousData },
   )
   const chart = useMemo(() => (data ? chartOfCurves(data) : { x: [], lines: [] }), [data])

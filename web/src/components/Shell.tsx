@@ -93,9 +93,14 @@ export function Shell() {
         {status?.commit && <code>{status.commit}</code>}
         <Group gap="md" className={classes.docs}>
           {!locked && (
-            <Anchor component={Link} to="/storage" inherit c="inherit">
-              Storage
-            </Anchor>
+            <>
+              <Anchor component={Link} to="/projects" inherit c="inherit">
+                Projects
+              </Anchor>
+              <Anchor component={Link} to="/storage" inherit c="inherit">
+                Storage
+              </Anchor>
+            </>
           )}
           <Anchor href="/api/openapi.json" inherit c="inherit">
             API

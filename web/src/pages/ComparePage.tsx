@@ -159,7 +159,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
       }
       actions={
         <Group gap="sm">
-          <WholeExport query={query} />
+          <WholeExport query={query} data={comparisonQuery(chosen, margin, {})} />
           <Button variant="default" onClick={onChange}>
             Choose others
           </Button>

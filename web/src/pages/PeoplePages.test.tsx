@@ -139,21 +139,39 @@ test('a token is shown once, listed and revoked', async () => {
   ])
 })
 
-test('a project leads to its members for who administrates it', async () => {
-  startServer({
+test('a project leads to its trainings, to its members for who administrates it, out and in', async () => {
+  const run = { id: 'r', experiment_id: 'e', outcome: 'imported', why: null }
+  const server = startServer({
     'GET /api/account': account,
     'GET /api/projects': {
       items: [project, { ...project, id: 'p2', name: 'Streets', role: 'viewer' }],
       total: 2,
     },
+    'POST /api/projects/p1/import': {
+      project_id: 'p1',
+      runs: [run, { ...run, outcome: 'refused', why: 'This server has another run of that id.' }],
+      checkpoints: 1,
+    },
   })
-  open('/projects')
-  const [halls, streets] = await screen.findAllByTestId('project')
-  expect(within(halls as HTMLElement).getByRole('link', { name: 'Halls' })).toHaveAttribute(
-    'href',
-    '/projects/p1',
+  const { user } = open('/projects')
+  const [halls, streets] = (await screen.findAllByTestId('project')).map((row) => within(row))
+  const leads = (row: typeof halls, name: string, to: string) =>
+    expect(row?.getByRole('link', { name })).toHaveAttribute('href', to)
+  leads(halls, 'Halls', '/?project=p1')
+  leads(halls, 'Members', '/projects/p1')
+  leads(halls, 'Export Halls', '/api/projects/p1/export')
+  leads(streets, 'Export Streets', '/api/projects/p2/export')
+  expect(streets?.queryByRole('link', { name: 'Members' })).toBeNull()
+  expect(streets?.queryByRole('button', { name: 'Import into Streets' })).toBeNull()
+
+  await user.upload(
+    document.querySelector('input[type=file]') as HTMLInputElement,
+    new File(['{"a": "tar"}'], 'mapless-halls.tar', { type: 'application/x-tar' }),
   )
-  expect(within(streets as HTMLElement).queryByRole('link')).toBeNull()
+  expect(
+    await screen.findByText('1 run imported, 1 run refused. This server has another run of that id.'),
+  ).toBeVisible()
+  expect(server.changes).toEqual([{ route: 'POST /api/projects/p1/import', body: { a: 'tar' } }])
 })
 
 test('the log is filtered, and goes into a table', async () => {

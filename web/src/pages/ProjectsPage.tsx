@@ -1,14 +1,17 @@
-/** The projects that one may see; administrators add some. */
-import { Anchor, Button, Group, Table, TextInput } from '@mantine/core'
+/** The projects that one may see, each to look at, to export whole, and to import into; administrators add some. */
+import { Anchor, Button, FileButton, Group, Table, TextInput } from '@mantine/core'
+import { notifications } from '@mantine/notifications'
+import { useMutation } from '@tanstack/react-query'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useAccount } from '../api/account'
-import { $api } from '../api/client'
+import { $api, api } from '../api/client'
+import type { Project, ProjectImport } from '../api/types'
 import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
 import { Page, Panel } from '../components/ui'
-import { count } from '../lib/format'
+import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
 const SIZE = 50
@@ -50,23 +53,23 @@ export function ProjectsPage() {
         )}
         <Rows
           what="Projects"
-          head={['Project', 'Trainings', 'You are']}
+          head={['Project', 'Trainings', 'You are', '']}
+          minWidth={620}
           query={projects}
           empty="You are in no project yet: ask for an invitation to one."
         >
           {projects.data?.items.map((project) => (
             <Table.Tr key={project.id} data-testid="project">
               <Table.Td>
-                {project.role === 'admin' ? (
-                  <Anchor component={Link} to={`/projects/${project.id}`} size="sm">
-                    {project.name}
-                  </Anchor>
-                ) : (
-                  project.name
-                )}
+                <Anchor component={Link} to={`/?project=${project.id}`} size="sm">
+                  {project.name}
+                </Anchor>
               </Table.Td>
               <Table.Td>{count(project.experiments)}</Table.Td>
               <Table.Td>{project.role}</Table.Td>
+              <Table.Td>
+                <ProjectTools project={project} people={account?.people === true} />
+              </Table.Td>
             </Table.Tr>
           ))}
         </Rows>
@@ -80,4 +83,75 @@ export function ProjectsPage() {
       </Panel>
     </Page>
   )
+}
+
+/** What one may do with a project: its members, its archive out, another server's archive in. */
+function ProjectTools({ project, people }: { project: Project; people: boolean }) {
+  const settle = useChange()
+  const take = useMutation({
+    mutationFn: async (file: File) => {
+      const { data } = await api.POST('/api/projects/{project_id}/import', {
+        params: { path: { project_id: project.id } },
+        body: file as unknown as string,
+        bodySerializer: (body) => body,
+        headers: { 'Content-Type': 'application/x-tar' },
+      })
+      return data
+    },
+    ...settle('import the archive'),
+    onSuccess: (came) => came && notifications.show(importNews(came)),
+  })
+  return (
+    <Group gap={6} justify="flex-end" wrap="nowrap">
+      {people && project.role === 'admin' && (
+        <Button size="compact-xs" variant="default" component={Link} to={`/projects/${project.id}`}>
+          Members
+        </Button>
+      )}
+      <Button
+        size="compact-xs"
+        variant="default"
+        component="a"
+        href={`/api/projects/${project.id}/export`}
+        download
+        aria-label={`Export ${project.name}`}
+      >
+        Export
+      </Button>
+      {project.role !== 'viewer' && (
+        <FileButton accept=".tar,application/x-tar" onChange={(file) => file && take.mutate(file)}>
+          {(props) => (
+            <Button
+              {...props}
+              size="compact-xs"
+              variant="default"
+              loading={take.isPending}
+              aria-label={`Import into ${project.name}`}
+            >
+              Import
+            </Button>
+          )}
+        </FileButton>
+      )}
+    </Group>
+  )
+}
+
+/** "3 imported, 1 there already", and why what was refused was. */
+function importNews({ runs }: ProjectImport) {
+  const refused = runs.filter(({ outcome }) => outcome === 'refused')
+  const told = [
+    [runs.filter(({ outcome }) => outcome === 'imported').length, 'imported'],
+    [runs.filter(({ outcome }) => outcome === 'there').length, 'there already'],
+    [refused.length, 'refused'],
+  ] as const
+  const counts = told
+    .filter(([number]) => number > 0)
+    .map(([number, word]) => `${plural(number, 'run')} ${word}`)
+  const why = refused[0]?.why
+  return {
+    title: refused.length > 0 ? 'Not all could be imported' : 'Imported',
+    message: `${counts.join(', ') || 'There was no run in it'}.${why ? ` ${why}` : ''}`,
+    ...(refused.length > 0 ? { color: 'red' } : {}),
+  }
 }

@@ -41,6 +41,22 @@ test('who has nothing yet is invited to launch the first', async () => {
   )
 })
 
+test('one looks at a project, and goes on with it', async () => {
+  const named = (id: string, name: string) => ({ id, name, created_at: 1, experiments: 1, role: 'editor' })
+  const server = startServer({
+    'GET /api/experiments': two,
+    'GET /api/projects': { items: [named('p1', 'Halls'), named('p2', 'Streets')], total: 2 },
+  })
+  const { router, user } = open('/')
+  await user.click(await screen.findByRole('combobox', { name: 'Project' }))
+  await user.click(await screen.findByRole('option', { name: 'Streets' }))
+  await waitFor(() => expect(router.state.location.search).toBe('?project=p2'))
+  await waitFor(() => expect(server.asked.at(-1)).toContain('project=p2'))
+  await router.navigate('/compare')
+  expect(await screen.findByRole('combobox', { name: 'Project' })).toHaveValue('Streets')
+  localStorage.clear()
+})
+
 test('ticked trainings are compared', async () => {
   startServer({ 'GET /api/experiments': two })
   const { router, user } = open('/')

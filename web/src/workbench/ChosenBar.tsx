@@ -93,7 +93,8 @@ export function ChosenBar({ ticked, onTick, view }: ChosenBarProps) {
   if (ticked.length === 0) return null
   const tooMany = ticked.length > MAX_COMPARED
   const whole = async () => {
-    const query = { query: view.query, place: view.place }
+    const project = view.project ? { project: view.project } : {}
+    const query = { query: view.query, place: view.place, ...project }
     const found = await client.fetchQuery(
       $api.queryOptions('get', '/api/workbench/ids', { params: { query } }),
     )

@@ -1,6 +1,7 @@
 /** The table of trainings with what finds, orders and groups them. */
 import { Button, Select } from '@mantine/core'
 import { type ReactNode, useCallback, useState } from 'react'
+import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Group, ListedExperiment } from '../api/types'
 import { Message, Panel, QueryError } from '../components/ui'
@@ -9,7 +10,7 @@ import { ColumnsButton } from './ColumnsButton'
 import { QueryInput, useKeys } from './QueryInput'
 import { TrainingsTable } from './TrainingsTable'
 import { useRows, within } from './useRows'
-import { DEFAULT_COLUMNS, type TableView } from './view'
+import { chooseProject, chosenProject, DEFAULT_COLUMNS, type TableView } from './view'
 import classes from './workbench.module.css'
 
 const PLACES = [
@@ -61,10 +62,24 @@ export function Trainings({ view, onView, ticked, onTick, empty, onStar, above, 
       <>
         {onStar && (
           <div className={classes.bar}>
+            <ProjectSelect view={view} onView={onView} />
             <PlaceSelect view={view} onView={onView} />
           </div>
         )}
-        <Panel>{empty}</Panel>
+        <Panel>
+          {view.project ? (
+            <Message
+              title="No training in this project"
+              actions={
+                <Button variant="default" onClick={() => onView(lookAt(''))}>
+                  Show all projects
+                </Button>
+              }
+            />
+          ) : (
+            empty
+          )}
+        </Panel>
       </>
     )
   }
@@ -83,6 +98,7 @@ export function Trainings({ view, onView, ticked, onTick, empty, onStar, above, 
           w={150}
           comboboxProps={{ width: 280, position: 'bottom-end' }}
         />
+        <ProjectSelect view={view} onView={onView} />
         {onStar && <PlaceSelect view={view} onView={onView} />}
         <ColumnsButton view={view} onView={onView} keys={keys} />
         {tools}
@@ -121,6 +137,32 @@ export function Trainings({ view, onView, ticked, onTick, empty, onStar, above, 
   )
 }
 
+/** Keeps the choice: the next list begins with it, too. */
+function lookAt(project: string): Partial<TableView> {
+  chooseProject(project)
+  return { project }
+}
+
+/** Which project is looked at; nothing where there is but one. */
+function ProjectSelect({ view, onView }: Pick<TrainingsProps, 'view' | 'onView'>) {
+  const { data } = $api.useQuery('get', '/api/projects', { params: { query: { limit: 200 } } })
+  const projects = data?.items ?? []
+  if (projects.length < 2 && !view.project) return null
+  return (
+    <Select
+      aria-label="Project"
+      placeholder="All projects"
+      searchable
+      clearable
+      data={projects.map(({ id, name }) => ({ value: id, label: name }))}
+      value={view.project || null}
+      onChange={(project) => onView(lookAt(project ?? ''))}
+      w={150}
+      comboboxProps={{ width: 280, position: 'bottom-end' }}
+    />
+  )
+}
+
 function PlaceSelect({ view, onView }: Pick<TrainingsProps, 'view' | 'onView'>) {
   return (
     <Select
@@ -138,6 +180,7 @@ function PlaceSelect({ view, onView }: Pick<TrainingsProps, 'view' | 'onView'>) 
 export function usePickerView(): [TableView, (change: Partial<TableView>) => void] {
   const [view, setView] = useState<TableView>({
     query: '',
+    project: chosenProject(),
     sort: '-created',
     columns: DEFAULT_COLUMNS,
     pinned: 0,

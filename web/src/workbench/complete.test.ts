@@ -23,6 +23,7 @@ test('values are quoted where they must be', () => {
 test('a view survives its address', () => {
   const view = {
     query: 'gamma > 0.9 -tag = "old one"',
+    project: 'p1',
     sort: 'algorithm.gamma',
     columns: ['state', 'train/return'],
     pinned: 1,

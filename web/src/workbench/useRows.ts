@@ -41,7 +41,7 @@ export function useRows(view: TableView, open: ReadonlySet<string>): Rows {
 function useAskedRows(view: TableView, open: ReadonlySet<string>): Rows {
   const grouped = view.by !== ''
   const column = useMemo(() => askedFor(view.columns), [view.columns])
-  const common = { place: view.place, column }
+  const common = { place: view.place, column, ...(view.project ? { project: view.project } : {}) }
   const list = $api.useInfiniteQuery(
     'get',
     '/api/experiments',

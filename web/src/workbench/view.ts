@@ -6,6 +6,8 @@ export type Place = 'live' | 'archived' | 'trash'
 
 export interface TableView {
   query: string
+  /** Id of the project that is looked at; empty for all. */
+  project: string
   /** A key, with a minus before it the largest first. */
   sort: string
   /** Keys after the name, in order. */
@@ -20,6 +22,7 @@ export interface TableView {
 export const DEFAULT_COLUMNS = ['state', 'success', 'seeds', 'arena', 'algorithm', 'reward', 'tag', 'created']
 const DEFAULTS: TableView = {
   query: '',
+  project: '',
   sort: '-created',
   columns: DEFAULT_COLUMNS,
   pinned: 0,
@@ -28,12 +31,21 @@ const DEFAULTS: TableView = {
 }
 const PLACES: readonly string[] = ['live', 'archived', 'trash']
 
+const PROJECT = 'mapless.project'
+
+/** Id of the project that this browser's person chose last: lists show it, trainings are launched into it. Empty for all. */
+export const chosenProject = (): string => localStorage.getItem(PROJECT) ?? ''
+
+export const chooseProject = (id: string): void =>
+  id ? localStorage.setItem(PROJECT, id) : localStorage.removeItem(PROJECT)
+
 /** The view that an address's query describes; what it does not say is as usual. */
 export function viewOf(search: URLSearchParams): TableView {
   const place = search.get('place') ?? ''
   const columns = search.get('columns')
   return {
     query: search.get('q') ?? '',
+    project: search.get('project') ?? chosenProject(),
     sort: search.get('sort') || DEFAULTS.sort,
     columns: columns === null ? DEFAULT_COLUMNS : [...new Set(columns.split(',').filter(Boolean))],
     pinned: Math.max(0, Number(search.get('pinned')) || 0),
@@ -46,6 +58,7 @@ export function viewOf(search: URLSearchParams): TableView {
 export function addressOf(view: TableView): URLSearchParams {
   const search = new URLSearchParams()
   if (view.query) search.set('q', view.query)
+  if (view.project) search.set('project', view.project)
   if (view.sort !== DEFAULTS.sort) search.set('sort', view.sort)
   if (view.columns.join() !== DEFAULT_COLUMNS.join()) search.set('columns', view.columns.join())
   if (view.pinned) search.set('pinned', String(view.pinned))
