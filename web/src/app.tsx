@@ -109,6 +109,10 @@ export const routes: RouteObject[] = [
             path: 'audit',
             lazy: async () => ({ Component: (await import('./pages/AuditPage')).AuditPage }),
           },
+          {
+            path: 'reference',
+            lazy: async () => ({ Component: (await import('./pages/ApiPage')).ApiPage }),
+          },
           { path: '*', element: <NotFoundPage /> },
         ],
       },

@@ -102,7 +102,7 @@ export function Shell() {
               </Anchor>
             </>
           )}
-          <Anchor href="/api/openapi.json" inherit c="inherit">
+          <Anchor component={Link} to="/reference" inherit c="inherit">
             API
           </Anchor>
         </Group>

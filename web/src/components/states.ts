@@ -6,9 +6,18 @@ export const STATES: Record<ExperimentState, { label: string; color: string }> =
   running: { label: 'Running', color: 'var(--mantine-primary-color-filled)' },
   stopping: { label: 'Stopping', color: 'var(--mantine-color-yellow-7)' },
   stopped: { label: 'Stopped', color: 'var(--mantine-color-gray-5)' },
-  completed: { label: 'Completed', color: 'var(--mantine-color-green-7)' },
+  // Grey: that it has ended says nothing about how well the robot drives.
+  completed: { label: 'Completed', color: 'var(--mapless-text-quiet)' },
   failed: { label: 'Failed', color: 'var(--mantine-color-red-7)' },
-  mixed: { label: 'Mixed', color: 'var(--mantine-color-yellow-7)' },
+  mixed: { label: 'Ended differently', color: 'var(--mantine-color-yellow-7)' },
+}
+
+/** "Completed and failed": what became of several runs that ended differently. */
+export function endsOf(states: readonly RunState[]): string {
+  const labels = [...new Set(states)].map((state) => STATES[state].label.toLowerCase())
+  const last = labels.pop()
+  const text = labels.length > 0 ? `${labels.join(', ')} and ${last}` : (last ?? STATES.mixed.label)
+  return text.charAt(0).toUpperCase() + text.slice(1)
 }
 
 export const canStop = (states: readonly RunState[]): boolean =>

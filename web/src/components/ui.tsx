@@ -2,10 +2,10 @@
 import { Alert, Button, Skeleton, Title, useComputedColorScheme } from '@mantine/core'
 import type { CSSProperties, ReactNode } from 'react'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
-import type { ExperimentState } from '../api/types'
+import type { ExperimentState, RunState } from '../api/types'
 import { lineColor } from '../charts/palette'
 import { IconAlertCircle, IconAlertTriangle } from './icons'
-import { STATES } from './states'
+import { endsOf, STATES } from './states'
 import classes from './ui.module.css'
 
 /** A page's frame: its title on the left, what can be done on the right. */
@@ -14,19 +14,16 @@ export function Page({
   above,
   below,
   actions,
-  wide = false,
   children,
 }: {
   title: ReactNode
-  /** Whether it takes all of a large screen. */
-  wide?: boolean
   above?: ReactNode
   below?: ReactNode
   actions?: ReactNode
   children: ReactNode
 }) {
   return (
-    <div className={classes.page} data-wide={wide || undefined}>
+    <div className={classes.page}>
       <div className={classes.top}>
         <div className={classes.topText}>
           {above}
@@ -148,8 +145,15 @@ export function QueryError({ error, what, retry }: { error: unknown; what: strin
   )
 }
 
-export function StateLabel({ state }: { state: ExperimentState }) {
-  const { label, color } = STATES[state]
+interface StateLabelProps {
+  state: ExperimentState
+  /** Of its runs, to say how they ended where they ended differently. */
+  states?: readonly RunState[]
+}
+
+export function StateLabel({ state, states = [] }: StateLabelProps) {
+  const { color } = STATES[state]
+  const label = state === 'mixed' ? endsOf(states) : STATES[state].label
   return (
     <span
       className={classes.state}

@@ -71,7 +71,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
       below={
         <Group gap="md" mt={4}>
           <Text size="sm">
-            <StateLabel state={experiment.state} />
+            <StateLabel state={experiment.state} states={states} />
           </Text>
           <Text size="sm" c="dimmed">
             {summaryOf(inShort(experiment.training))}

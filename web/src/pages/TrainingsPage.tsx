@@ -18,7 +18,6 @@ export function TrainingsPage() {
   return (
     <Page
       title="Trainings"
-      wide
       actions={
         <Button component={Link} to="/new" leftSection={<IconPlus size={16} />}>
           New training

@@ -36,7 +36,7 @@ export function Jobs() {
             <Table.Td>
               {job.state === 'running' ? percent(job.progress) : words(job.state)}
               {job.seconds_left !== null && `, ${duration(job.seconds_left)} left`}
-              {job.error && `: ${job.error}`}
+              {job.error && job.state !== 'cancelled' && `: ${job.error}`}
             </Table.Td>
             <Table.Td>{job.worker}</Table.Td>
             <Table.Td className={ui.number}>{age(job.created_at, now)}</Table.Td>

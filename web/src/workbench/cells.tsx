@@ -140,7 +140,7 @@ function Progress({ row }: { row: ListedExperiment }) {
   return (
     <div className={classes.progress}>
       <div>
-        <StateLabel state={state} />
+        <StateLabel state={state} states={row.states} />
         {isActive(state) && (
           <span className={`${ui.number} ${ui.quiet}`}>
             {left === null ? percent(progress) : `${duration(left)} left`}

@@ -18,7 +18,7 @@ export function CampaignState({ campaign, rows }: { campaign: Campaign; rows: re
         <Group justify="space-between" gap="4px 20px">
           <Group gap="4px 16px">
             <Text size="sm" component="div">
-              <StateLabel state={campaign.state} />
+              <StateLabel state={campaign.state} states={runs.map(({ run }) => run.state)} />
             </Text>
             <Text size="sm" className={ui.number}>
               {done} of {plural(runs.length, 'training')} done

@@ -44,7 +44,7 @@ export function SeedStrip({ row }: { row: CampaignRow }) {
                 data-state={run.state}
                 style={{ '--state-color': STATES[run.state].color } as React.CSSProperties}
               >
-                {run.state === 'running' ? percent(run.progress) : run.seed}
+                {run.state === 'running' ? `${percent(run.progress)} trained` : run.seed}
               </Anchor>
             </Tooltip>
           ))}
