@@ -31,6 +31,8 @@ class ArenaStore:
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
+        # By hash, with when its file was changed last: no more than MAX_ARENAS at a time are there.
+        self._names: dict[str, tuple[int, str]] = {}
 
     def add(self, document: ArenaFile) -> str:
         """Keep an arena; the same geometry again keeps its first name.
@@ -73,6 +75,21 @@ class ArenaStore:
         if document.sha256 != sha256:
             raise NotFoundError.of("imported arena", sha256[:12])
         return StoredArena(document, imported_at)
+
+    def name(self, sha256: str) -> str | None:
+        """What the arena of a hash is called, read once while its file stays as it is; None where there is none."""
+        try:
+            changed = self._path(sha256).stat().st_mtime_ns
+        except (OSError, NotFoundError):
+            return None
+        known = self._names.get(sha256)
+        if known is None or known[0] != changed:
+            try:
+                known = changed, self.get(sha256).document.name
+            except NotFoundError:
+                return None
+            self._names[sha256] = known
+        return known[1]
 
     def all(self) -> list[StoredArena]:
         """Every arena, by name; files that are none are passed over."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, status
+from fastapi import APIRouter, Depends, Query, status
 
 from server.experiments.form import form_schema
 from server.experiments.schemas import (
@@ -11,6 +11,7 @@ from server.experiments.schemas import (
     ExperimentLaunch,
     ExperimentPatch,
     TrainingForm,
+    TrainingPace,
 )
 from server.experiments.service import ExperimentService
 from server.problems import CONFLICT, NOT_FOUND
@@ -33,6 +34,16 @@ ExperimentServiceDep = Annotated[ExperimentService, Depends(_service)]
 def get_training_form() -> TrainingForm:
     """What the launch form is made of: schema, defaults and presets."""
     return TrainingForm(schema=form_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
+
+
+@router.get("/api/training/pace", dependencies=[SIGNED_IN])
+def get_training_pace(
+    algorithm: Annotated[str, Query(max_length=64)],
+    network: Annotated[str, Query(max_length=64)],
+    service: ExperimentServiceDep,
+) -> TrainingPace:
+    """How quick runs of an algorithm with a network were here, to tell how long another will take."""
+    return service.pace(algorithm, network)
 
 
 @router.post("/api/experiments", status_code=status.HTTP_201_CREATED, responses=NOT_FOUND, dependencies=[LAUNCH])

@@ -11,6 +11,8 @@ from server.errors import NotFoundError
 from server.experiments.schemas import ExperimentState
 from server.workbench.keys import KeyRepository
 
+# Among these of the whole service is looked for runs of a kind.
+_LAST_RUNS = 200
 # While any run is in one of these, that is what the experiment is; the first that applies.
 UNFINISHED: tuple[RunState, ...] = ("running", "stopping", "queued")
 
@@ -42,6 +44,29 @@ class ExperimentRepository:
         self._session.add(experiment)
         self._session.flush()
         KeyRepository(self._session).write_down([experiment])
+
+    def speeds(self, algorithm: str, network: str, metric: str) -> Sequence[float]:
+        """The newest value of a metric of the runs of an algorithm with a network, among those that ended last."""
+        last = (
+            select(tables.Run.id, tables.Run.experiment_id)
+            .where(tables.Run.finished_at.is_not(None))
+            .order_by(tables.Run.finished_at.desc())
+            .limit(_LAST_RUNS)
+            .subquery()
+        )
+        trained = tables.Experiment.training["algorithm"]
+        query = (
+            select(tables.LatestMetric.value)
+            .join(last, last.c.id == tables.LatestMetric.run_id)
+            .join(tables.Experiment, tables.Experiment.id == last.c.experiment_id)
+            .where(
+                tables.LatestMetric.name == metric,
+                tables.LatestMetric.value > 0.0,
+                trained["name"].as_string() == algorithm,
+                trained["network"]["name"].as_string() == network,
+            )
+        )
+        return self._session.scalars(query).all()
 
     def get(self, experiment_id: str, *, deleted: bool = False) -> tables.Experiment:
         """The experiment with its runs; one in the trash where it is `deleted`.

@@ -74,6 +74,13 @@ class Experiment(Schema):
     )
 
 
+class TrainingPace(Schema):
+    """How quick runs like one that is about to be launched were here."""
+
+    steps_per_second: float | None = Field(description="Median of those that ended last; null where there is none like it.")
+    runs: int = Field(description="Behind the median.")
+
+
 class TrainingForm(Schema):
     """Everything that the launch form is made of."""
 

@@ -1,5 +1,6 @@
 """What a person may do with an experiment."""
 
+import statistics
 import time
 from collections.abc import Callable, Sequence
 
@@ -18,6 +19,7 @@ from server.experiments.schemas import (
     Experiment,
     ExperimentLaunch,
     ExperimentPatch,
+    TrainingPace,
 )
 from server.experiments.stored import read_training
 from server.ids import new_id
@@ -26,7 +28,7 @@ from server.projects.repository import ProjectRepository
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, resume_run, stop_run
-from server.runs.views import SHOWN, run_view
+from server.runs.views import SHOWN, SPEED, run_view
 from server.security.principal import Principal
 from server.services import Services
 from workers.archive_size import refuse_too_large
@@ -101,6 +103,12 @@ class ExperimentService:
         """
         with self._services.database.read() as session:
             return _views(session, [ExperimentRepository(session).get(experiment_id)])[0]
+
+    def pace(self, algorithm: str, network: str) -> TrainingPace:
+        """How quick runs of an algorithm with a network were."""
+        with self._services.database.read() as session:
+            speeds = ExperimentRepository(session).speeds(algorithm, network, SPEED)
+        return TrainingPace(steps_per_second=statistics.median(speeds) if speeds else None, runs=len(speeds))
 
     def change(self, experiment_id: str, patch: ExperimentPatch) -> Experiment:
         """Give the experiment another name, or move it to another project.

@@ -9,6 +9,7 @@ import numpy as np
 from sqlalchemy import ColumnElement
 from sqlalchemy.orm import Session
 
+from server.arenas.store import ArenaStore
 from server.checkpoints.views import success_over_runs
 from server.database import tables
 from server.database.tables import RunState
@@ -24,7 +25,8 @@ from server.workbench.repository import ListedRun, WorkbenchRepository
 from server.workbench.schemas import Group, ListedExperiment
 
 _STEPS = "steps"
-_SHOWN = (*ALIASES.values(), _STEPS, UNREADABLE)
+_IMPORTED = "task.arena.sha256"
+_SHOWN = (*ALIASES.values(), _IMPORTED, _STEPS, UNREADABLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,11 @@ class _PacedRun:
 
 
 def listed(
-    session: Session, experiments: Sequence[tables.Experiment], settings: Collection[str], metrics: Sequence[str]
+    session: Session,
+    arenas: ArenaStore,
+    experiments: Sequence[tables.Experiment],
+    settings: Collection[str],
+    metrics: Sequence[str],
 ) -> list[ListedExperiment]:
     """These experiments as rows, with the settings and the metrics that are asked for by their whole names."""
     ids = [experiment.id for experiment in experiments]
@@ -52,8 +58,10 @@ def listed(
     values = _settings(session, experiments, {*_SHOWN, *settings})
     latest = repository.latest([run.id for run in chain(*runs.values())], metrics) if metrics else {}
     figures = figures_of([[run.id for run in runs.get(one, ())] for one in ids], latest, metrics)
+    imported = {str(values[one][_IMPORTED]) for one in ids if values[one].get(_IMPORTED)}
+    names = {sha256: name for sha256 in imported if (name := arenas.name(sha256))}
     return [
-        _row(one, runs.get(one.id, []), speeds, tags.get(one.id, []), values[one.id], settings, figures[place])
+        _row(one, runs.get(one.id, []), speeds, tags.get(one.id, []), values[one.id], names, settings, figures[place])
         for place, one in enumerate(experiments)
     ]
 
@@ -76,18 +84,21 @@ def _row(
     speeds: Mapping[str, float],
     tags: list[str],
     values: Mapping[str, Value],
+    imported: Mapping[str, str],
     settings: Collection[str],
     metrics: dict[str, SeedMean],
 ) -> ListedExperiment:
     total = int(values.get(_STEPS, 0))
     paced = [_PacedRun(run.state, run.step, total, speeds.get(run.id)) for run in runs]
     unreadable = values.get(UNREADABLE)
+    arena = str(values.get(ALIASES["arena"], ""))
     return ListedExperiment(
         id=experiment.id,
         project_id=experiment.project_id,
         name=experiment.name,
         created_at=experiment.created_at,
-        arena=str(values.get(ALIASES["arena"], "")),
+        arena=arena,
+        arena_title=imported.get(str(values.get(_IMPORTED, "")), arena.replace("_", " ").capitalize()),
         movers=int(values.get(ALIASES["movers"], 0)),
         robot=str(values.get(ALIASES["robot"], "")),
         algorithm=str(values.get(ALIASES["algorithm"], "")),

@@ -28,6 +28,7 @@ class ListedExperiment(Schema):
     name: str
     created_at: float
     arena: str
+    arena_title: str = Field(description="As people call it; of an imported one the name that its file gave it.")
     movers: int = Field(description="Moving obstacles.")
     robot: str
     algorithm: str

@@ -39,7 +39,7 @@ class WorkbenchService:
             matching = repository.matching(wanted)
             settings, metrics = _columns(session, columns)
             found, following = repository.page(matching, Sorting.of(sort), window.limit, window.offset, after)
-            items = listed(session, found, settings, metrics)
+            items = listed(session, self._services.arenas, found, settings, metrics)
             return ListedPage(items=items, total=repository.count(matching), next=following)
 
     def ids(self, wanted: Wanted) -> MatchingIds:

@@ -90,7 +90,11 @@ class ImportedArenaConfig(Frozen):
 
     name: Literal["imported"] = Field("imported", title="Imported", description="Read from a file; see the gallery.")
     sha256: str = Field(
-        "", pattern="^([0-9a-f]{64})?$", title="Imported arena", description="The hash that the gallery shows."
+        "",
+        pattern="^([0-9a-f]{64})?$",
+        title="Imported arena",
+        description="By the hash of its geometry; the form shows names.",
+        json_schema_extra={"x-imported-arena": True},
     )
     arena: ArenaFile | None = Field(None, title="Geometry", json_schema_extra=HIDDEN)
     movers: MoversConfig = Field(default_factory=MoversConfig, title="Movers")

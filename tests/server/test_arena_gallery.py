@@ -117,6 +117,15 @@ def test_a_training_on_an_imported_arena_carries_it_to_the_worker(client: TestCl
     assert arena.circles.tolist() == [[1.0, 0.5, 0.3]]
 
 
+def test_a_list_calls_an_imported_arena_by_its_name(client: TestClient) -> None:
+    sha256 = upload(client, keep=True).json()["config"]["sha256"]
+    launch(client, {"name": "imported", "sha256": sha256})
+    launch(client, {"name": "simple"})
+
+    listed = client.get("/api/experiments").json()["items"]
+    assert [(one["arena"], one["arena_title"]) for one in listed] == [("simple", "Simple"), ("imported", "Lab")]
+
+
 def test_geometry_that_comes_with_a_training_is_imported(client: TestClient, services: Services) -> None:
     config = upload(client).json()
     arena = config["config"] | {"arena": config["geometry"]}

@@ -345,3 +345,24 @@ def test_a_memory_that_makes_checkpoints_larger_than_the_service_takes_is_refuse
     assert problem["loc"] == ["body", "training", "algorithm", "sac", "replay_size"]
     assert "keep at most 104,000 transitions" in problem["msg"]
     assert client.get("/api/experiments").json()["items"] == []
+
+
+def test_how_quick_a_training_will_be_is_told_from_runs_like_it_that_have_ended(
+    client: TestClient, services: Services, reports: Reports
+) -> None:
+    like = {"algorithm": "ppo", "network": "mlp"}
+    assert client.get("/api/training/pace", params=like).json() == {"steps_per_second": None, "runs": 0}
+
+    for seconds, speed in enumerate((1_000.0, 9_000.0, 2_000.0)):
+        (run,) = reports.experiment()["runs"]
+        reports.metrics(run, "time/steps_per_second", {1_000: speed})
+        with services.database.write() as session:
+            row = session.get(tables.Run, run["id"])
+            assert row is not None
+            row.state, row.finished_at = "completed", 1_000.0 + seconds
+    (running,) = reports.experiment()["runs"]
+    reports.metrics(running, "time/steps_per_second", {1_000: 5.0})
+
+    assert client.get("/api/training/pace", params=like).json() == {"steps_per_second": 2_000.0, "runs": 3}
+    other = client.get("/api/training/pace", params={"algorithm": "sac", "network": "mlp"}).json()
+    assert other == {"steps_per_second": None, "runs": 0}

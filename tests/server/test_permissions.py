@@ -45,6 +45,7 @@ TABLE = {
         POST /api/sign-out
         GET /api/projects
         GET /api/training/form
+        GET /api/training/pace
         GET /api/training/starts
         GET /api/experiments
         GET /api/studies

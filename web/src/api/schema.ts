@@ -2296,6 +2296,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/training/pace": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Training Pace
+         * @description How quick runs of an algorithm with a network were here, to tell how long another will take.
+         */
+        get: operations["get_training_pace_api_training_pace_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/training/starts": {
         parameters: {
             query?: never;
@@ -5670,7 +5690,7 @@ export interface components {
             name: "imported";
             /**
              * Imported arena
-             * @description The hash that the gallery shows.
+             * @description By the hash of its geometry; the form shows names.
              * @default
              */
             sha256: string;
@@ -5691,7 +5711,7 @@ export interface components {
             name: "imported";
             /**
              * Imported arena
-             * @description The hash that the gallery shows.
+             * @description By the hash of its geometry; the form shows names.
              * @default
              */
             sha256: string;
@@ -6318,6 +6338,11 @@ export interface components {
             archived: boolean;
             /** Arena */
             arena: string;
+            /**
+             * Arena Title
+             * @description As people call it; of an imported one the name that its file gave it.
+             */
+            arena_title: string;
             /**
              * Campaign
              * @description Of the paper's reproduction that it was launched by; null for all others.
@@ -11151,6 +11176,22 @@ export interface components {
             schema: {
                 [key: string]: unknown;
             };
+        };
+        /**
+         * TrainingPace
+         * @description How quick runs like one that is about to be launched were here.
+         */
+        TrainingPace: {
+            /**
+             * Runs
+             * @description Behind the median.
+             */
+            runs: number;
+            /**
+             * Steps Per Second
+             * @description Median of those that ended last; null where there is none like it.
+             */
+            steps_per_second: number | null;
         };
         /**
          * TrainingPolicies
@@ -18486,6 +18527,47 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_training_pace_api_training_pace_get: {
+        parameters: {
+            query: {
+                algorithm: string;
+                network: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrainingPace"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

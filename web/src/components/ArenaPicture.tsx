@@ -12,7 +12,7 @@ export function ArenaPicture({ arena }: { arena: ArenaConfig }) {
     case 'complex':
       return <Fixed name={arena.name} />
     case 'imported':
-      return <Picture geometry={arena.arena ?? undefined} />
+      return arena.arena ? <Picture geometry={arena.arena} /> : <Imported sha256={arena.sha256} />
     default:
       return <Generated arena={arena} />
   }
@@ -21,6 +21,16 @@ export function ArenaPicture({ arena }: { arena: ArenaConfig }) {
 function Fixed({ name }: { name: 'simple' | 'complex' }) {
   const { data } = $api.useQuery('get', '/api/arenas/fixed', { params: { query: { name } } }, FOR_GOOD)
   return <Picture geometry={data?.geometry} />
+}
+
+function Imported({ sha256 }: { sha256: string }) {
+  const { data, isError } = $api.useQuery(
+    'get',
+    '/api/arenas/imported/{sha256}',
+    { params: { path: { sha256 } } },
+    { enabled: sha256 !== '', staleTime: 60_000, retry: false },
+  )
+  return sha256 === '' || isError ? null : <Picture geometry={data?.geometry} />
 }
 
 type GeneratedArena = Exclude<ArenaConfig, { name: 'simple' | 'complex' | 'imported' }>

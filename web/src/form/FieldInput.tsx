@@ -3,6 +3,7 @@ import { Anchor, Input, NumberInput, SegmentedControl, Select, Switch, Text, Tex
 import { useState } from 'react'
 import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
+import { ImportedArenaInput } from './ImportedArenaInput'
 import { type Field, initialOf } from './layout'
 import { problemOf } from './problems'
 import { SearchInput } from './SearchInput'
@@ -116,6 +117,16 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
         <TermsInput field={field} form={form} root={root} />
       )
     case 'text':
+      if (field.schema['x-imported-arena'])
+        return (
+          <ImportedArenaInput
+            id={common.id}
+            label={common.label}
+            error={error}
+            value={typeof value === 'string' ? value : ''}
+            onChange={set}
+          />
+        )
       return (
         <TextInput
           {...common}

@@ -29,13 +29,18 @@ export function FieldGrid({ fields, ...rest }: FieldGridProps) {
   )
 }
 
-/** Everything else, by heading; opens by itself where the server refused something inside. */
-export function AdvancedFields({ fields, ...rest }: FieldGridProps) {
+interface AdvancedFieldsProps extends FieldGridProps {
+  /** What kept the form from being launched. */
+  refused: Problems
+}
+
+/** Everything else, by heading; opens by itself where something inside was refused. */
+export function AdvancedFields({ fields, refused, ...rest }: AdvancedFieldsProps) {
   const { form, initial } = rest
   const [open, setOpen] = useState<string | null>(null)
   const [search, setSearch] = useState('')
   const troubled = fields.some((field) =>
-    Object.keys(form.problems).some((path) => isAt(field, path) || path === parentOf(field)),
+    Object.keys(refused).some((path) => isAt(field, path) || path === parentOf(field)),
   )
   useEffect(() => {
     if (!troubled) return

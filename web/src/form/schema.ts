@@ -33,6 +33,8 @@ export interface Schema {
   'x-presets'?: Record<string, Json>
   /** A list of which each kind may be there once: ticks, no rows to add. */
   'x-ticks'?: boolean
+  /** The hash of an imported arena, which is chosen by its name. */
+  'x-imported-arena'?: boolean
 }
 
 /** Values of a form: what JSON can hold. */

@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
 import type { TrainingConfig } from '../api/types'
 import { training } from '../testing/examples'
-import { inShort, rewardName, summaryOf } from './experiments'
+import { inShort, rewardName, suggestedName, summaryOf } from './experiments'
 
 const changed = (task: object): TrainingConfig => ({ ...training, task: { ...training.task, ...task } })
 
@@ -20,4 +20,11 @@ test('a reward goes by the name of the paper’s, or by how many terms it has', 
   )
   expect(named([arrival, progress, { name: 'time', weight: -1 }])).toBe('3 terms')
   expect(named([arrival])).toBe('1 term')
+})
+
+test('a name is suggested from what is trained where', () => {
+  expect(suggestedName(training as never)).toBe('PPO, simple')
+  const task = { arena: { name: 'imported', movers: { count: 4 } }, robot: { name: 'jackal' } }
+  expect(suggestedName({ algorithm: { name: 'sac' }, task }, 'Lab')).toBe('SAC, Lab, 4 moving, Jackal')
+  expect(suggestedName(null)).toBe('Training')
 })

@@ -1,5 +1,7 @@
 /** What lists and headings say about an experiment. */
 import type { ListedExperiment, TrainingConfig } from '../api/types'
+import type { Json } from '../form/schema'
+import { valueAt } from '../form/values'
 import { plural, words } from './format'
 
 /** What nobody needs to be told: the robot that everybody starts with. */
@@ -8,13 +10,13 @@ const USUAL_ROBOT = 'burger'
 /** What is trained, in the words of a list. */
 export type Trained = Pick<
   ListedExperiment,
-  'arena' | 'movers' | 'robot' | 'algorithm' | 'network' | 'reward'
+  'arena_title' | 'movers' | 'robot' | 'algorithm' | 'network' | 'reward'
 >
 
-/** A whole configuration in the words of a list. */
-export function inShort({ task, algorithm }: TrainingConfig): Trained {
+/** A whole configuration in the words of a list; an imported arena's name is to be given. */
+export function inShort({ task, algorithm }: TrainingConfig, arena = words(task.arena.name)): Trained {
   return {
-    arena: task.arena.name,
+    arena_title: arena,
     movers: task.arena.movers.count,
     robot: task.robot.name,
     algorithm: algorithm.name,
@@ -25,9 +27,9 @@ export function inShort({ task, algorithm }: TrainingConfig): Trained {
 
 /** "Simple, 4 moving · Jackal · PPO, MLP · Basic reward". */
 export function summaryOf(trained: Trained): string {
-  const { arena, movers, robot, reward } = trained
+  const { arena_title: arena, movers, robot, reward } = trained
   return [
-    movers > 0 ? `${words(arena)}, ${movers} moving` : words(arena),
+    movers > 0 ? `${arena}, ${movers} moving` : arena,
     ...(robot === USUAL_ROBOT ? [] : [words(robot)]),
     algorithmOf(trained),
     /^\d/.test(reward) ? `Reward of ${reward}` : `${words(reward)} reward`,
@@ -47,4 +49,20 @@ export function rewardName({ terms }: TrainingConfig['task']['reward']): string 
 /** "PPO, ResBlock". */
 export function algorithmOf({ algorithm, network }: Trained): string {
   return `${words(algorithm)}, ${words(network)}`
+}
+
+/** "PPO, rooms, 4 moving": a name for a training from its settings, as far as they can be read. */
+export function suggestedName(training: Json, arena?: string): string {
+  const at = (...path: string[]) => valueAt(training, path)
+  const movers = at('task', 'arena', 'movers', 'count')
+  const robot = at('task', 'robot', 'name')
+  const place = arena ?? words(String(at('task', 'arena', 'name') ?? '')).toLocaleLowerCase()
+  return [
+    words(String(at('algorithm', 'name') ?? 'training')),
+    place,
+    ...(typeof movers === 'number' && movers > 0 ? [`${movers} moving`] : []),
+    ...(typeof robot === 'string' && robot !== USUAL_ROBOT ? [words(robot)] : []),
+  ]
+    .filter(Boolean)
+    .join(', ')
 }

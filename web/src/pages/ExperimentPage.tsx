@@ -16,6 +16,7 @@ import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Page, Panel, QueryError, StateLabel } from '../components/ui'
+import { useArenaTitle } from '../components/useArenaTitle'
 import { inShort, summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -59,6 +60,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
   const navigate = useNavigate()
   const actions = useActions()
   const states = experiment.runs.map((run) => run.state)
+  const arena = useArenaTitle(experiment.training.task.arena)
   const of = { params: { path: { experiment_id: experiment.id } } }
   return (
     <Page
@@ -74,7 +76,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
             <StateLabel state={experiment.state} states={states} />
           </Text>
           <Text size="sm" c="dimmed">
-            {summaryOf(inShort(experiment.training))}
+            {summaryOf(inShort(experiment.training, arena))}
           </Text>
           <Text size="sm" c="dimmed">
             launched {dateTime(experiment.created_at)}

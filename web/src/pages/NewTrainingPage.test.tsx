@@ -1,6 +1,6 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { experiment, form, policy, training } from '../testing/examples'
+import { experiment, form, policy, status, training } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -12,6 +12,9 @@ function start(routes = {}) {
   return startServer({ 'GET /api/training/form': form, 'POST /api/experiments': LAUNCHED, ...routes })
 }
 
+/** What the form starts with: a name from the settings. */
+const NAMED = { ...form.defaults, name: 'PPO, simple' }
+
 const sent = (server: ReturnType<typeof start>) => server.changes.at(-1)?.body as typeof form.defaults
 
 test('the defaults can be launched at once, and a single run is then watched', async () => {
@@ -19,7 +22,7 @@ test('the defaults can be launched at once, and a single run is then watched', a
   const { router, user } = open('/new')
   await user.click(await screen.findByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(router.state.location.pathname).toBe('/runs/run1'))
-  expect(sent(server)).toEqual(form.defaults)
+  expect(sent(server)).toEqual(NAMED)
 })
 
 test('what is typed and chosen is what is sent', async () => {
@@ -81,7 +84,7 @@ test('a preset sets the training and leaves name and seeds; a change of it is ca
   await user.click(within(presets).getByRole('radio', { name: 'Default' }))
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(server.changes).toHaveLength(1))
-  expect(sent(server)).toEqual(form.defaults)
+  expect(sent(server)).toEqual(NAMED)
 })
 
 test('what the server refuses stands at its field, in the summary, and goes when the field is changed', async () => {
@@ -103,7 +106,7 @@ test('what the server refuses stands at its field, in the summary, and goes when
   await user.click(await screen.findByRole('button', { name: /Advanced/ }))
   const rate = await screen.findByRole('textbox', { name: 'Learning rate' })
   await user.clear(rate)
-  await user.type(rate, '7')
+  await user.type(rate, '0.05')
   await user.click(screen.getByRole('button', { name: 'Launch' }))
 
   const summary = await screen.findByTestId('problems')
@@ -115,6 +118,7 @@ test('what the server refuses stands at its field, in the summary, and goes when
   await user.click(within(summary).getByRole('button', { name: 'Learning rate' }))
   expect(rate).toHaveFocus()
   await user.clear(rate)
+  await user.type(rate, '0.01')
   expect(rate).toBeValid()
   expect(screen.queryByTestId('problems')).not.toBeInTheDocument()
 })
@@ -218,7 +222,7 @@ test('what was typed is there again after a look elsewhere, until one starts ove
   const { user } = open('/new')
   expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('Half done')
   await user.click(screen.getByRole('button', { name: 'Start over' }))
-  expect(screen.getByRole('textbox', { name: 'Name' })).toHaveValue('My first policy')
+  expect(screen.getByRole('textbox', { name: 'Name' })).toHaveValue('PPO, simple')
   expect(screen.queryByText('As you left it.')).not.toBeInTheDocument()
 })
 
@@ -230,7 +234,7 @@ test('what was launched is no draft any more', async () => {
   await waitFor(() => expect(first.router.state.location.pathname).toBe('/runs/run1'))
   first.unmount()
   open('/new')
-  expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('My first policy')
+  expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('PPO, simple')
 })
 
 test('advanced settings are searched by name, heading and description', async () => {
@@ -356,4 +360,66 @@ test('what can be set of a part is told in a line, shown when asked for, and nev
   ])
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(within(part).getByRole('textbox', { name: 'Weight' })).toBeInvalid())
+})
+
+test('what is wrong with a value is said beside it as it is typed, and keeps it from being launched', async () => {
+  const server = start()
+  const { user } = open('/new')
+  const steps = await screen.findByRole('textbox', { name: 'Steps' })
+  await user.clear(steps)
+  expect(steps).toHaveAccessibleDescription(/A whole number is missing/)
+  await user.type(steps, '5')
+  expect(steps).toHaveAccessibleDescription(/It must be 1\s000 to 1\s000\s000\s000\./)
+  expect(screen.queryByTestId('problems')).not.toBeInTheDocument()
+
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  expect(screen.getByTestId('problems')).toHaveTextContent(/Steps: It must be/)
+  expect(server.changes).toHaveLength(0)
+
+  await user.type(steps, '000')
+  expect(steps).toBeValid()
+  expect(screen.queryByTestId('problems')).not.toBeInTheDocument()
+})
+
+test('the name follows the settings until somebody chooses one', async () => {
+  start()
+  const { user } = open('/new')
+  const name = await screen.findByRole('textbox', { name: 'Name' })
+  await user.click(screen.getByRole('radio', { name: 'DDPG' }))
+  await waitFor(() => expect(name).toHaveValue('DDPG, simple'))
+  await user.type(name, ' again')
+  await user.click(screen.getByRole('radio', { name: 'PPO' }))
+  expect(name).toHaveValue('DDPG, simple again')
+})
+
+test('how long it will take is told from the runs like it', async () => {
+  start({ 'GET /api/training/pace': { steps_per_second: 10_000, runs: 4 } })
+  const { user } = open('/new')
+  const workers = status.workers.length
+  const estimate = await screen.findByTestId('time-estimate')
+  expect(estimate).toHaveTextContent('About 30 s once it begins')
+  expect(estimate).toHaveTextContent('as quick as 4 runs like it here')
+  const seeds = screen.getByRole('textbox', { name: 'Number of seeds' })
+  await user.clear(seeds)
+  await user.type(seeds, String(2 * workers))
+  await waitFor(() =>
+    expect(screen.getByTestId('time-estimate')).toHaveTextContent('About 1 min once it begins'),
+  )
+})
+
+test('an imported arena is chosen by its name', async () => {
+  const sha256 = 'ab'.repeat(32)
+  const chosen = structuredClone(form) as unknown as { schema: { $defs: Record<string, unknown> } }
+  const arena = chosen.schema.$defs.Arena as { properties: Record<string, unknown> }
+  arena.properties.sha256 = { type: 'string', title: 'Imported arena', default: '', 'x-imported-arena': true }
+  const imported = { kind: 'imported', key: sha256, title: 'Our lab', config: { name: 'imported', sha256 } }
+  const server = start({ 'GET /api/training/form': chosen, 'GET /api/arenas': [imported] })
+  const { user } = open('/new')
+  const field = await screen.findByRole('combobox', { name: 'Imported arena' })
+  expect(field).toHaveAccessibleDescription(/Choose one of the imported arenas/)
+  await user.click(field)
+  await user.click(await screen.findByRole('option', { name: 'Our lab' }))
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toMatchObject({ training: { task: { arena: { sha256 } } } })
 })

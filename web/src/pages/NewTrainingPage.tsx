@@ -7,24 +7,30 @@ import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
 import type { Experiment, Preset, ShippedPolicy, StartFrom, StartPolicy } from '../api/types'
 import { IconRocket } from '../components/icons'
+import { ArenaFields, isOfArena } from '../components/launch/ArenaFields'
+import { TimeEstimate } from '../components/launch/TimeEstimate'
 import { useLaunchProject } from '../components/people/useLaunchProject'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
+import { faultsOf } from '../form/faults'
 import { fieldsOf } from '../form/layout'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
 import { START_FIELD, StartFromInput } from '../form/StartFromInput'
 import type { Json, Schema } from '../form/schema'
 import { SearchContext, settingsOf, useSearchState } from '../form/search'
-import { useForm } from '../form/useForm'
+import { type Form, useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
 import { arenaFromSearch } from '../lib/arenas'
+import { suggestedName } from '../lib/experiments'
 import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import classes from './NewTrainingPage.module.css'
 
 /** Leaves room for what is added, within the server's 120 characters. */
 const LONGEST_COPIED_NAME = 110
+
+const NAME = ['name']
 
 type ExperimentLaunch = components['schemas']['ExperimentLaunch']
 type StudyLaunch = components['schemas']['StudyLaunch']
@@ -107,7 +113,8 @@ function withArena(defaults: unknown, chosen: string | null): Json | undefined {
   if (defaults === undefined) return undefined
   const values = defaults as Json
   const arena = arenaFromSearch(chosen)
-  return arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
+  const there = arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
+  return withValue(there, NAME, suggestedName(valueAt(there, ['training']) ?? null))
 }
 
 /** The training that made a shipped policy, from fresh weights or from the policy itself. */
@@ -178,12 +185,25 @@ interface LaunchFormProps {
 function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormProps) {
   const navigate = useNavigate()
   const [kept] = useState(() => readDraft(draft))
-  const form = useForm(kept ?? initial)
+  const state = useForm(kept ?? initial)
+  const search = useSearchState(`${draft}:search`)
+  const fields = fieldsOf(schema, schema, state.values)
+  const settings = settingsOf(search.searched, fields)
+  const isStudy = settings.length > 0
+  const typed = fields.filter(
+    (field) => !(field.key in search.searched) && !(isStudy && field.key === 'seeds'),
+  )
+  const faults = faultsOf(typed, schema, state.values)
+  const form = { ...state, problems: { ...state.problems, ...faults } }
+  const [pressed, setPressed] = useState(false)
+  const faulty = Object.keys(faults).length > 0
+  const refused = pressed && faulty ? form.problems : state.problems
   const changed = !sameValue(form.values, initial)
   useEffect(() => {
     if (changed) sessionStorage.setItem(draft, JSON.stringify(form.values))
     else sessionStorage.removeItem(draft)
   }, [draft, changed, form.values])
+  useSuggestedName(state)
   const { projects, project, choose } = useLaunchProject()
   const launch = $api.useMutation('post', '/api/experiments', {
     onSuccess: (experiment) => {
@@ -194,7 +214,6 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       if (error instanceof ApiError) form.refuse(error.problems)
     },
   })
-  const search = useSearchState(`${draft}:search`)
   const [choices, setChoices] = useState(FIRST_CHOICES)
   const launchStudy = $api.useMutation('post', '/api/studies', {
     onSuccess: (study) => {
@@ -206,13 +225,11 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       if (error instanceof ApiError) form.refuse(error.problems)
     },
   })
-  const fields = fieldsOf(schema, schema, form.values)
-  const settings = settingsOf(search.searched, fields)
-  const isStudy = settings.length > 0
   const launched = isStudy ? launchStudy : launch
   const seeds = fields.find((field) => field.key === 'seeds')
   const name = fields.filter((field) => field.key === 'name')
   const main = fields.filter((field) => !field.advanced && field !== seeds && field.key !== 'name')
+  const place = main.filter(isOfArena)
   const advanced = fields.filter((field) => field.advanced)
   const shared = { form, root: schema, initial: defaults }
 
@@ -230,6 +247,8 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       aria-label="New training"
       onSubmit={(event) => {
         event.preventDefault()
+        setPressed(true)
+        if (faulty) return
         const values = form.values as unknown as ExperimentLaunch
         if (isStudy) {
           const { seeds, ...rest } = choices
@@ -256,7 +275,7 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
               </Anchor>
             </Text>
           )}
-          <ProblemSummary fields={[...fields, START_FIELD]} problems={form.problems} root={schema} />
+          <ProblemSummary fields={[...fields, START_FIELD]} problems={refused} root={schema} />
           <Panel>
             <Stack gap="lg">
               <FieldGrid fields={name} {...shared} />
@@ -286,10 +305,11 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                 </Text>
               </div>
               <StartFromInput form={form} />
-              <FieldGrid fields={main} {...shared} />
+              <ArenaFields fields={place} {...shared} />
+              <FieldGrid fields={main.filter((field) => !isOfArena(field))} {...shared} />
             </Stack>
           </Panel>
-          <AdvancedFields fields={advanced} {...shared} />
+          <AdvancedFields fields={advanced} refused={refused} {...shared} />
         </Stack>
       </SearchContext>
       <aside className={classes.launch}>
@@ -317,6 +337,10 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                   ? `${plural(runs.length, 'run')} of ${count(steps)} steps`
                   : ' '}
             </Text>
+            <TimeEstimate
+              training={training}
+              runs={isStudy ? choices.trials * choices.seeds : Array.isArray(runs) ? runs.length : 0}
+            />
             {otherError && (
               <Text size="sm" c="red" role="alert">
                 Not launched: {messageOf(launched.error)}
@@ -338,6 +362,18 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
       </aside>
     </form>
   )
+}
+
+/** A training whose name nobody has chosen is called by its settings, whatever they become. */
+function useSuggestedName({ values, set }: Form): void {
+  const suggested = suggestedName(valueAt(values, ['training']) ?? null)
+  const name = valueAt(values, NAME)
+  const [last, setLast] = useState(suggested)
+  useEffect(() => {
+    if (suggested === last) return
+    if (name === last) set(NAME, suggested)
+    setLast(suggested)
+  }, [suggested, last, name, set])
 }
 
 /** A single run is what one wants to watch; several are looked at together. */

@@ -25,6 +25,7 @@ import { RunLog } from '../components/RunLog'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
+import { useArenaTitle } from '../components/useArenaTitle'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
 import { useNumberInAddress, useReplayInAddress, useTitle } from '../lib/hooks'
@@ -63,6 +64,7 @@ export function RunPage() {
 function LoadedRun({ run }: { run: RunDetail }) {
   const init = { params: { path: { run_id: run.id } } }
   const metrics = useCurves(run.id, POINTS)
+  const arena = useArenaTitle(run.training.task.arena)
   const [page, setPage] = useState(1)
   const checkpoints = $api.useQuery(
     'get',
@@ -103,7 +105,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       below={
         <Text size="sm" c="dimmed" mt={4}>
-          {summaryOf(inShort(run.training))}
+          {summaryOf(inShort(run.training, arena))}
         </Text>
       }
       actions={<RunActions run={run} />}

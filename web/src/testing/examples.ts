@@ -133,6 +133,7 @@ export const listed: ListedExperiment = {
   name: experiment.name,
   created_at: experiment.created_at,
   arena: 'simple',
+  arena_title: 'Simple',
   movers: 0,
   robot: 'burger',
   algorithm: 'ppo',

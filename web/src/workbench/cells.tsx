@@ -66,7 +66,7 @@ export function Cell({ row, column, now }: { row: ListedExperiment; column: stri
     case 'seeds':
       return count(row.runs)
     case 'arena':
-      return words(row.arena)
+      return row.arena_title
     case 'algorithm':
       return algorithmOf(row)
     case 'tag':
