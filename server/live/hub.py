@@ -94,6 +94,7 @@ class _Channel:
     told: WatchRequest | None = None
     screens: dict[Theme, _Screen] = field(default_factory=dict)
     last_frame: float = float("-inf")
+    playground: bool = False
 
     @property
     def views(self) -> list[View]:
@@ -226,6 +227,7 @@ class LiveHub:
             TooManyViewsError: the cap on scenes is reached.
         """
         channel = self._channel(run_id)
+        channel.playground = stage is not None
         screen = channel.screens.setdefault(theme, _Screen())
         screen.watchers += 1
         try:
@@ -259,7 +261,8 @@ class LiveHub:
                 score = score.model_copy(update={"refusal": self._full})
         else:
             score = screen.view.score()
-        return score.model_copy(update={"after_training": channel.driver is not None and not channel.callbacks})
+        driven = channel.driver is not None and not channel.callbacks
+        return score.model_copy(update={"after_training": driven, "playground": channel.playground})
 
     async def close(self) -> None:
         """Closes every scene; the hub is of no use afterwards."""

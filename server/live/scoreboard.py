@@ -30,6 +30,7 @@ class Score(BaseModel):
         mode: what is shown.
         step: environment steps of the training behind it.
         after_training: whether the policy is a finished one.
+        playground: whether a person plays with it.
         speed: simulated seconds per wall second.
         arrivals, collisions, timeouts: attempts of the robots on screen that ended since the view began.
         robots: the first few, or the one that is followed.
@@ -40,6 +41,7 @@ class Score(BaseModel):
     mode: ViewMode | None = None
     step: int = 0
     after_training: bool = False
+    playground: bool = False
     speed: float = 1.0
     arrivals: int = 0
     collisions: int = 0

@@ -23,6 +23,11 @@ class LiveSettings(Frozen):
     robots: int = Field(8, ge=1, le=MAX_ROBOTS, title="Robots")
     speed: Literal[1, 2, 5, 10] = Field(1, title="Speed", description="Simulated seconds per second, in policy mode.")
     rays: bool = Field(True, title="LiDAR rays")
+    ray_robots: Literal["followed", "all"] = Field(
+        "followed",
+        title="Rays of",
+        description="The followed robot, or the first one where none is; or all, which bury the arena.",
+    )
     follow: int | None = Field(None, ge=0, lt=MAX_ROBOTS, title="Follow", description="Index of the robot to stay with.")
 
     def watch_request(self) -> WatchRequest:

@@ -115,7 +115,7 @@ class LiveView:
             if frame is not None:
                 self._scoreboard.update(frame)
         with self._server.atomic():
-            self._scene.show_rays(settings.rays)
+            self._scene.show_rays(settings.rays, None if settings.ray_robots == "all" else settings.follow or 0)
             self._camera.follow(settings.follow, now)
             if frame is not None:
                 self._positions = [(float(x), float(y)) for x, y, _ in frame.poses]

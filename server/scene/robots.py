@@ -53,6 +53,7 @@ class RobotNodes:
 
         self._lidar = task.lidar
         self._rays_visible = True
+        self._rays_of: int | None = None
         self._ends = np.empty((robots, rays, 2, 3), np.float32)
         # Rays at the scanner's true height would hide the robots: they are drawn on the floor.
         self._ends[..., 2] = _FLOOR_HEIGHT
@@ -183,9 +184,10 @@ class RobotNodes:
         self._draw_flashes(now)
         self._last = frame
 
-    def show_rays(self, visible: bool) -> None:
-        """Shows or hides rays, hits and the scanned area."""
+    def show_rays(self, visible: bool, robot: int | None) -> None:
+        """Shows or hides rays, hits and the scanned area; those of one robot, or of all where it is None."""
         self._rays_visible = visible
+        self._rays_of = robot
         for node in (self._ray_lines, self._hits, self._fan):
             if node is not None:
                 node.visible = visible
@@ -209,13 +211,17 @@ class RobotNodes:
 
     def _draw_rays(self, frame: Frame) -> None:
         angles = frame.poses[:, 2:3] + drawn_ray_angles(self._lidar, frame.fields_of_view)
+        ranges = frame.ranges
+        if self._rays_of is not None:
+            # The count stays the same: the others' rays have no length, and lie where nobody sees them.
+            ranges = np.where(np.arange(len(ranges))[:, None] == min(self._rays_of, len(ranges) - 1), ranges, 0.0)
         self._ends[:, :, 0, :2] = origins = ray_origins(self._lidar, frame.poses)
-        self._ends[:, :, 1, 0] = origins[..., 0] + frame.ranges * np.cos(angles)
-        self._ends[:, :, 1, 1] = origins[..., 1] + frame.ranges * np.sin(angles)
+        self._ends[:, :, 1, 0] = origins[..., 0] + ranges * np.cos(angles)
+        self._ends[:, :, 1, 1] = origins[..., 1] + ranges * np.sin(angles)
         self._ray_lines.points = self._ends.reshape(-1, 2, 3)
         # The points stand a little before the surface that was met, or it would hide half of each. A ray that meets
         # nothing puts its point inside the robot, where nobody sees it: the count stays the same.
-        length = np.where(frame.ranges < self._lidar.range - 1e-3, frame.ranges - _HIT_OFFSET, 0.0)
+        length = np.where((ranges > 0.0) & (ranges < self._lidar.range - 1e-3), ranges - _HIT_OFFSET, 0.0)
         hits = self._ends[:, :, 0].copy()
         hits[..., 0] += length * np.cos(angles)
         hits[..., 1] += length * np.sin(angles)

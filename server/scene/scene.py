@@ -32,7 +32,7 @@ class Scene:
         self._server = server
         self._task = task
         self._colours = COLOURS[theme]
-        self._rays_visible = True
+        self._rays: tuple[bool, int | None] = (True, None)
         self._robots: RobotNodes | None = None
         self._movers: MoverNodes | None = None
         self._shape: tuple[int, ...] = ()
@@ -53,13 +53,13 @@ class Scene:
         """Moves the world so that the point (x, y) of the arena lies where the camera looks."""
         self._world.position = (-x, -y, 0.0)
 
-    def show_rays(self, visible: bool) -> None:
-        """Shows or hides rays, hits and scanned area."""
-        if visible == self._rays_visible:
+    def show_rays(self, visible: bool, robot: int | None) -> None:
+        """Shows or hides rays, hits and scanned area; those of one robot, or of all where it is None."""
+        if (visible, robot) == self._rays:
             return
-        self._rays_visible = visible
+        self._rays = visible, robot
         if self._robots is not None:
-            self._robots.show_rays(visible)
+            self._robots.show_rays(visible, robot)
 
     def update(self, frame: Frame, now: float) -> None:
         """Draws a frame.
@@ -76,7 +76,7 @@ class Scene:
                 self._robots.remove()
             self._shape = frame.ranges.shape
             self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
-            self._robots.show_rays(self._rays_visible)
+            self._robots.show_rays(*self._rays)
         self._robots.update(frame, now)
         if len(frame.movers) != (0 if self._movers is None else len(self._movers)):
             if self._movers is not None:

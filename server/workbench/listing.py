@@ -108,6 +108,7 @@ def _row(
         state=aggregate_state([run.state for run in runs]) if runs else "mixed",
         states=sorted({run.state for run in runs}),
         runs=len(runs),
+        run_id=runs[0].id if len(runs) == 1 else None,
         progress=min(1.0, sum(run.step for run in runs) / max(1, total * len(runs))),
         seconds_left=seconds_left(paced),
         campaign=experiment.campaign,

@@ -38,6 +38,7 @@ class ListedExperiment(Schema):
     state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
     states: list[RunState] = Field(description="That its runs are in, each once.")
     runs: int
+    run_id: str | None = Field(description="Of its only run; null where it has several.")
     progress: float = Field(description="Steps done by all runs over the steps that they were given, 0 to 1.")
     seconds_left: float | None = Field(
         description="Until its last run is through, those that wait included; null where that is not known."

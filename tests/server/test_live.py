@@ -286,6 +286,21 @@ async def _play(view: LiveView) -> bool:
     return False
 
 
+def test_the_rays_of_one_robot_leave_those_of_the_others_without_length() -> None:
+    frame = make_frame(robots=3)
+    server = start_viser()
+    try:
+        nodes = RobotNodes(server, "/robots", TaskConfig(), COLOURS["light"], frame)
+        nodes.show_rays(True, 1)
+        nodes.update(frame, 0.0)
+        rays = nodes._ray_lines.points.reshape(3, 30, 2, 3)
+    finally:
+        stop_viser(server)
+    lengths = np.linalg.norm(rays[:, :, 1] - rays[:, :, 0], axis=-1)
+    assert lengths[[0, 2]].max() == 0.0
+    assert lengths[1] == pytest.approx(np.full(30, 2.0), abs=1e-5)
+
+
 def test_rays_are_drawn_where_each_robots_own_scanner_has_them() -> None:
     frame = dataclasses.replace(
         make_frame(robots=2),
@@ -364,10 +379,11 @@ def test_settings_are_kept_and_come_with_a_status(client: TestClient, run_id: st
         "robots": 8,
         "speed": 1,
         "rays": True,
+        "ray_robots": "followed",
         "follow": None,
         "status": {"connected": False, "receiving": False, "watchers": 0},
     }
-    wanted = {"mode": "training", "robots": 64, "speed": 10, "rays": False, "follow": 63}
+    wanted = {"mode": "training", "robots": 64, "speed": 10, "rays": False, "ray_robots": "all", "follow": 63}
     assert client.put(f"/api/runs/{run_id}/live", json=wanted).json() == wanted | {"status": state["status"]}
     assert client.get(f"/api/runs/{run_id}/live").json() == wanted | {"status": state["status"]}
 

@@ -17,16 +17,20 @@ addEventListener("DOMContentLoaded", () => {
     return made;
   };
 
+  const name = (score) =>
+    score.playground ? "Playground" : score.after_training ? "Best policy" : score.mode === "policy" ? "Policy" : "Training";
+
   const draw = (score) => {
     const parts = [];
     if (score.state === "live") {
       const rate = score.speed >= 10 ? Math.round(score.speed) : +score.speed.toFixed(1);
       const title = element("div", "title");
       title.append(
-        element("span", "mode", score.after_training ? "Best policy" : score.mode === "policy" ? "Policy" : "Training"),
+        element("span", "mode", name(score)),
         element("span", "", score.mode === "policy" ? `${rate}× real time` : `time-lapse, ${rate}×`),
       );
-      parts.push(title, element("div", "step", `${score.after_training ? "after training, " : ""}step ${count.format(score.step)}`));
+      if (!score.playground) title.append(element("span", "", `, step ${count.format(score.step)}`));
+      parts.push(title);
       const tally = element("div", "tally");
       for (const [name, word, value] of [
         ["arrival", "arrived", score.arrivals],
@@ -36,20 +40,18 @@ addEventListener("DOMContentLoaded", () => {
         tally.append(element("span", name, `${count.format(value)} ${word}`));
       }
       parts.push(tally);
-      if (score.robots.length) {
-        const list = element("div", "robots");
-        for (const robot of score.robots) {
-          const line = element("div", `robot ${outcomes[robot.outcome]}`);
-          const dot = element("i", "");
-          dot.style.background = colours[robot.index % colours.length];
-          line.append(dot, element("span", "", `${robot.reward >= 0 ? "+" : "−"}${Math.abs(robot.reward).toFixed(0)}`));
-          list.append(line);
-        }
-        list.title = "Reward since the last target; the edge tells how the last attempt ended";
-        parts.push(list);
+      // Of the one that is followed: the figures of all would hide the arena.
+      if (score.robots.length === 1) {
+        const [robot] = score.robots;
+        const line = element("div", `robot ${outcomes[robot.outcome]}`);
+        const dot = element("i", "");
+        dot.style.background = colours[robot.index % colours.length];
+        const reward = `${robot.reward >= 0 ? "+" : "−"}${Math.abs(robot.reward).toFixed(0)}`;
+        line.append(dot, element("span", "", `reward since its last target ${reward}`));
+        parts.push(line);
       }
     } else {
-      const starting = score.after_training ? "Starting the best policy …" : waiting[score.state];
+      const starting = score.playground ? "Starting the policy …" : score.after_training ? "Starting the best policy …" : waiting[score.state];
       parts.push(element("div", "waiting", score.refusal ?? starting));
     }
     display.dataset.state = score.state;

@@ -6389,6 +6389,11 @@ export interface components {
             reward: string;
             /** Robot */
             robot: string;
+            /**
+             * Run Id
+             * @description Of its only run; null where it has several.
+             */
+            run_id: string | null;
             /** Runs */
             runs: number;
             /**
@@ -6552,6 +6557,13 @@ export interface components {
              */
             mode: "training" | "policy";
             /**
+             * Rays of
+             * @description The followed robot, or the first one where none is; or all, which bury the arena.
+             * @default followed
+             * @enum {string}
+             */
+            ray_robots: "followed" | "all";
+            /**
              * LiDAR rays
              * @default true
              */
@@ -6586,6 +6598,13 @@ export interface components {
              * @enum {string}
              */
             mode: "training" | "policy";
+            /**
+             * Rays of
+             * @description The followed robot, or the first one where none is; or all, which bury the arena.
+             * @default followed
+             * @enum {string}
+             */
+            ray_robots: "followed" | "all";
             /**
              * LiDAR rays
              * @default true

@@ -2,7 +2,7 @@
 import { ActionIcon, Button, Group, Skeleton, Slider, Text, Tooltip } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
@@ -13,18 +13,19 @@ import { ArenaDrawing } from './ArenaDrawing'
 import { evaluate, suiteInArena } from './evaluations/choices'
 import { IconRefresh, IconTrash } from './icons'
 
-export function ArenaCard({
-  arena,
-  onDelete,
-}: {
+interface ArenaCardProps {
   arena: ArenaSummary
+  /** Whether it was imported just now: then it comes on screen, and says so. */
+  isNew?: boolean
   onDelete: (arena: ArenaSummary) => void
-}) {
+}
+
+export function ArenaCard({ arena, isNew = false, onDelete }: ArenaCardProps) {
   switch (arena.kind) {
     case 'generated':
       return <FamilyCard arena={arena} />
     case 'imported':
-      return <ImportedCard arena={arena} onDelete={onDelete} />
+      return <ImportedCard arena={arena} isNew={isNew} onDelete={onDelete} />
     case 'fixed':
       return <FixedCard arena={arena} />
   }
@@ -40,7 +41,7 @@ function FixedCard({ arena }: { arena: ArenaSummary }) {
   return <Card title={arena.title} view={data} error={error} config={arena.config} />
 }
 
-function ImportedCard({ arena, onDelete }: { arena: ArenaSummary; onDelete: (arena: ArenaSummary) => void }) {
+function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
   const { data, error } = $api.useQuery(
     'get',
     '/api/arenas/imported/{sha256}',
@@ -50,6 +51,7 @@ function ImportedCard({ arena, onDelete }: { arena: ArenaSummary; onDelete: (are
   return (
     <Card
       title={arena.title}
+      isNew={isNew}
       view={data}
       error={error}
       config={arena.config}
@@ -123,6 +125,7 @@ function FamilyCard({ arena }: { arena: ArenaSummary }) {
 
 interface CardProps {
   title: string
+  isNew?: boolean
   view: ArenaView | undefined
   error: unknown
   config: ArenaSummary['config']
@@ -130,9 +133,13 @@ interface CardProps {
   children?: React.ReactNode
 }
 
-function Card({ title, view, error, config, action, children }: CardProps) {
+function Card({ title, isNew = false, view, error, config, action, children }: CardProps) {
+  const card = useRef<HTMLLIElement>(null)
+  useEffect(() => {
+    if (isNew) card.current?.scrollIntoView({ block: 'center', behavior: 'smooth' })
+  }, [isNew])
   return (
-    <li className={classes.card} data-testid="arena">
+    <li ref={card} className={classes.card} data-testid="arena" data-new={isNew || undefined}>
       <div className={classes.picture}>
         {view ? (
           <ArenaDrawing geometry={view.geometry} label={`${title} from above`} />

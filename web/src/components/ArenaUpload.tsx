@@ -14,7 +14,22 @@ import { Notice } from './ui'
 
 const ACCEPTED = '.yaml,.yml,.json,.world,.sdf,.pgm,.png,.cc'
 
-export function ArenaUpload() {
+/** What can be imported. */
+export const ArenaFormats = () => (
+  <Text size="sm" c="dimmed" maw="90ch">
+    Imported are arenas in our own YAML or JSON, Gazebo worlds (.world, .sdf) with cylinders and boxes, and
+    ROS maps (the YAML file and its image, chosen together). What moves in a world comes with it: actors by
+    their trajectories, models that a plugin moves by its keyframes or its source (.cc), chosen together with
+    the world.
+  </Text>
+)
+
+interface ArenaUploadProps {
+  /** Called with the hash of one that was kept. */
+  onImported: (sha256: string) => void
+}
+
+export function ArenaUpload({ onImported }: ArenaUploadProps) {
   const client = useQueryClient()
   const [files, setFiles] = useState<UploadFile[]>([])
   const [preview, setPreview] = useState<ArenaView>()
@@ -38,9 +53,10 @@ export function ArenaUpload() {
   }
   const keep = async () => {
     try {
-      await upload.mutateAsync({ body: { files, keep: true } })
+      const { config } = await upload.mutateAsync({ body: { files, keep: true } })
       close()
       await client.invalidateQueries({ queryKey: ['get', '/api/arenas'] })
+      if (config.name === 'imported') onImported(config.sha256)
     } catch (error) {
       setProblem(messageOf(error))
     }
@@ -76,12 +92,7 @@ export function ArenaUpload() {
               {problem}
             </Notice>
           )}
-          <Text size="xs" c="dimmed">
-            Read are arenas in our own YAML, Gazebo worlds (.world, .sdf) with cylinders and boxes, and ROS
-            maps: choose the YAML file and its image together. Of what moves in a world, actors are read from
-            their trajectories, and models that a plugin moves from a file of keyframes or the plugin’s source
-            (.cc), chosen together with the world.
-          </Text>
+          {problem && <ArenaFormats />}
           <Group justify="flex-end">
             <Button variant="default" onClick={close}>
               {preview ? 'Cancel' : 'Close'}

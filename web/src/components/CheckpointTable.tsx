@@ -26,7 +26,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
     )
   }
   return (
-    <Table.ScrollContainer type="native" minWidth={320} mah={420}>
+    <Table.ScrollContainer type="native" minWidth={320}>
       <Table highlightOnHover className={classes.table} data-testid="checkpoints">
         <Table.Thead>
           <Table.Tr>

@@ -45,7 +45,7 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
           {filter === 'all' ? 'Failures first, then the narrowest.' : 'The narrowest first.'}
         </Text>
       </Group>
-      <Table.ScrollContainer type="native" minWidth={340} mah={420}>
+      <Table.ScrollContainer type="native" minWidth={340}>
         <Table highlightOnHover className={table.table}>
           <Table.Thead>
             <Table.Tr>

@@ -2,7 +2,6 @@
 import {
   ActionIcon,
   Button,
-  Checkbox,
   Group,
   NumberInput,
   SegmentedControl,
@@ -12,7 +11,7 @@ import {
   useComputedColorScheme,
 } from '@mantine/core'
 import { type QueryClient, useQuery, useQueryClient } from '@tanstack/react-query'
-import { type ReactNode, useEffect, useRef, useState } from 'react'
+import { type ReactNode, type RefObject, useEffect, useRef, useState } from 'react'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
@@ -20,6 +19,8 @@ import { IconMaximize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
 
 const MAX_ROBOTS = 64
+/** In full screen nothing is seen that lies outside. */
+const WITHIN = { withinPortal: false }
 const SPEEDS = [1, 2, 5, 10] as const
 /** A hidden tab keeps its picture this long, so that a glance elsewhere costs nothing. */
 const HIDDEN_MS = 20_000
@@ -95,9 +96,10 @@ interface LiveViewProps extends LiveControlsProps {
 }
 
 function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {
+  const whole = useRef<HTMLDivElement>(null)
   return (
-    <div>
-      <LiveFrame page={page} overlay={overlay} receiving={live?.status.receiving ?? false} />
+    <div ref={whole} className={classes.whole}>
+      <LiveFrame page={page} overlay={overlay} receiving={live?.status.receiving ?? false} whole={whole} />
       <LiveControls live={live} change={change} driven={driven} />
     </div>
   )
@@ -106,10 +108,12 @@ function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {
 interface LiveFrameProps extends Pick<LiveViewProps, 'page' | 'overlay'> {
   /** Whether pictures come. */
   receiving: boolean
+  /** What fills the screen, where that is more than the picture: it with its controls. */
+  whole?: RefObject<HTMLElement | null>
 }
 
 /** The page in 3D, what stands in its place, and the way to see it as large as the screen. */
-export function LiveFrame({ page, overlay, receiving }: LiveFrameProps) {
+export function LiveFrame({ page, overlay, receiving, whole }: LiveFrameProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const box = useRef<HTMLDivElement>(null)
   return (
@@ -134,7 +138,11 @@ export function LiveFrame({ page, overlay, receiving }: LiveFrameProps) {
             className={classes.full}
             variant="default"
             aria-label="Full screen"
-            onClick={() => void box.current?.requestFullscreen()}
+            onClick={() =>
+              void (document.fullscreenElement
+                ? document.exitFullscreen()
+                : (whole ?? box).current?.requestFullscreen())
+            }
           >
             <IconMaximize size={16} />
           </ActionIcon>
@@ -282,6 +290,7 @@ function LiveControls({ live, change, driven }: LiveControlsProps) {
           w={126}
           aria-label="Follow"
           disabled={off}
+          comboboxProps={WITHIN}
           value={follow === null ? 'none' : String(follow)}
           onChange={(next) => change({ follow: next === null || next === 'none' ? null : Number(next) })}
           data={[
@@ -292,13 +301,22 @@ function LiveControls({ live, change, driven }: LiveControlsProps) {
             })),
           ]}
         />
-        <Checkbox
+        <Select
           size="xs"
-          label="Rays"
+          w={126}
+          aria-label="LiDAR rays"
           disabled={off}
-          checked={live?.rays ?? true}
-          onChange={(event) => change({ rays: event.currentTarget.checked })}
-          styles={{ body: { alignItems: 'center', height: 30 } }}
+          allowDeselect={false}
+          comboboxProps={WITHIN}
+          value={live?.rays === false ? 'none' : (live?.ray_robots ?? 'followed')}
+          onChange={(next) =>
+            change(next === 'all' || next === 'followed' ? { rays: true, ray_robots: next } : { rays: false })
+          }
+          data={[
+            { value: 'followed', label: 'Rays of one' },
+            { value: 'all', label: 'Rays of all' },
+            { value: 'none', label: 'No rays' },
+          ]}
         />
       </Group>
       <Text size="xs" c="dimmed" mt={6}>

@@ -1,6 +1,7 @@
 /** The small parts that every page is made of. */
-import { Alert, Button, Skeleton, Title, useComputedColorScheme } from '@mantine/core'
+import { Alert, Button, Group, Skeleton, Title, useComputedColorScheme } from '@mantine/core'
 import type { CSSProperties, ReactNode } from 'react'
+import { Link } from 'react-router'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
 import type { ExperimentState, RunState } from '../api/types'
 import { lineColor } from '../charts/palette'
@@ -124,7 +125,7 @@ export function Message({
 export function QueryError({ error, what, retry }: { error: unknown; what: string; retry: () => void }) {
   if (isNotFound(error)) {
     return (
-      <Message title={`There is no such ${what}`} role="alert">
+      <Message title={`There is no such ${what}`} role="alert" actions={<WaysOn what={what} />}>
         It may have been deleted, or the address is not complete.
       </Message>
     )
@@ -142,6 +143,34 @@ export function QueryError({ error, what, retry }: { error: unknown; what: strin
     >
       {offline ? 'This page fills by itself as soon as the server is back.' : messageOf(error)}
     </Message>
+  )
+}
+
+const TRAININGS = [
+  ['/', 'All trainings'],
+  ['/?place=trash', 'Look in the trash'],
+] as const
+/** Where to look for what is not there. */
+const WAYS_ON: Record<string, readonly (readonly [to: string, label: string])[]> = {
+  training: TRAININGS,
+  run: TRAININGS,
+  policy: [['/policies', 'All policies']],
+  evaluation: [['/evaluations', 'All evaluations']],
+  leaderboard: [['/leaderboards', 'All leaderboards']],
+  study: [['/studies', 'All studies']],
+  project: [['/projects', 'All projects']],
+  playground: [['/playground', 'Open another']],
+}
+
+function WaysOn({ what }: { what: string }) {
+  return (
+    <Group gap="xs" justify="center">
+      {(WAYS_ON[what] ?? [['/', 'All trainings']]).map(([to, label]) => (
+        <Button key={to} component={Link} to={to} variant="default">
+          {label}
+        </Button>
+      ))}
+    </Group>
   )
 }
 

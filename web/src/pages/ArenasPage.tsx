@@ -6,20 +6,21 @@ import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaSummary } from '../api/types'
 import { ArenaCard } from '../components/ArenaCard'
-import { ArenaUpload } from '../components/ArenaUpload'
+import { ArenaFormats, ArenaUpload } from '../components/ArenaUpload'
 import { IconSearch } from '../components/icons'
 import { Notice, Page, Panel, QueryError } from '../components/ui'
 import { useTitle } from '../lib/hooks'
 import classes from './ArenasPage.module.css'
 
+/** One's own first: whoever imports one sees it. */
 const SECTIONS = [
+  { kind: 'imported', title: 'Imported', text: 'Read from files, the newest first.' },
   { kind: 'fixed', title: 'Built in', text: 'The two arenas of the paper.' },
   {
     kind: 'generated',
     title: 'Generated',
     text: 'A training meets a pool of different maps like the one shown; evaluations use maps that no training has seen.',
   },
-  { kind: 'imported', title: 'Imported', text: 'Read from files.' },
 ] as const
 
 /** Imported arenas that are drawn at first: each is a request of its own. */
@@ -28,9 +29,10 @@ const FIRST = 24
 export function ArenasPage() {
   useTitle('Arenas')
   const { data, error, refetch } = $api.useQuery('get', '/api/arenas')
+  const [newest, setNewest] = useState<string>()
   const [deleting, setDeleting] = useState<ArenaSummary>()
   return (
-    <Page title="Arenas" actions={<ArenaUpload />}>
+    <Page title="Arenas" below={<ArenaFormats />} actions={<ArenaUpload onImported={setNewest} />}>
       {error && !data ? (
         <Panel>
           <QueryError error={error} what="list of arenas" retry={refetch} />
@@ -47,7 +49,10 @@ export function ArenasPage() {
             key={kind}
             title={title}
             text={text}
-            arenas={data.filter((arena) => arena.kind === kind)}
+            arenas={data
+              .filter((arena) => arena.kind === kind)
+              .sort((one, other) => (other.imported_at ?? 0) - (one.imported_at ?? 0))}
+            newest={newest}
             onDelete={setDeleting}
           />
         ))
@@ -61,10 +66,12 @@ interface SectionProps {
   title: string
   text: string
   arenas: readonly ArenaSummary[]
+  /** The key of the one that was imported just now. */
+  newest: string | undefined
   onDelete: (arena: ArenaSummary) => void
 }
 
-function Section({ title, text, arenas, onDelete }: SectionProps) {
+function Section({ title, text, arenas, newest, onDelete }: SectionProps) {
   const [shown, setShown] = useState(FIRST)
   const [query, setQuery] = useState('')
   const found = arenas.filter((arena) => arena.title.toLowerCase().includes(query.trim().toLowerCase()))
@@ -90,7 +97,7 @@ function Section({ title, text, arenas, onDelete }: SectionProps) {
       </Group>
       <ul className={classes.grid}>
         {found.slice(0, shown).map((arena) => (
-          <ArenaCard key={arena.key} arena={arena} onDelete={onDelete} />
+          <ArenaCard key={arena.key} arena={arena} isNew={arena.key === newest} onDelete={onDelete} />
         ))}
       </ul>
       {found.length > shown && (

@@ -17,7 +17,7 @@ import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { WaitsForExtensions } from '../components/Extensions'
-import { IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
+import { IconCopy, IconDownload, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
@@ -108,10 +108,10 @@ function LoadedRun({ run }: { run: RunDetail }) {
           {summaryOf(inShort(run.training, arena))}
         </Text>
       }
-      actions={<RunActions run={run} />}
+      actions={<RunActions run={run} best={checkpoints.data?.best ?? null} />}
     >
       <Stack gap="md">
-        <Vitals run={run} />
+        <Vitals run={run} best={checkpoints.data?.best ?? null} />
         {run.error && (
           <Notice bad title={run.state === 'failed' ? 'This run failed' : 'What happened'}>
             <Text size="sm" className={classes.error}>
@@ -121,7 +121,6 @@ function LoadedRun({ run }: { run: RunDetail }) {
         )}
         <WaitsForExtensions extensions={run.waits_for} />
         <UnreadableSettings names={run.unreadable} lacking={run.lacking} />
-        <Diagnoses runId={run.id} state={run.state} />
         <div className={classes.stage}>
           <Panel flush>
             <RunLiveView
@@ -140,10 +139,31 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Stack>
           </Panel>
         </div>
+        <Diagnoses runId={run.id} state={run.state} />
+        <Panel title="Curves">
+          <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
+            <Tabs.List mb="md" className={classes.tabs}>
+              {SECTIONS.map(({ title }) => (
+                <Tabs.Tab key={title} value={title}>
+                  {title}
+                </Tabs.Tab>
+              ))}
+            </Tabs.List>
+            {SECTIONS.map(({ title, charts }) => (
+              <Tabs.Panel key={title} value={title}>
+                <div className={grid.grid}>
+                  {charts.map((spec) => (
+                    <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
+                  ))}
+                </div>
+              </Tabs.Panel>
+            ))}
+          </Tabs>
+        </Panel>
         <Panel title="Checkpoints" flush>
           {checkpoints.data ? (
             <>
-              <CheckpointTable checkpoints={checkpoints.data.items} chosen={chosen} onChoose={choose} />
+              <CheckpointTable checkpoints={bestFirst(checkpoints.data)} chosen={chosen} onChoose={choose} />
               <Pager
                 page={page}
                 size={CHECKPOINTS_A_PAGE}
@@ -166,30 +186,15 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Panel>
           </div>
         )}
-        <Panel title="Curves">
-          <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
-            <Tabs.List mb="md" className={classes.tabs}>
-              {SECTIONS.map(({ title }) => (
-                <Tabs.Tab key={title} value={title}>
-                  {title}
-                </Tabs.Tab>
-              ))}
-            </Tabs.List>
-            {SECTIONS.map(({ title, charts }) => (
-              <Tabs.Panel key={title} value={title}>
-                <div className={grid.grid}>
-                  {charts.map((spec) => (
-                    <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
-                  ))}
-                </div>
-              </Tabs.Panel>
-            ))}
-          </Tabs>
-        </Panel>
         <RunLog runId={run.id} state={run.state} />
       </Stack>
     </Page>
   )
+}
+
+/** Those of a page of the list, below the best of all. */
+function bestFirst({ best, items }: CheckpointPage): Checkpoint[] {
+  return best ? [best, ...items.filter(({ id }) => id !== best.id)] : items
 }
 
 /** The checkpoint in the address, on whichever page of the list it stands, else the best one. */
@@ -222,7 +227,13 @@ function SpecChart({ spec, series, height, empty }: SpecChartProps) {
   return <MetricChart {...look} data={data} height={height} empty={empty} />
 }
 
-function RunActions({ run }: { run: RunDetail }) {
+interface OfRun {
+  run: RunDetail
+  /** Its best checkpoint so far. */
+  best: Checkpoint | null
+}
+
+function RunActions({ run, best }: OfRun) {
   const navigate = useNavigate()
   const actions = useActions()
   const of = { params: { path: { run_id: run.id } } }
@@ -251,6 +262,16 @@ function RunActions({ run }: { run: RunDetail }) {
           Resume
         </Button>
       )}
+      {best && (
+        <Button
+          component="a"
+          href={`/api/checkpoints/${best.id}/download`}
+          download
+          leftSection={<IconDownload size={16} />}
+        >
+          Download the best
+        </Button>
+      )}
       <Button
         variant="default"
         leftSection={<IconCopy size={16} />}
@@ -275,7 +296,7 @@ function RunActions({ run }: { run: RunDetail }) {
 }
 
 /** The figures that are glanced at: all in one line, with the progress under it. */
-function Vitals({ run }: { run: RunDetail }) {
+function Vitals({ run, best }: OfRun) {
   const progress = run.step / run.total_steps
   const figures: [label: string, value: string][] = [
     // The last rollout is whole, so that a completed run has some steps more than it was given.
@@ -290,6 +311,16 @@ function Vitals({ run }: { run: RunDetail }) {
       : []),
     ['Success, training', run.success_rate === null ? '–' : percent(run.success_rate)],
     ['Success, evaluation', run.eval_success_rate === null ? '–' : percent(run.eval_success_rate)],
+    ...(best
+      ? [
+          [
+            'Best checkpoint',
+            [best.evaluation && percent(best.evaluation.success.value), `step ${count(best.step)}`]
+              .filter(Boolean)
+              .join(' at '),
+          ] as [string, string],
+        ]
+      : []),
     ...(run.attempt > 1 ? [['Attempt', count(run.attempt)] as [string, string]] : []),
     ...(run.worker ? [['Worker', run.worker] as [string, string]] : []),
   ]

@@ -12,7 +12,7 @@ const other = {
   name: 'Maze',
   state: 'failed' as const,
   success: null,
-  arena: 'complex',
+  arena_title: 'Complex',
   movers: 4,
 }
 const two = { items: [listed, other], total: 2, next: null }

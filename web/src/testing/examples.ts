@@ -134,6 +134,7 @@ export const listed: ListedExperiment = {
   created_at: experiment.created_at,
   arena: 'simple',
   arena_title: 'Simple',
+  run_id: null,
   movers: 0,
   robot: 'burger',
   algorithm: 'ppo',
@@ -171,6 +172,7 @@ export const live: LiveState = {
   robots: 8,
   speed: 1,
   rays: true,
+  ray_robots: 'followed',
   follow: null,
   status: { connected: true, receiving: true, watchers: 1 },
 }

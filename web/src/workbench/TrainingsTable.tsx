@@ -89,8 +89,7 @@ export function TrainingsTable(props: TrainingsTableProps) {
     const to = steps[event.key]
     if (to !== undefined) go(to)
     else if (event.key === ' ' && row.kind === 'training') tick(row.experiment.id)
-    else if (event.key === 'Enter' && row.kind === 'training')
-      void navigate(`/experiments/${row.experiment.id}`)
+    else if (event.key === 'Enter' && row.kind === 'training') void navigate(pageOf(row.experiment))
     else if ((event.key === 'Enter' || event.key === ' ') && row.kind === 'group') props.onOpen(row.group)
     else return
     event.preventDefault()
@@ -257,7 +256,7 @@ function TrainingCells({
         className={classes.name}
       >
         {onStar && <Star experiment={experiment} onStar={onStar} />}
-        <Anchor component={Link} to={`/experiments/${experiment.id}`} inherit title={experiment.name}>
+        <Anchor component={Link} to={pageOf(experiment)} inherit title={experiment.name}>
           {experiment.name}
         </Anchor>
       </GridCell>
@@ -282,6 +281,10 @@ function TrainingCells({
   )
 }
 
+/** A training of one run is that run: a page with nothing but a way to it would be one too many. */
+const pageOf = ({ id, run_id }: ListedExperiment): string =>
+  run_id === null ? `/experiments/${id}` : `/runs/${run_id}`
+
 function CardCells({ experiment, view, now, ticked, onTick, onStar }: TrainingCellsProps) {
   return (
     // biome-ignore lint/a11y/useSemanticElements: of a thousand rows a table element draws all.
@@ -292,7 +295,7 @@ function CardCells({ experiment, view, now, ticked, onTick, onStar }: TrainingCe
       </div>
       <div className={classes.card}>
         <div>
-          <Anchor component={Link} to={`/experiments/${experiment.id}`} inherit>
+          <Anchor component={Link} to={pageOf(experiment)} inherit>
             {experiment.name}
           </Anchor>
           <span>{age(experiment.created_at, now)}</span>
