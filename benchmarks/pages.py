@@ -2,8 +2,8 @@
 
 Lighthouse (pinned in web/package-lock.json) runs with its phone profile, 1.6 Mbit/s and a processor four times as slow, and
 gives performance, accessibility and best practices 0 to 100 points each. *Usable* is measured by ourselves under the same
-throttling, which Chromium applies: from the address, nothing in the cache, until pressing the switch of the colour scheme has
-changed the colours; median of five. Views in 3D wait for a press, and are not part of it.
+throttling, which Chromium applies: from the address, nothing in the cache, until pressing the switch of the colour scheme
+has changed the colours; median of five. Views in 3D wait for a press, and are not part of it.
 
     python -m benchmarks.pages --check                      every page: about ten minutes
     python -m benchmarks.pages --check --pages run arenas   some of them

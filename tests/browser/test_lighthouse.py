@@ -1,4 +1,4 @@
-"""Lighthouse finds the built pages accessible and well made; how quick they are `benchmarks.pages` says on an idle machine."""
+"""Lighthouse finds a built page accessible and well made; how quick it is `benchmarks.pages` says."""
 
 from pathlib import Path
 
