@@ -10,12 +10,13 @@ final state of every run is compared with that of a run that nobody disturbed.
     python -m benchmarks.chaos --faults 500 --mode production --check
 """
 
+import math
 import signal
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.chaos.campaign import Campaign, Outcome
+from benchmarks.chaos.campaign import STUCK_SECONDS, Campaign, Outcome
 from benchmarks.chaos.kinds import Kind
 from benchmarks.chaos.proof import Proof, Verdict
 from benchmarks.chaos.report import figures, table, targets
@@ -37,6 +38,8 @@ def campaign(
     runs: int,
     steps: int,
     lease_seconds: float,
+    seconds: float = math.inf,
+    patience: float = STUCK_SECONDS,
     talk: bool,
 ) -> tuple[Outcome, Verdict]:
     """Inject faults, wait for the end of all runs, and compare.
@@ -49,13 +52,17 @@ def campaign(
         runs: trainings side by side; there is one more worker.
         steps: of each training.
         lease_seconds: of the service.
+        seconds: after which no more faults come.
+        patience: as of a campaign.
         talk: whether to tell each fault on standard error.
     """
     with TemporaryDirectory(prefix="mapless-chaos-") as directory:
         stack = Stack(Path(directory), mode, runs + 1, lease_seconds)
         try:
             stack.start()
-            outcome = Campaign(stack, kinds, faults, seed, small_training(steps), talk=talk).run()
+            outcome = Campaign(
+                stack, kinds, faults, seed, small_training(steps), seconds=seconds, patience=patience, talk=talk
+            ).run()
             stack.recorder.close()
             proof = Proof(stack.database_url, stack.data / "checkpoints", stack.recorder.attempts(), outcome.damaged)
             try:
@@ -73,6 +80,15 @@ def main() -> None:
     """Measure and print."""
     options = parser(__doc__)
     options.add_argument("--faults", type=int, default=500)
+    options.add_argument(
+        "--minutes", type=float, default=math.inf, help="after which no more faults come; as long as it takes"
+    )
+    options.add_argument(
+        "--patience",
+        type=float,
+        default=STUCK_SECONDS,
+        help="seconds beyond the lease before a run counts as stuck; more on a busy machine",
+    )
     options.add_argument("--mode", choices=("embedded", "production"), default="embedded")
     options.add_argument("--seed", type=int, default=0, help="of the faults' order and victims")
     options.add_argument("--runs", type=int, default=2, help="trainings side by side")
@@ -94,6 +110,8 @@ def main() -> None:
         runs=arguments.runs,
         steps=arguments.steps,
         lease_seconds=arguments.lease,
+        seconds=60.0 * arguments.minutes,
+        patience=arguments.patience,
         talk=True,
     )
     print(table(outcome.injected))

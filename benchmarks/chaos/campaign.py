@@ -1,5 +1,6 @@
 """Faults, one round after another: launch, hit, wait until everything has recovered, hit again."""
 
+import math
 import random
 import sys
 import time
@@ -15,9 +16,9 @@ from benchmarks.chaos.recovery import Recovery
 from benchmarks.chaos.stack import Node, Stack
 
 # On top of the lease: for a run that shows no sign of life after a fault, before it counts as stuck.
-_STUCK_SECONDS = 60.0
-# For trainings that nobody disturbs (any more).
-_COMPLETION_SECONDS = 600.0
+STUCK_SECONDS = 60.0
+# For trainings that nobody disturbs (any more), as a multiple of that.
+_COMPLETION = 10.0
 _POLL_SECONDS = 0.05
 # Only runs with so much of their training before them are hit, as part of the whole.
 _LATEST_HIT = 0.7
@@ -66,17 +67,30 @@ class Campaign:
         faults: how many.
         seed: of everything that is left to chance.
         training: of every run.
+        seconds: after which no more faults come, however many are left.
+        patience: seconds on top of the lease after which a run that shows no sign of life counts as stuck.
         talk: whether each fault is told on standard error as it happens.
     """
 
     def __init__(
-        self, stack: Stack, kinds: Sequence[Kind], faults: int, seed: int, training: dict[str, Any], *, talk: bool = False
+        self,
+        stack: Stack,
+        kinds: Sequence[Kind],
+        faults: int,
+        seed: int,
+        training: dict[str, Any],
+        *,
+        seconds: float = math.inf,
+        patience: float = STUCK_SECONDS,
+        talk: bool = False,
     ) -> None:
         self._stack = stack
         self._kinds = tuple(kind for kind in kinds if stack.mode in kind.modes)
         self._faults = faults
         self._dice = random.Random(seed)
         self._training = training
+        self._end = time.monotonic() + seconds
+        self._patience = patience
         self._talk = talk
         self._rows = Rows(stack.database_url)
         self._side_by_side = len(stack.nodes) - 1
@@ -86,9 +100,9 @@ class Campaign:
         self.outcome = Outcome()
 
     def run(self) -> Outcome:
-        """Train undisturbed, then disturbed, until all faults are injected and all runs have ended."""
+        """Train undisturbed, then disturbed, until all faults are injected or the time is up, and all runs have ended."""
         self._train_recipes()
-        while len(self.outcome.injected) < self._faults:
+        while len(self.outcome.injected) < self._faults and time.monotonic() < self._end:
             self._revive()
             self._round(self._draw())
         self._await_completion(self._active)
@@ -122,7 +136,7 @@ class Campaign:
         return row.state in ("completed", "failed", "stopped") or run_id in self.outcome.stuck
 
     def _await_completion(self, run_ids: Sequence[str]) -> None:
-        deadline = time.monotonic() + _COMPLETION_SECONDS
+        deadline = time.monotonic() + _COMPLETION * self._patience
         waiting = set(run_ids)
         while waiting and time.monotonic() < deadline:
             self._revive()
@@ -134,7 +148,7 @@ class Campaign:
     def _victims(self, number: int) -> list[tuple[str, Node]]:
         """So many runs that train, have checkpoints and have recovered from whatever hit them before."""
         nodes = {node.name: node for node in self._stack.nodes}
-        deadline = time.monotonic() + _COMPLETION_SECONDS
+        deadline = time.monotonic() + _COMPLETION * self._patience
         while time.monotonic() < deadline:
             self._revive()
             self._top_up()
@@ -199,7 +213,7 @@ class Campaign:
             return None
         now = time.monotonic()
         rows = self._rows.read(watched)
-        while not rows and time.monotonic() < now + _STUCK_SECONDS:
+        while not rows and time.monotonic() < now + self._patience:
             time.sleep(_POLL_SECONDS)
             rows = self._rows.read(watched)
         before = {key: row for key, row in rows.items() if row.state not in ("completed", "failed")}
@@ -209,7 +223,7 @@ class Campaign:
 
     def _settle(self, hits: Sequence["_Hit"]) -> None:
         """Wait until every run that was hit has recovered, and has a new checkpoint where it lost an attempt."""
-        patience = time.monotonic() + self._stack.lease_seconds + _STUCK_SECONDS
+        patience = time.monotonic() + self._stack.lease_seconds + self._patience
         waiting = list(hits)
         while waiting and time.monotonic() < patience:
             self._revive()

@@ -8,14 +8,15 @@ synthetic, their link to the server is the real one. A page is all its requests 
 """
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import httpx
 import numpy as np
@@ -54,15 +55,17 @@ def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -
         "MAPLESS_TOKEN": _TOKEN,
         "MAPLESS_WORKER_TOKEN": _WORKER_TOKEN,
     }
-    postgres = None
-    if database == "postgresql":
-        postgres = Postgres(directory)
-        postgres.start()
-        for process in postgres.members():
-            process.cpu_affinity(others)
-        environment["MAPLESS_DATABASE_URL"] = postgres.url
-    with (directory / "server.log").open("ab") as log:
-        process = subprocess.Popen(
+    # What has been started is ended, however far the rest has come.
+    with ExitStack() as started:
+        if database == "postgresql":
+            postgres = Postgres(directory)
+            started.callback(postgres.close)
+            postgres.start()
+            for process in postgres.members():
+                process.cpu_affinity(others)
+            environment["MAPLESS_DATABASE_URL"] = postgres.url
+        log = started.enter_context((directory / "server.log").open("ab"))
+        server = subprocess.Popen(
             ["taskset", "-c", str(own), sys.executable, "-m", "server", "serve"],
             cwd=ROOT,
             env=environment,
@@ -70,15 +73,16 @@ def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -
             stderr=log,
             start_new_session=True,
         )
-    url = f"http://127.0.0.1:{port}"
-    try:
+        started.callback(_end, server)
+        url = f"http://127.0.0.1:{port}"
         wait_for(lambda: _answers(url), seconds=60.0)
-        yield url, process.pid
-    finally:
-        kill(tree(process.pid))
-        process.wait()
-        if postgres is not None:
-            postgres.close()
+        yield url, server.pid
+
+
+def _end(process: "subprocess.Popen[Any]") -> None:
+    """End it, if it has not ended, with all that it has started."""
+    kill(tree(process.pid))
+    process.wait()
 
 
 def _answers(url: str) -> bool:
@@ -138,8 +142,7 @@ class _Part:
 
     def kill(self) -> None:
         """End it, if it has not ended."""
-        kill(tree(self._process.pid))
-        self._process.wait()
+        _end(self._process)
 
 
 def load(
@@ -159,6 +162,7 @@ def load(
     with (
         TemporaryDirectory(prefix="mapless-load-") as directory,
         _server(Path(directory), database, (own, others)) as server,
+        ExitStack() as started,
     ):
         url, pid = server
         run_ids, experiment_ids = _launch(url, runs)
@@ -176,28 +180,28 @@ def load(
             seconds=seconds,
         )
         # The pages' clock must not wait for a turn on a core that the others keep busy.
-        parts = [
-            _Part(plan, others, 5, "benchmarks.load.workers"),
-            _Part(plan, others, 5, "benchmarks.load.browsers", "streams"),
-            _Part(plan, others, 5, "benchmarks.load.views"),
-            _Part(plan, others, 0, "benchmarks.load.browsers", "pages"),
-        ]
+        parts = []
+        for niceness, command in (
+            (5, ("benchmarks.load.workers",)),
+            (5, ("benchmarks.load.browsers", "streams")),
+            (5, ("benchmarks.load.views",)),
+            (0, ("benchmarks.load.browsers", "pages")),
+        ):
+            parts.append(_Part(plan, others, niceness, *command))
+            started.callback(parts[-1].kill)
         patience = seconds + 120.0
-        try:
-            for part in parts:
-                part.await_readiness()
-            meter = Meter(pid)
-            clients_before = psutil.cpu_times(percpu=True)
-            end = time.time() + seconds
-            for part in parts:
-                part.begin(end)
-            workers = parts[0].told(WorkersTold, patience)
-            streams = parts[1].told(StreamsTold, patience)
-            watched = parts[2].told(ViewsTold, patience)
-            pages = parts[3].told(PagesTold, patience)
-        finally:
-            for part in parts:
-                part.kill()
+        for part in parts:
+            part.await_readiness()
+        meter = Meter(pid)
+        clients_before = psutil.cpu_times(percpu=True)
+        end = time.time() + seconds
+        for part in parts:
+            part.begin(end)
+        workers = parts[0].told(WorkersTold, patience)
+        streams = parts[1].told(StreamsTold, patience)
+        watched = parts[2].told(ViewsTold, patience)
+        pages = parts[3].told(PagesTold, patience)
+        started.close()
         idle = sum(
             after.idle - before.idle
             for core, (before, after) in enumerate(zip(clients_before, psutil.cpu_times(percpu=True), strict=True))
@@ -248,6 +252,8 @@ def main() -> None:
     options.add_argument("--views", type=int, default=20)
     options.add_argument("--minutes", type=float, default=10.0)
     arguments = options.parse_args()
+    # What was started is ended, however this ends.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     figures = load(
         database=arguments.database,
         runs=arguments.runs,

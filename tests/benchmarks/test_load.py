@@ -3,9 +3,16 @@
 How quickly pages come is the benchmark's to say, with a core for the server alone.
 """
 
+import signal
+import subprocess
+import sys
+
+import psutil
 import pytest
 
 from benchmarks.load.__main__ import Database, load
+from benchmarks.processes import kill, tree
+from benchmarks.service import wait_for
 from tests.conftest import POSTGRES, require_service
 
 
@@ -19,3 +26,17 @@ def test_a_small_lab_is_carried(database: Database) -> None:
         value = figures[name]
         assert isinstance(value, int | float)
         assert value > 0, figures
+
+
+def test_who_ends_it_ends_all_that_it_has_started() -> None:
+    command = (sys.executable, "-m", "benchmarks.load", "--runs=1", "--browsers=1", "--views=0")
+    with subprocess.Popen(command) as process:
+        try:
+            wait_for(lambda: len(tree(process.pid)) >= 6, seconds=60.0)
+            started = tree(process.pid)[1:]
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(30) == 1
+            _, left = psutil.wait_procs(started, timeout=10)
+            assert not left
+        finally:
+            kill(tree(process.pid))
