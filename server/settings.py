@@ -9,6 +9,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from server.people.oidc.settings import OidcSettings, check_right, is_safe_url
+from server.runs.limits import Limits
 from server.storage.rule import KeepRule
 from workers.logs import LogFormat
 from workers.runtime.settings import EXTENSIONS_SETTING
@@ -128,6 +129,15 @@ class Settings(BaseSettings):
     smtp_from: str | None = Field(None, description="Sender of the mail; `mapless@` the mail server's name if not given.")
 
     lease_seconds: float = Field(15.0, gt=0.0, le=600.0, description="How long a silent worker keeps its run or job.")
+    max_runs_per_person: int | None = Field(
+        None,
+        ge=1,
+        description="Runs of one person that may be under way at a time; any number if not given. What was launched with "
+        "MAPLESS_TOKEN counts as one person's.",
+    )
+    max_runs_per_experiment: int | None = Field(
+        None, ge=1, description="Likewise of an experiment that has no limit of its own; any number if not given."
+    )
     extensions: str = Field("", description=EXTENSIONS_SETTING)
     log_format: LogFormat = Field("text", description="Of the log on standard error: `text`, or `json`, an object a line.")
     web_dist: Path = Field(PROJECT_ROOT / "web" / "dist", description="The built pages.")
@@ -148,6 +158,11 @@ class Settings(BaseSettings):
         20.0, gt=0.0, le=600.0, description="How long a client may take for headers, and for the next part of a body."
     )
     max_body_bytes: int = Field(4 * 2**20, gt=0, description="Largest body of any other request.")
+
+    @property
+    def limits(self) -> Limits:
+        """How many runs may be under way at a time."""
+        return Limits(self.max_runs_per_person, self.max_runs_per_experiment)
 
     @field_validator("data_dir")
     @classmethod

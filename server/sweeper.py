@@ -14,6 +14,7 @@ from server.doorbell import CeleryDoorbell, prepare_broker
 from server.experiments.stored import training_of
 from server.jobs.service import JobService
 from server.runs.repository import RunRepository
+from server.runs.shares import ShareRepository
 from server.services import Services
 from server.system.repository import SILENCE_SECONDS, WorkerRepository, versions_on
 from server.worker_api.ingest import Ingest
@@ -80,6 +81,7 @@ class Sweeper:
         moment = time.time()
         with self._services.database.read() as session:
             waiting = RunRepository(session).queued()
+            shares = ShareRepository(session).read(self._services.settings.limits)
             idle = [
                 (worker.queue, versions_on(worker))
                 for worker in WorkerRepository(session).idle(moment - SILENCE_SECONDS, moment)
@@ -88,6 +90,9 @@ class Sweeper:
         quiet_since = {(run.id, run.attempt): self._quiet_since.get((run.id, run.attempt), now) for run in waiting}
         rung: dict[str, int] = defaultdict(int)
         for run in waiting:
+            # Once the limit allows it, it has waited long enough already.
+            if shares.waits_for(run) is not None:
+                continue
             quiet = now - quiet_since[run.id, run.attempt]
             training = training_of(run.experiment)
             for queue in queues_of(training, run.device):

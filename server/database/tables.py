@@ -76,6 +76,10 @@ class Experiment(Base):
     deleted_at: Mapped[float | None] = mapped_column(Float, index=True)
     # The form of the settings under which `ExperimentKey` has them; another one than this version's, and they are due.
     indexed_as: Mapped[str | None] = mapped_column(String(12), index=True)
+    # Id of the account in whose name it was launched; null for the installation's own token. No foreign key: it may go.
+    launched_by: Mapped[str | None] = mapped_column(String(16))
+    # How many of its runs may be under way at a time; null for what the installation's settings say.
+    parallel_runs: Mapped[int | None] = mapped_column(Integer)
     # Which of its checkpoints stay (`server.storage.rule`); null for what the installation's settings say.
     keep_rule: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
@@ -102,6 +106,8 @@ class Study(Base):
     # What is searched and how (`server.studies.schemas.StudySpec`).
     spec: Mapped[dict[str, Any]] = mapped_column(JSON)
     state: Mapped[StudyState] = mapped_column(String(12), default="running", index=True)
+    # As of an experiment: its trials are launched in that name.
+    launched_by: Mapped[str | None] = mapped_column(String(16))
     # Trials that it may have, and those that it has had.
     budget: Mapped[int] = mapped_column(Integer)
     asked: Mapped[int] = mapped_column(Integer, default=0)
@@ -218,6 +224,15 @@ class Run(Base):
     final_episodes: Mapped[int | None] = mapped_column(Integer)
 
     experiment: Mapped[Experiment] = relationship(back_populates="runs")
+
+
+class Share(Base):
+    """When somebody was last given a worker for a run, as the number of the turn; nobody's name is the empty one."""
+
+    __tablename__ = "shares"
+
+    person: Mapped[str] = mapped_column(String(16), primary_key=True)
+    turn: Mapped[int] = mapped_column(BigInteger)
 
 
 class RunEvent(Base):

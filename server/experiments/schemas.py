@@ -46,6 +46,9 @@ class ExperimentLaunch(ExperimentCreate):
     """An experiment, and where it belongs."""
 
     project_id: str = Field(DEFAULT_PROJECT, max_length=16, description="Of the project that it is launched into.")
+    parallel_runs: int | None = Field(
+        None, ge=1, le=_MAX_SEEDS, description="Of its runs that may be under way at a time; null: as the installation says."
+    )
 
 
 class ExperimentPatch(Schema):
@@ -53,6 +56,9 @@ class ExperimentPatch(Schema):
 
     name: ExperimentName | None = None
     project_id: str | None = Field(None, max_length=16, description="Of the project that it is moved to.")
+    parallel_runs: int | None = Field(
+        None, ge=0, le=_MAX_SEEDS, description="Of its runs that may be under way at a time; 0: as the installation says."
+    )
 
 
 class Experiment(Schema):
@@ -67,6 +73,9 @@ class Experiment(Schema):
     lacking: list[UsedExtension] = Field(description=LACKING)
     state: ExperimentState = Field(description="Of its runs together; mixed where they ended differently.")
     runs: list[Run] = Field(description="One a seed, by seed.")
+    parallel_runs: int | None = Field(
+        description="Of its runs that may be under way at a time; null: as the installation says."
+    )
     campaign: str | None = Field(description="Of the paper's reproduction that it was launched by; null for all others.")
     study_id: str | None = Field(description="Of the study that it is a trial of; null for all others.")
     success: Estimate | None = Field(

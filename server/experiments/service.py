@@ -82,7 +82,12 @@ class ExperimentService:
         """
         training = launchable(self._services, request.training, principal)
         experiment = tables.Experiment(
-            id=new_id(), project_id=request.project_id, name=request.name, training=training.model_dump(mode="json")
+            id=new_id(),
+            project_id=request.project_id,
+            name=request.name,
+            training=training.model_dump(mode="json"),
+            launched_by=principal.user_id,
+            parallel_runs=request.parallel_runs,
         )
         experiment.runs = [tables.Run(id=new_id(), seed=seed) for seed in sorted(request.seeds)]
         with self._services.database.write() as session:
@@ -121,6 +126,9 @@ class ExperimentService:
             if patch.name is not None and patch.name != experiment.name:
                 before, experiment.name = experiment.name, patch.name
                 _note(session, "experiment.renamed", experiment, f"was {before}")
+            if patch.parallel_runs is not None and (patch.parallel_runs or None) != experiment.parallel_runs:
+                experiment.parallel_runs = patch.parallel_runs or None
+                _note(session, "experiment.limited", experiment, f"{patch.parallel_runs or 'any number of'} runs at a time")
             if patch.project_id is not None and patch.project_id != experiment.project_id:
                 projects = ProjectRepository(session)
                 before = projects.get(experiment.project_id).name
@@ -273,6 +281,7 @@ def _views(session: Session, experiments: Sequence[tables.Experiment]) -> list[E
                 lacking=list(stored.lacking),
                 state=aggregate_state([run.state for run in experiment.runs]),
                 runs=[run_view(run, stored.training, latest.get(run.id, {})) for run in experiment.runs],
+                parallel_runs=experiment.parallel_runs,
                 campaign=experiment.campaign,
                 study_id=experiment.study_id,
                 success=success_over_runs([final[run.id] for run in experiment.runs if run.id in final]),

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from server.runs.limits import Limit
 from server.schemas import Page, Schema
 from workers.protocol import ExtensionState, Machine, Queue
 
@@ -11,7 +12,7 @@ MAX_PRIORITY = 1_000_000
 EDITORS_PRIORITY = 100
 """An editor may give a run this much; more takes an administrator of the installation, whose queue it is."""
 
-WaitsFor = Literal["turn", "worker", "gpu", "extension", "other worker"]
+WaitsFor = Literal["turn", "worker", "gpu", "extension", "other worker"] | Limit
 
 
 class WaitingRun(Schema):
@@ -25,12 +26,15 @@ class WaitingRun(Schema):
     algorithm: str
     step: int = Field(description="Environment steps done by earlier attempts.")
     total_steps: int
-    priority: int = Field(description="The highest is claimed first, of equal ones who has waited longest.")
+    priority: int = Field(
+        description="The highest is claimed first; of equal ones whoever has the fewest runs under way comes first."
+    )
     queued_at: float
     position: int = Field(description="In the whole queue, from 1; those that one may not see count.")
     waits_for: WaitsFor = Field(
         description="`turn`: a worker that could train it is there. Otherwise none is: no worker at all, none with a GPU, "
-        "none with its extensions, none but those that have lost it again and again."
+        "none with its extensions, none but those that have lost it again and again. `person limit`, `experiment limit`: "
+        "as many runs of whoever launched it, or of its experiment, are under way as may be."
     )
     extensions: list[str] = Field(description="That it needs.")
     starts_in: float | None = Field(description="Seconds, by the rates of what runs; null where that is not known.")

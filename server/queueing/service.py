@@ -30,6 +30,7 @@ from server.queueing.schemas import (
 from server.runs import views
 from server.runs.repository import RunRepository
 from server.runs.schemas import Run
+from server.runs.shares import ShareRepository, Shares
 from server.security.principal import Principal
 from server.services import Services
 from server.system.repository import SILENCE_SECONDS, WorkerRepository, extensions_on, versions_on
@@ -53,7 +54,8 @@ class QueueService:
         """
         now = time.time()
         with self._services.database.read() as session:
-            queued = RunRepository(session).queued()
+            shares = self._shares(session)
+            queued = shares.in_turn(RunRepository(session).queued())
             workers = [worker for worker in QueueRepository(session).workers() if _takes_runs(worker, now)]
             places = _places(session, workers)
             speeds = _speeds(session)
@@ -63,12 +65,19 @@ class QueueService:
             # Nobody behind the last one that is shown changes when it begins.
             ahead = queued[: shown[-1][0]] if shown else []
             stored = _read_once(ahead)
-            able = {run.id: _able(run, stored[run.experiment_id], workers) for run in ahead}
+            able = {
+                run.id: frozenset[str]() if shares.waits_for(run) else _able(run, stored[run.experiment_id], workers)
+                for run in ahead
+            }
             turns = [Turn(max(stored[run.experiment_id].training.steps - run.step, 0), able[run.id]) for run in ahead]
             begins = forecast(places, turns, speeds)
             items = [
                 _waiting(
-                    run, stored[run.experiment_id], at, begins[at - 1], _waits_for(run, stored[run.experiment_id], workers)
+                    run,
+                    stored[run.experiment_id],
+                    at,
+                    begins[at - 1],
+                    shares.waits_for(run) or _waits_for(run, stored[run.experiment_id], workers),
                 )
                 for at, run in shown
             ]
@@ -110,7 +119,7 @@ class QueueService:
         """
         with self._services.database.write() as session:
             run = _queued(session, run_id)
-            first = next(RunRepository(session).in_turn())
+            first = next(RunRepository(session).in_turn(self._shares(session)), run)
             if first.id != run.id:
                 self._give(session, run, first.priority + 1, principal)
         self._tell(run)
@@ -131,6 +140,9 @@ class QueueService:
                 raise ConflictError(f"{worker} is still there: drain it first.")
             WorkerRepository(session).remove([row.name for row in known])
             AuditRepository(session).add("worker.removed", name=worker)
+
+    def _shares(self, session: Session) -> Shares:
+        return ShareRepository(session).read(self._services.settings.limits)
 
     @staticmethod
     def _give(session: Session, run: tables.Run, priority: int, principal: Principal) -> None:

@@ -6,6 +6,7 @@ from threading import Lock
 
 from sqlalchemy.orm import Session
 
+from server.audit.actor import current_actor
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError
@@ -154,6 +155,7 @@ def _experiment(row: Row, campaign: str, request: CampaignCreate, project_id: st
         project_id=project_id,
         name=f"Paper: {title(row)}",
         training=scaled(row.training, request.effort).model_dump(mode="json"),
+        launched_by=current_actor().principal.user_id,
         campaign=campaign,
         campaign_row=row.id,
         runs=[tables.Run(id=new_id(), seed=seed) for seed in range(request.seeds)],

@@ -4,15 +4,16 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session, joinedload
+from sqlalchemy.orm import Session, contains_eager, joinedload
 
 from server.database import tables
 from server.errors import NotFoundError
+from server.runs.shares import Shares
 from server.runs.states import ACTIVE
 from workers.reporting import EventLevel
 
 _TURN = tables.Run.priority.desc(), tables.Run.queued_at, tables.Run.id
-"""Which run is claimed first."""
+"""Which run of one person is claimed first."""
 _AT_ONCE = 50
 
 
@@ -74,7 +75,7 @@ class RunRepository:
         self._session.add(tables.RunEvent(run_id=run_id, level=level, message=message, step=step))
 
     def queued(self) -> Sequence[tables.Run]:
-        """The runs that wait for a worker, with their experiments, in the order of their turn."""
+        """The runs that wait for a worker, with their experiments, by priority, then by how long they wait."""
         query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
         return self._session.scalars(query.order_by(*_TURN)).all()
 
@@ -83,11 +84,18 @@ class RunRepository:
         query = select(tables.Run.id).where(tables.Run.state.in_(ACTIVE), tables.Run.claim_id == claim_id)
         return self._session.scalar(query)
 
-    def in_turn(self) -> Iterator[tables.Run]:
-        """As `queued`, read as far as it is asked for."""
-        query = select(tables.Run).where(tables.Run.state == "queued").options(joinedload(tables.Run.experiment))
+    def in_turn(self, shares: Shares) -> Iterator[tables.Run]:
+        """Those that wait for no limit, in the order in which they would be given away now; read as far as asked for."""
+        priority, *rest = _TURN
+        query = (
+            select(tables.Run)
+            .join(tables.Run.experiment)
+            .where(tables.Run.state == "queued", shares.allowed())
+            .options(contains_eager(tables.Run.experiment))
+            .order_by(priority, *shares.places(), *rest)
+        )
         offset = 0
-        while runs := self._session.scalars(query.order_by(*_TURN).offset(offset).limit(_AT_ONCE)).all():
+        while runs := self._session.scalars(query.offset(offset).limit(_AT_ONCE)).all():
             yield from runs
             offset += len(runs)
 

@@ -273,6 +273,7 @@ def _experiment(study: tables.Study, name: str, training: TrainingConfig, seeds:
     return tables.Experiment(
         id=new_id(),
         project_id=study.project_id,
+        launched_by=study.launched_by,
         name=name,
         training=training.model_dump(mode="json"),
         runs=[tables.Run(id=new_id(), seed=seed) for seed in sorted(seeds)],

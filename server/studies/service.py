@@ -53,6 +53,7 @@ class StudyService:
         study = tables.Study(
             id=new_id(),
             project_id=request.project_id,
+            launched_by=principal.user_id,
             name=request.name,
             spec=spec.model_dump(mode="json"),
             budget=min(request.trials, _most_trials(spec)),

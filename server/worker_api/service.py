@@ -21,6 +21,7 @@ from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, takers
+from server.runs.shares import ShareRepository, Shares
 from server.security.principal import WORKER, Principal
 from server.services import Services
 from server.system.repository import WorkerRepository
@@ -82,7 +83,13 @@ class WorkerService:
         """
         problem: str | None = None
         with self._services.database.write() as session:
-            run, request = _in_turn(session, run_id, request)
+            sharing = ShareRepository(session)
+            sharing.lock()
+            shares = sharing.read(self._services.settings.limits)
+            run, request = _in_turn(session, run_id, request, shares)
+            is_fresh = run.state == "queued"
+            if is_fresh and (limit := shares.waits_for(run)) is not None:
+                raise ConflictError(f"Run {run.id} waits: as many are under way as may be ({limit}).")
             # At once, not from the worker's next heartbeat on; a claim whose answer got lost is asked for once more.
             if WorkerRepository(session).is_drained(request.worker) and run.claim_id != (request.claim_id or ""):
                 raise ConflictError("This worker was asked to take up no more runs.")
@@ -96,6 +103,8 @@ class WorkerService:
                 RunRepository(session).add_event(run.id, "info", f"Claimed with the token {principal.name}.", run.step)
             run.claimed_with = principal.credential
             WorkerRepository(session).took_up(request.worker, run.id)
+            if is_fresh:
+                sharing.took(run.experiment)
             if stored.unreadable:
                 problem = stored.why_not
             try:
@@ -334,7 +343,7 @@ def _refuse_without_extensions(run: tables.Run, stored: StoredTraining, request:
         raise ConflictError(f"Run {run.id} needs {wording(lacking)}, which {request.worker} does not have.")
 
 
-def _in_turn(session: Session, run_id: str, request: ClaimRequest) -> tuple[tables.Run, ClaimRequest]:
+def _in_turn(session: Session, run_id: str, request: ClaimRequest, shares: Shares) -> tuple[tables.Run, ClaimRequest]:
     """The run that a worker is given, if it may have it, and the request as if it had asked for that one.
 
     Raises:
@@ -344,7 +353,7 @@ def _in_turn(session: Session, run_id: str, request: ClaimRequest) -> tuple[tabl
     if request.any_run:
         if request.claim_id is not None and (held := runs.claimed_under(request.claim_id)) is not None:
             return runs.get(held, for_update=True), request
-        for waiting in runs.in_turn():
+        for waiting in runs.in_turn(shares):
             if _can_train(session, waiting, request) and (run := runs.take(waiting.id)) is not None:
                 return run, request.model_copy(update={"published_attempt": run.attempt})
     return runs.get(run_id, for_update=True), request

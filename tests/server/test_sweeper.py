@@ -257,6 +257,28 @@ def test_a_lost_message_is_sent_again_though_the_clock_was_set_back(
     assert bell.heard() == ["r"]
 
 
+def test_nobody_is_rung_for_what_a_limit_keeps_and_at_once_when_it_does_no_more(
+    services: Services, sweeper: Sweeper, bell: Bell, clock: Clock
+) -> None:
+    sweeper.sweep()
+    add_run(services, "first")
+    add_run(services, "second")
+    with services.database.write() as session:
+        for experiment in session.query(tables.Experiment):
+            experiment.parallel_runs = 1
+        ids = {run.id: run.experiment_id for run in session.query(tables.Run)}
+        session.get_one(tables.Run, "second").experiment_id = ids["first"]
+    claim(services, "first", worker="w1")
+    see_worker(services, "w2")
+    bell.heard()
+    pass_by(sweeper, clock, RING_AGAIN_SECONDS + 4)
+    assert bell.heard() == []
+    with services.database.write() as session:
+        session.get_one(tables.Run, "first").state = "completed"
+    pass_by(sweeper, clock, 3)
+    assert bell.heard() == ["second"]
+
+
 def test_each_queue_is_rung_for_its_own_workers(services: Services, sweeper: Sweeper, bell: Bell, clock: Clock) -> None:
     sweeper.sweep()
     add_run(services, "on-cpu", 60)

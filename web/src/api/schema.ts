@@ -5198,6 +5198,11 @@ export interface components {
             lacking: components["schemas"]["UsedExtension-Output"][];
             /** Name */
             name: string;
+            /**
+             * Parallel Runs
+             * @description Of its runs that may be under way at a time; null: as the installation says.
+             */
+            parallel_runs: number | null;
             /** Project Id */
             project_id: string;
             /**
@@ -5287,6 +5292,11 @@ export interface components {
              */
             name: string;
             /**
+             * Parallel Runs
+             * @description Of its runs that may be under way at a time; null: as the installation says.
+             */
+            parallel_runs?: number | null;
+            /**
              * Project Id
              * @description Of the project that it is launched into.
              * @default default
@@ -5327,6 +5337,11 @@ export interface components {
         ExperimentPatch: {
             /** Name */
             name?: string | null;
+            /**
+             * Parallel Runs
+             * @description Of its runs that may be under way at a time; 0: as the installation says.
+             */
+            parallel_runs?: number | null;
             /**
              * Project Id
              * @description Of the project that it is moved to.
@@ -11552,7 +11567,7 @@ export interface components {
             position: number;
             /**
              * Priority
-             * @description The highest is claimed first, of equal ones who has waited longest.
+             * @description The highest is claimed first; of equal ones whoever has the fewest runs under way comes first.
              */
             priority: number;
             /** Project Id */
@@ -11575,10 +11590,9 @@ export interface components {
             total_steps: number;
             /**
              * Waits For
-             * @description `turn`: a worker that could train it is there. Otherwise none is: no worker at all, none with a GPU, none with its extensions, none but those that have lost it again and again.
-             * @enum {string}
+             * @description `turn`: a worker that could train it is there. Otherwise none is: no worker at all, none with a GPU, none with its extensions, none but those that have lost it again and again. `person limit`, `experiment limit`: as many runs of whoever launched it, or of its experiment, are under way as may be.
              */
-            waits_for: "turn" | "worker" | "gpu" | "extension" | "other worker";
+            waits_for: ("turn" | "worker" | "gpu" | "extension" | "other worker") | ("person limit" | "experiment limit");
         };
         /**
          * Walker

@@ -152,6 +152,10 @@ function waitsFor({ waits_for, extensions }: WaitingRun): string {
       return 'a worker with a GPU: none is there'
     case 'extension':
       return `a worker with ${extensions.join(', ')}: none is there`
+    case 'person limit':
+      return 'a limit: whoever launched it has as many runs under way as may be'
+    case 'experiment limit':
+      return 'a limit: as many runs of its experiment are under way as may be'
     case 'other worker':
       return 'another worker: those that are there lost it too often'
   }
