@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
 STACK_TESTS := tests/benchmarks tests/browser tests/services
-.PHONY: help run test check format lock pages types
+.PHONY: help run test check format lock pages types sbom
 
 help:
 	@echo "make run     set up, start the server and its workers, print the address"
@@ -12,6 +12,7 @@ help:
 	@echo "make check   linters, types, architecture"
 	@echo "make format  format everything"
 	@echo "make lock    compile the hash-pinned requirements anew"
+	@echo "make sbom    write what is in each part into build/sbom (CycloneDX)"
 	@echo "make types   generate the pages' types from the server's OpenAPI"
 
 # --- set up --------------------------------------------------------------------------------------------------------
@@ -100,4 +101,17 @@ lock: .venv/bin/uv
 	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["build"], sep="\n")' \
 	  | $(LOCK) - -o requirements-build.txt -c requirements.txt
 	$(LOCK) server/client/pyproject.toml --extra mcp -o server/client/requirements.txt -c requirements.txt
+	echo 'cyclonedx-bom==7.3.1' | $(LOCK) - -o requirements-sbom.txt
 	echo 'uv==0.13.8' | $(LOCK) - -o requirements-uv.txt
+
+# Of the locks, with their hashes: what an installation from them has in it. The tool has an environment of its own.
+SBOM := build/sbom
+$(SBOM)/.venv: requirements-sbom.txt .venv/bin/uv
+	@rm -rf $@ && $(BIN)/uv venv -q --python $(BIN)/python $@
+	@$(BIN)/uv pip install -q --python $@/bin/python --require-hashes -r requirements-sbom.txt
+
+sbom: $(SBOM)/.venv .venv/.run
+	@for part in server worker; do \
+	  $</bin/cyclonedx-py requirements requirements-$$part.txt --output-reproducible -o $(SBOM)/$$part.cdx.json || exit 1; done
+	@$(BIN)/python web/build.py sbom --package-lock-only --sbom-format cyclonedx --loglevel=error >$(SBOM)/pages.cdx.json
+	@ls $(SBOM)/*.cdx.json

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -11,8 +12,43 @@ from starlette.concurrency import run_in_threadpool
 logger = logging.getLogger(__name__)
 
 
+class Wake:
+    """Ends the pause of work that is done in the background. Thread-safe; what is rung while it works counts afterwards."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._rung = False
+        self._waiting: tuple[asyncio.AbstractEventLoop, asyncio.Event] | None = None
+
+    def ring(self) -> None:
+        """There is something to do."""
+        with self._lock:
+            self._rung = True
+            if self._waiting is not None:
+                loop, event = self._waiting
+                loop.call_soon_threadsafe(event.set)
+
+    async def pause(self, seconds: float) -> None:
+        """Until somebody rings, or has rung since the last pause; `seconds` at most."""
+        event = asyncio.Event()
+        with self._lock:
+            if not self._rung:
+                self._waiting = asyncio.get_running_loop(), event
+        try:
+            if self._waiting is not None:
+                async with asyncio.timeout(seconds):
+                    await event.wait()
+        except TimeoutError:
+            return
+        finally:
+            with self._lock:
+                self._waiting, self._rung = None, False
+
+
 @asynccontextmanager
-async def kept_up(some: Callable[[], int], *, at_once: int, pause: float, failed: str) -> AsyncIterator[None]:
+async def kept_up(
+    some: Callable[[], int], *, at_once: int, pause: float, failed: str, wake: Wake | None = None
+) -> AsyncIterator[None]:
     """Do what is due at start and regularly from then on, for as long as the block lasts.
 
     Args:
@@ -20,8 +56,9 @@ async def kept_up(some: Callable[[], int], *, at_once: int, pause: float, failed
         at_once: how many it does at most: after so many it is asked again at once.
         pause: seconds until the next look otherwise.
         failed: what the log says of an error, after which the next look tries again.
+        wake: ends the pause before its time.
     """
-    task = asyncio.create_task(_regularly(some, at_once, pause, failed))
+    task = asyncio.create_task(_regularly(some, at_once, pause, failed, wake or Wake()))
     try:
         yield
     finally:
@@ -30,7 +67,7 @@ async def kept_up(some: Callable[[], int], *, at_once: int, pause: float, failed
             await task
 
 
-async def _regularly(some: Callable[[], int], at_once: int, pause: float, failed: str) -> None:
+async def _regularly(some: Callable[[], int], at_once: int, pause: float, failed: str, wake: Wake) -> None:
     while True:
         done = 0
         try:
@@ -38,4 +75,4 @@ async def _regularly(some: Callable[[], int], at_once: int, pause: float, failed
         except Exception:
             logger.exception(failed)
         if done < at_once:
-            await asyncio.sleep(pause)
+            await wake.pause(pause)

@@ -8,6 +8,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from server.arenas.store import ArenaStore
+from server.background import Wake
 from server.database.engine import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
@@ -54,6 +55,8 @@ class Services:
     curves: AnswerCache = field(default_factory=AnswerCache)
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)
+    # Of the sweep that removes what rules have taken.
+    storage_wake: Wake = field(default_factory=Wake)
     login_limiter: GuessLimiter = field(init=False)
     gate: Gate = field(init=False)
     provider: Provider | None = field(init=False)

@@ -1,6 +1,8 @@
 """What stops an installation is said in one line that tells what to do."""
 
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -63,3 +65,22 @@ def test_no_network(checkout: Path) -> None:
     python = fake_python(checkout, f'[ "$2" = venv ] && {environment} || exec {sys.executable} "$@"')
     line = first_refusal(checkout, python, **offline, PIP_FIND_LINKS="")
     assert "is there a network? Then run make again" in line
+
+
+@pytest.mark.services
+@pytest.mark.timeout(300)
+def test_the_bills_of_materials_list_what_the_locks_name() -> None:
+    """Installs the tool on its first run, and so takes a network as `make run` does."""
+    made = subprocess.run(["make", "sbom"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if made.returncode and os.environ.get("REQUIRE_SERVICES") != "1":
+        pytest.skip(f"the tool is not installed, and can not be: {made.stderr[-500:]}")
+    assert made.returncode == 0, made.stderr
+
+    for part in ("server", "worker"):
+        locked = re.findall(r"^([\w.-]+)==([^\s;]+)", (ROOT / f"requirements-{part}.txt").read_text(), re.MULTILINE)
+        bill = json.loads((ROOT / "build" / "sbom" / f"{part}.cdx.json").read_text())
+        assert bill["bomFormat"] == "CycloneDX"
+        assert sorted((one["name"], one["version"]) for one in bill["components"]) == sorted(locked)
+    pages = json.loads((ROOT / "build" / "sbom" / "pages.cdx.json").read_text())
+    wanted = json.loads((ROOT / "web" / "package.json").read_text())["dependencies"]
+    assert wanted.keys() <= {f"{one.get('group', '')}/{one['name']}".lstrip("/") for one in pages["components"]}

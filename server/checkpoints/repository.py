@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import Float, Select, cast, func, select
 from sqlalchemy.orm import Session, defer
 
+from server.checkpoints.sums import add_to_sums
 from server.database import tables
 from server.errors import NotFoundError
 from server.files import StoredFile
@@ -29,6 +30,8 @@ class CheckpointRepository:
         checkpoint = tables.Checkpoint(id=file.id, run_id=run_id, step=step, size=file.size, sha256=file.sha256)
         self._session.add(checkpoint)
         self._session.flush()
+        experiment_id = self._session.get_one(tables.Run, run_id).experiment_id
+        add_to_sums(self._session, experiment_id, checkpoint_count=1, checkpoint_bytes=file.size)
         if evaluation is not None:
             arrived = [episode.steps for episode in evaluation.episodes if episode.outcome == "arrival"]
             self._session.add(

@@ -80,6 +80,11 @@ class Experiment(Base):
     launched_by: Mapped[str | None] = mapped_column(String(16))
     # How many of its runs may be under way at a time; null for what the installation's settings say.
     parallel_runs: Mapped[int | None] = mapped_column(Integer)
+    # Of its checkpoints, and of those that a rule has taken; kept by `server.checkpoints.sums`.
+    checkpoint_count: Mapped[int] = mapped_column(Integer, default=0, server_default="0")
+    checkpoint_bytes: Mapped[int] = mapped_column(BigInteger, default=0, server_default="0")
+    going_count: Mapped[int] = mapped_column(Integer, default=0, server_default="0")
+    going_bytes: Mapped[int] = mapped_column(BigInteger, default=0, server_default="0")
     # Which of its checkpoints stay (`server.storage.rule`); null for what the installation's settings say.
     keep_rule: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 

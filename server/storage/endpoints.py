@@ -49,6 +49,6 @@ def change_thinning(experiment_id: str, change: RuleChange, service: StorageServ
 
 @router.post("/api/experiments/{experiment_id}/thinning/free", responses=NOT_FOUND, dependencies=[edit("experiment_id")])
 def free_storage(experiment_id: str, service: StorageServiceDep) -> Thinning:
-    """Remove what goes of an experiment at once."""
+    """Remove what goes of an experiment now, not after its days: it begins at once, and pages hear of it as it goes on."""
     service.free(experiment_id)
     return service.state(experiment_id)

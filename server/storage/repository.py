@@ -2,11 +2,11 @@
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, case, delete, func, select, true, update
+from sqlalchemy import ColumnElement, delete, func, select, update
 from sqlalchemy.orm import Session
 
+from server.checkpoints.sums import add_to_sums
 from server.database import tables
 from server.paging import Window
 
@@ -16,51 +16,30 @@ _SEARCHED = "a study that goes on measures by it"
 _RANKED = "its run stands by it on leaderboards"
 
 
-@dataclass(frozen=True)
-class Use:
-    """What an experiment takes, in checkpoints and bytes."""
-
-    experiment: tables.Experiment
-    checkpoints: int
-    size: int
-    going: int
-    going_size: int
-
-
 class StorageRepository:
     """Reads and writes within the caller's transaction."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def page(self, visible: Collection[str] | None, window: Window) -> tuple[list[Use], int, int, int]:
+    def page(self, visible: Collection[str] | None, window: Window) -> tuple[Sequence[tables.Experiment], int, int, int]:
         """Experiments of `visible` projects (None: all) that have checkpoints, the largest first.
 
         Returns:
             Them, how many there are on all pages, and the bytes of all, and of what goes of it.
         """
-        checkpoint, experiment = tables.Checkpoint, tables.Experiment
-        gone = checkpoint.goes_at.is_not(None)
+        experiment = tables.Experiment
+        seen = [experiment.checkpoint_count > 0]
+        if visible is not None:
+            seen.append(experiment.project_id.in_(visible))
         sums = (
-            func.count(checkpoint.id),
-            func.coalesce(func.sum(checkpoint.size), 0),
-            func.coalesce(func.sum(case((gone, 1), else_=0)), 0),
-            func.coalesce(func.sum(case((gone, checkpoint.size), else_=0)), 0),
+            func.count(),
+            *(func.coalesce(func.sum(each), 0) for each in (experiment.checkpoint_bytes, experiment.going_bytes)),
         )
-        seen: ColumnElement[bool] = experiment.project_id.in_(visible) if visible is not None else true()
-        by_run = select(checkpoint).join(tables.Run).join(experiment).where(seen)
-        total = self._session.execute(by_run.with_only_columns(func.count(experiment.id.distinct()), sums[1], sums[3])).one()
-        found = self._session.execute(
-            by_run.with_only_columns(experiment.id, *sums)
-            .group_by(experiment.id)
-            .order_by(sums[1].desc(), experiment.id)
-            .limit(window.limit)
-            .offset(window.offset)
-        ).all()
-        rows = self._session.scalars(select(experiment).where(experiment.id.in_([row[0] for row in found])))
-        named = {row.id: row for row in rows}
-        uses = [Use(named[row[0]], row[1], int(row[2]), int(row[3]), int(row[4])) for row in found]
-        return uses, total[0], int(total[1]), int(total[2])
+        total = self._session.execute(select(*sums).select_from(experiment).where(*seen)).one()
+        query = select(experiment).where(*seen).order_by(experiment.checkpoint_bytes.desc(), experiment.id)
+        rows = self._session.scalars(query.limit(window.limit).offset(window.offset)).all()
+        return rows, total[0], int(total[1]), int(total[2])
 
     def curve_bytes(self, experiment_ids: Collection[str]) -> dict[str, int]:
         """Bytes of their compacted curves."""
@@ -116,7 +95,17 @@ class StorageRepository:
         ids = list(checkpoint_ids)
         for begin in range(0, len(ids), 500):
             some = tables.Checkpoint.id.in_(ids[begin : begin + 500])
+            marked = tables.Checkpoint.goes_at.is_not(None)
+            for experiment_id, count, size in self._sums(some, ~marked if goes_at is not None else marked):
+                sign = 1 if goes_at is not None else -1
+                add_to_sums(self._session, experiment_id, going_count=sign * count, going_bytes=sign * size)
             self._session.execute(update(tables.Checkpoint).where(some).values(goes_at=goes_at))
+
+    def hasten(self, experiment_id: str, moment: float) -> int:
+        """Let what goes of an experiment go at `moment`; how many checkpoints that are."""
+        runs = select(tables.Run.id).where(tables.Run.experiment_id == experiment_id)
+        going = update(tables.Checkpoint).where(tables.Checkpoint.run_id.in_(runs), tables.Checkpoint.goes_at > moment)
+        return self._session.execute(going.values(goes_at=moment)).rowcount  # type: ignore[attr-defined,no-any-return]
 
     def due(self, moment: float, limit: int) -> list[tables.Checkpoint]:
         """Some that were to go by `moment`, the longest due first."""
@@ -126,7 +115,22 @@ class StorageRepository:
 
     def remove(self, checkpoint_ids: Collection[str]) -> None:
         """Remove them with their evaluations."""
-        self._session.execute(delete(tables.Checkpoint).where(tables.Checkpoint.id.in_(checkpoint_ids)))
+        some = tables.Checkpoint.id.in_(checkpoint_ids)
+        for experiment_id, count, size in self._sums(some):
+            add_to_sums(self._session, experiment_id, checkpoint_count=-count, checkpoint_bytes=-size)
+        for experiment_id, count, size in self._sums(some, tables.Checkpoint.goes_at.is_not(None)):
+            add_to_sums(self._session, experiment_id, going_count=-count, going_bytes=-size)
+        self._session.execute(delete(tables.Checkpoint).where(some))
+
+    def _sums(self, *which: ColumnElement[bool]) -> list[tuple[str, int, int]]:
+        """How many of these checkpoints each experiment has, and their bytes."""
+        query = (
+            select(tables.Run.experiment_id, func.count(), func.sum(tables.Checkpoint.size))
+            .join(tables.Checkpoint, tables.Checkpoint.run_id == tables.Run.id)
+            .where(*which)
+            .group_by(tables.Run.experiment_id)
+        )
+        return [(row[0], row[1], int(row[2])) for row in self._session.execute(query)]
 
     def with_new(self, since: float, limit: int) -> list[tuple[str, float]]:
         """Experiments whose runs have got checkpoints after `since`, with when the newest one came, the oldest first."""

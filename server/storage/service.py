@@ -21,12 +21,11 @@ from server.experiments.repository import ExperimentRepository
 from server.paging import Window
 from server.security.principal import Principal
 from server.services import Services
-from server.storage.repository import StorageRepository, Use
+from server.storage.repository import StorageRepository
 from server.storage.rule import KEEP_ALL, KeepRule, Stored, staying
 from server.storage.schemas import MOST_SPARED, SparedCheckpoint, Storage, StoredExperiment, Thinning
 
 _DAY = 86_400.0
-_AT_ONCE = 200
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,10 @@ class StorageService:
         settings = self._services.settings
         with self._services.database.read() as session:
             repository = StorageRepository(session)
-            uses, total, size, going = repository.page(principal.visible, window)
-            curves = repository.curve_bytes([use.experiment.id for use in uses])
+            experiments, total, size, going = repository.page(principal.visible, window)
+            curves = repository.curve_bytes([experiment.id for experiment in experiments])
         return Storage(
-            items=[self._view(use, curves.get(use.experiment.id, 0)) for use in uses],
+            items=[self._view(experiment, curves.get(experiment.id, 0)) for experiment in experiments],
             total=total,
             checkpoint_bytes=size,
             going_bytes=going,
@@ -102,18 +101,24 @@ class StorageService:
         self._publish(experiment_id)
         return thinning
 
-    def free(self, experiment_id: str) -> int:
-        """Remove what goes of an experiment now; how many checkpoints that were.
+    def free(self, experiment_id: str) -> None:
+        """Let go now what goes of an experiment; the sweep removes it, some at a time.
 
         Raises:
             NotFoundError: there is no such experiment.
         """
-        with self._services.database.read() as session:
-            ExperimentRepository(session).get(experiment_id)
-            rows = StorageRepository(session).of_experiment(experiment_id).values()
-            going = [checkpoint.id for row in rows for checkpoint in row if checkpoint.goes_at is not None]
-        # Some at a time: others write in between.
-        return sum(self._remove(experiment_id, going[begin : begin + _AT_ONCE]) for begin in range(0, len(going), _AT_ONCE))
+        with self._services.database.write() as session:
+            experiment = ExperimentRepository(session).get(experiment_id)
+            hastened = StorageRepository(session).hasten(experiment_id, time.time())
+            if hastened:
+                AuditRepository(session).add(
+                    "experiment.freed",
+                    target=experiment.id,
+                    name=experiment.name,
+                    project_id=experiment.project_id,
+                    details=f"{hastened} checkpoints go now",
+                )
+        self._services.storage_wake.ring()
 
     def apply_to_new(self, since: float, limit: int) -> tuple[int, float]:
         """Apply the rules of experiments that have got checkpoints after `since`.
@@ -186,18 +191,18 @@ class StorageService:
         self._publish(experiment_id)
         return len(gone)
 
-    def _view(self, use: Use, curves: int) -> StoredExperiment:
+    def _view(self, experiment: tables.Experiment, curves: int) -> StoredExperiment:
         return StoredExperiment(
-            id=use.experiment.id,
-            name=use.experiment.name,
-            in_trash=use.experiment.deleted_at is not None,
-            checkpoints=use.checkpoints,
-            checkpoint_bytes=use.size,
+            id=experiment.id,
+            name=experiment.name,
+            in_trash=experiment.deleted_at is not None,
+            checkpoints=experiment.checkpoint_count,
+            checkpoint_bytes=experiment.checkpoint_bytes,
             curve_bytes=curves,
-            going=use.going,
-            going_bytes=use.going_size,
-            rule=self._rule(use.experiment),
-            own_rule=use.experiment.keep_rule is not None,
+            going=experiment.going_count,
+            going_bytes=experiment.going_bytes,
+            rule=self._rule(experiment),
+            own_rule=experiment.keep_rule is not None,
         )
 
     def _publish(self, experiment_id: str) -> None:

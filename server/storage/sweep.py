@@ -27,12 +27,13 @@ class StorageSweep:
 
 @asynccontextmanager
 async def keep_thinned(services: Services) -> AsyncIterator[None]:
-    """Sweep at start and every ten minutes, for as long as the block lasts."""
+    """Sweep at start, every ten minutes, and when somebody frees space, for as long as the block lasts."""
     sweep = StorageSweep(services)
     async with kept_up(
         lambda: sweep.sweep(time.time()),
         at_once=_AT_ONCE,
         pause=_PAUSE_SECONDS,
+        wake=services.storage_wake,
         failed="rules for checkpoints could not be applied: the next sweep tries again",
     ):
         yield

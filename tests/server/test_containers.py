@@ -1,13 +1,16 @@
 """docker-compose.yml and the Dockerfile name only what exists, and hold no secret."""
 
+import os
 import re
 import shutil
 import subprocess
 import sys
+import time
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 import yaml
 from typer.main import get_command
@@ -43,6 +46,33 @@ def test_the_server_starts_on_these_settings(monkeypatch: pytest.MonkeyPatch) ->
     assert settings.resolved_broker_url.startswith("redis://")
     assert settings.resolved_database_url.startswith("postgresql+psycopg://")
     assert settings.resolved_server_url == "http://server:8400"
+
+
+def test_the_server_needs_no_root_that_can_be_written_to(tmp_path: Path) -> None:
+    """As in its container: all but its volume and a place for temporary files is read-only, in a namespace of the test's."""
+    server = COMPOSE["services"]["server"]
+    assert (server["read_only"], server["tmpfs"], server["volumes"]) == (True, ["/tmp"], ["data:/data"])
+    if os.geteuid() != 0 or subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("mounting takes root")
+    script = (
+        f"mount --make-rprivate / && mount --bind {tmp_path} /mnt && mount -o remount,ro,bind / "
+        "&& mount -t tmpfs tmpfs /media && ! touch /root/written 2>/dev/null && exec $0 -m server serve"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAPLESS_")}
+    environment |= {"MAPLESS_DATA_DIR": "/mnt", "MAPLESS_PORT": "0", "TMPDIR": "/media", "PYTHONDONTWRITEBYTECODE": "1"}
+    command = ["unshare", "-m", "sh", "-c", script, sys.executable]
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            found = re.search(r"http://[^/]+", process.stdout.readline())
+            assert found is not None
+            deadline = time.monotonic() + 30.0
+            while httpx.get(f"{found[0]}/readyz").status_code != 200:
+                assert time.monotonic() < deadline
+                time.sleep(0.2)
+        finally:
+            process.terminate()
+    assert (tmp_path / "mapless.db").is_file()
 
 
 def test_workers_know_neither_the_database_nor_the_login() -> None:

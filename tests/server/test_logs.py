@@ -15,7 +15,8 @@ import httpx
 import pytest
 
 from tests.server.test_serving import ROOT, environment, serving
-from workers.logs import JsonFormatter, about, process_is_about
+from workers.logs import JsonFormatter, about, configure, process_is_about
+from workers.runtime.trainer_handle import TrainerHandle
 
 
 def line(message: str = "hello %s", *arguments: object, error: BaseException | None = None) -> dict[str, Any]:
@@ -104,3 +105,33 @@ def test_a_worker_logs_objects_too(tmp_path: Path) -> None:
             process.wait(timeout=30)
     said = [json.loads(found) for found in log.read_text().splitlines()]
     assert {"time", "level", "logger", "message"} <= set(said[0])
+
+
+def test_what_a_trainer_prints_is_an_object_a_line_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text("""print('a "library" says')\nprint('something')\n""")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    root, handlers, level = logging.getLogger(), logging.getLogger().handlers[:], logging.getLogger().level
+    try:
+        configure("json")
+        trainer = TrainerHandle()
+        try:
+            with process_is_about("r0"):
+                deadline = time.monotonic() + 30.0
+                err = ""
+                while err.count("\n") < 2:
+                    assert time.monotonic() < deadline
+                    time.sleep(0.05)
+                    err += capfd.readouterr().err
+        finally:
+            trainer.close()
+    finally:
+        root.handlers[:], root.level = handlers, level
+        logging.captureWarnings(False)
+    said = [json.loads(line) for line in err.splitlines()]
+    assert [one["message"] for one in said[:2]] == [
+        f'trainer {trainer.pid}: a "library" says',
+        f"trainer {trainer.pid}: something",
+    ]
+    assert {one["run"] for one in said[:2]} == {"r0"}

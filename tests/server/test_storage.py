@@ -1,15 +1,18 @@
 """Disk use, and rules for checkpoints: what they take, what they never take, and until when it can be had back."""
 
+import threading
 import time
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import update
+from sqlalchemy import func, select, update
 
 from server.app import create_services
 from server.checkpoints.archives import sweep_archives
+from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
+from server.files import StoredFile
 from server.paging import Window
 from server.security.principal import OWNER
 from server.services import Services
@@ -140,12 +143,42 @@ def test_it_goes_after_days_and_is_kept_by_another_rule_until_then(
     assert [entry["details"] for entry in done] == ["8 checkpoints, 152 bytes"]
 
 
+def wait_until_freed(client: TestClient) -> None:
+    deadline = time.monotonic() + 20.0
+    while client.get("/api/storage").json()["going_bytes"]:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
 def test_it_is_freed_at_once_when_somebody_says_so(client: TestClient, experiment: dict[str, Any]) -> None:
     assert client.post(f"{thinning(experiment)}/free").json()["staying"] == 20
     put(client, experiment, last=1, best=False)
-    found = client.post(f"{thinning(experiment)}/free").json()
-    assert (found["going"], found["staying"]) == (0, 2)
+    assert client.post(f"{thinning(experiment)}/free").status_code == 200
+    wait_until_freed(client)
     assert set(ids(client, experiment["runs"][1])) == {1000}
+    item = client.get("/api/storage").json()["items"][0]
+    assert (item["checkpoints"], item["checkpoint_bytes"], item["going"], item["going_bytes"]) == (2, 40, 0, 0)
+    done = client.get("/api/audit", params={"target": experiment["id"], "action": "experiment.freed"}).json()["items"]
+    assert [entry["details"] for entry in done] == ["18 checkpoints go now"]
+
+
+def test_who_frees_much_does_not_wait_for_a_store_that_takes_its_time(
+    client: TestClient, services: Services, experiment: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on, delete = threading.Event(), services.files.delete
+
+    def slowly(archive_id: str) -> None:
+        assert goes_on.wait(30.0)
+        delete(archive_id)
+
+    monkeypatch.setattr(services.files, "delete", slowly)
+    put(client, experiment, last=1, best=False)
+    try:
+        assert client.post(f"{thinning(experiment)}/free").status_code == 200
+        assert len(services.files.ids()) == 20
+    finally:
+        goes_on.set()
+    wait_until_freed(client)
 
 
 def test_what_others_need_stays_and_is_named(
@@ -171,6 +204,7 @@ def test_what_others_need_stays_and_is_named(
     }
     assert found["spared_total"] == 3
     client.post(f"{thinning(experiment)}/free")
+    wait_until_freed(client)
     assert set(ids(client, first)) == {200, 400, 1000}
     assert set(ids(client, second)) == {1000, 2000}
 
@@ -217,18 +251,37 @@ def test_on_each_database(settings: Settings, database_url: str) -> None:
     services = create_services(settings.model_copy(update={"database_url": database_url}))
     fill(services.database)
     with services.database.write() as session:
-        session.execute(update(tables.Experiment).values(deleted_at=None))
+        # A checkpoint of a byte and one of two are there, and stay.
+        session.execute(update(tables.Checkpoint).values(goes_at=None))
+        for number in (1, 2):
+            sums = {"checkpoint_count": 1, "checkpoint_bytes": number, "going_count": 0, "going_bytes": 0}
+            row = update(tables.Experiment).where(tables.Experiment.id == f"{number}experiments")
+            session.execute(row.values(deleted_at=None, **sums))
         for step in (10, 20, 30):
-            session.add(tables.Checkpoint(id=f"c{step}", run_id="1runs", step=step, size=2**40, sha256="", goes_at=None))
+            CheckpointRepository(session).add("1runs", step, StoredFile(f"c{step}", 2**40, ""), None)
     storage = StorageService(services)
     page = storage.page(OWNER, Window(10, 0))
     assert [(one.id, one.checkpoints) for one in page.items] == [("1experiments", 4), ("2experiments", 1)]
-    # A byte of the curve, and what the filled rows have.
-    assert (page.items[0].checkpoint_bytes, page.items[0].curve_bytes) == (3 * 2**40 + 1, 1)
+    # A byte of the curve and one of its steps, and what the filled rows have.
+    assert (page.items[0].checkpoint_bytes, page.items[0].curve_bytes) == (3 * 2**40 + 1, 2)
 
     taken = storage.change("1experiments", KeepRule(last=1, best=False))
     assert (taken.going, taken.going_bytes, [one.id for one in taken.spared]) == (2, 2 * 2**40, ["1checkpoints"])
     assert storage.page(OWNER, Window(10, 0)).items[0].going_bytes == 2 * 2**40
+    storage.free("1experiments")
+    storage.remove_due(time.time(), 10)
+    largest = storage.page(OWNER, Window(10, 0))
+    assert (largest.items[0].checkpoints, largest.items[0].checkpoint_bytes, largest.going_bytes) == (2, 2**40 + 1, 0)
+    # What is kept is what adding up gives.
+    with services.database.read() as session:
+        added_up = (
+            select(tables.Run.experiment_id, func.count(), func.sum(tables.Checkpoint.size))
+            .join(tables.Checkpoint, tables.Checkpoint.run_id == tables.Run.id)
+            .group_by(tables.Run.experiment_id)
+        )
+        assert {row[0]: (row[1], int(row[2])) for row in session.execute(added_up)} == {
+            item.id: (item.checkpoints, item.checkpoint_bytes) for item in largest.items
+        }
     services.database.dispose()
 
 

@@ -1,5 +1,6 @@
 """The trainer process as the Celery task sees it: started, given a job, listened to, asked to stop, killed."""
 
+import logging
 import os
 import signal
 import subprocess
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import IO
 
 from workers.runtime.pipe import Control, Job, Order, Ready, Report, Sender, reports
+
+logger = logging.getLogger(__name__)
 
 _ROOT = Path(__file__).resolve().parents[2]
 # What a crash is explained with.
@@ -145,4 +148,4 @@ class TrainerHandle:
             self._output.append(text)
             if self._on_output is not None:
                 self._on_output(text)
-            sys.stderr.write(f"trainer {self._process.pid}: {text}\n")
+            logger.info("trainer %d: %s", self._process.pid, text)

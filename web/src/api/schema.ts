@@ -1004,7 +1004,7 @@ export interface paths {
         put?: never;
         /**
          * Free Storage
-         * @description Remove what goes of an experiment at once.
+         * @description Remove what goes of an experiment now, not after its days: it begins at once, and pages hear of it as it goes on.
          */
         post: operations["free_storage_api_experiments__experiment_id__thinning_free_post"];
         delete?: never;
