@@ -109,6 +109,7 @@ export const experiment: Experiment = {
   unreadable: [],
   lacking: [],
   state: 'running',
+  parallel_runs: null,
   campaign: null,
   study_id: null,
   runs: [
