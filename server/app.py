@@ -27,6 +27,7 @@ from server.events import endpoints as events
 from server.events.position import PositionMiddleware
 from server.experiments import endpoints as experiments
 from server.exports import endpoints as exports
+from server.field import endpoints as field
 from server.files import FileStore
 from server.jobs import endpoints as jobs
 from server.jobs.results import ResultStore
@@ -111,6 +112,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     jobs.router,
     evaluations.router,
     leaderboards.router,
+    field.router,
     uploads.router,
     storage.router,
     monitoring.router,

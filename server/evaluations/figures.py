@@ -1,13 +1,10 @@
 """An evaluation's figures, from what a worker has measured."""
 
-import math
-
 from server.estimates import success_estimate
 from server.evaluations.schemas import EvaluationFigures
 from workers.job_protocol import Measurement
 from workers.shipped.figures import figures as usual_figures
-
-_TENTH = 0.1
+from workers.shipped.figures import worst_tenth
 
 
 def figures_of(measurement: Measurement, *, trained: bool) -> EvaluationFigures:
@@ -20,17 +17,16 @@ def figures_of(measurement: Measurement, *, trained: bool) -> EvaluationFigures:
     episodes, task = measurement.result.episodes, measurement.task
     usual = usual_figures(episodes, task.arrival_distance)
     arrived = [episode for episode in episodes if episode.outcome == "arrival"]
-    merits = sorted(
+    merits = [
         episode.path_efficiency(task.arrival_distance) if episode.outcome == "arrival" else 0.0 for episode in episodes
-    )
-    worst = merits[: math.ceil(_TENTH * len(merits))]
+    ]
     return EvaluationFigures(
         episodes=usual.episodes,
         success=success_estimate([usual.arrivals], [usual.episodes], trained=trained),
         collision=usual.collision,
         timeout=usual.timeout,
         spl=usual.spl,
-        worst_tenth_spl=sum(worst) / len(worst),
+        worst_tenth_spl=worst_tenth(merits),
         steps=usual.steps,
         seconds=None if usual.steps is None else usual.steps * task.control_period,
         path_length=sum(episode.path_length for episode in arrived) / len(arrived) if arrived else None,

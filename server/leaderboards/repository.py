@@ -94,6 +94,12 @@ class LeaderboardRepository:
         query = select(row).where(row.suite_hash == suite_hash, self._asked_seen())
         return list(self._session.scalars(query.order_by(row.created_at.desc()).limit(MOST_ENTRIES)))
 
+    def evaluations_named(self, suites: Collection[str]) -> list[tables.PolicyEvaluation]:
+        """Evaluations on suites of these names that are done, the newest first."""
+        row = tables.PolicyEvaluation
+        query = select(row).where(row.suite.in_(suites), row.figures.is_not(None), self._asked_seen())
+        return list(self._session.scalars(query.order_by(row.created_at.desc()).limit(MOST_ENTRIES)))
+
     def _seen(self) -> list[ColumnElement[bool]]:
         experiment = tables.Experiment
         found: list[ColumnElement[bool]] = [experiment.deleted_at.is_(None)]

@@ -25,6 +25,9 @@ CELL = 0.1
 PLAN_AGAIN = 4
 """Steps after which the way is planned anew."""
 
+PLAN_KNOWN_AGAIN = 40
+"""The same where the map is known from the beginning: the way changes with the robot's place alone."""
+
 AHEAD = 0.8
 """Metres along the way at which the point lies that is driven to; half a second at top speed where that is more."""
 
@@ -52,7 +55,7 @@ class Maps:
     """
 
     def __init__(self, task: TaskConfig, *, moving: bool = True, known: Sequence[Arena] = ()) -> None:
-        self._known = known
+        self._known, self._again = known, PLAN_KNOWN_AGAIN if known else PLAN_AGAIN
         self.scans, self._body, self._moving = Scans(task), Body.of(task), moving
         rectangular = self._body.half_length > 0.0
         self._cell = 0.5 * CELL if rectangular else CELL
@@ -71,7 +74,7 @@ class Maps:
             starts, angles, ranges = self._still(situation, i)
             trace(grid, x, y, self._cell, starts, pose[2], angles, ranges, self.scans.limit)
             step = self._steps.get(scenario, 0)
-            if step % PLAN_AGAIN == 0:
+            if step % self._again == 0:
                 self._ways[scenario] = self._plan(x, y, grid, pose, target)
             self._steps[scenario] = step + 1
             points[i] = self._point_ahead(self._ways[scenario], pose, target)

@@ -63,6 +63,7 @@ TABLE = {
         GET /api/arenas/imported/{sha256}
         GET /api/evaluations
         GET /api/uploads
+        GET /api/field
         GET /api/leaderboards
         GET /api/leaderboards/{suite_hash}
         GET /api/policies

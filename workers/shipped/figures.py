@@ -1,11 +1,14 @@
 """An evaluation in the few numbers that every table shows (no NumPy: the server reads them)."""
 
+import math
 from collections.abc import Sequence
 
 from sim.config import Frozen
 from workers.reporting import EpisodeResult
 from workers.statistics.intervals import Interval
 from workers.statistics.seeds import success_rate
+
+_TENTH = 0.1
 
 
 class Figures(Frozen):
@@ -58,3 +61,9 @@ def figures(episodes: Sequence[EpisodeResult], arrival_distance: float) -> Figur
         steps=sum(episode.steps for episode in arrivals) / len(arrivals) if arrivals else None,
         min_clearance=sum(episode.min_clearance for episode in episodes) / count,
     )
+
+
+def worst_tenth(merits: Sequence[float]) -> float:
+    """Mean over the tenth of the episodes, at least one, that did worst; 0 is the merit of one that did not arrive."""
+    worst = sorted(merits)[: math.ceil(_TENTH * len(merits))]
+    return sum(worst) / len(worst)

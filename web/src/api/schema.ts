@@ -1013,6 +1013,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/field": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Field
+         * @description Success in every family at difficulty 1, the hardest first, of shipped policies, baselines and asked evaluations.
+         */
+        get: operations["get_field_api_field_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/invitations": {
         parameters: {
             query?: never;
@@ -5386,6 +5406,100 @@ export interface components {
             seeds: number;
             /** Sentence */
             sentence: string;
+        };
+        /**
+         * FieldCell
+         * @description One driver in one family.
+         */
+        FieldCell: {
+            /**
+             * Collision
+             * @description Share of the episodes that ended in one.
+             */
+            collision: number;
+            /**
+             * Evaluation
+             * @description Of which asked evaluation; null for what ships.
+             */
+            evaluation: string | null;
+            success: components["schemas"]["Estimate"];
+            /**
+             * Worst Tenth Spl
+             * @description Success weighted by path length over the tenth of the episodes that did worst; a mean over seeds.
+             */
+            worst_tenth_spl: number;
+        };
+        /**
+         * FieldDriver
+         * @description A policy or a baseline in every family.
+         */
+        FieldDriver: {
+            /**
+             * Cells
+             * @description In the order of the families; null where it was not measured.
+             */
+            cells: (components["schemas"]["FieldCell"] | null)[];
+            /**
+             * Policy
+             * @description Name of the shipped policy; null for others.
+             */
+            policy: string | null;
+            /** Title */
+            title: string;
+            /**
+             * Trained
+             * @description Whether it was; baselines are not.
+             */
+            trained: boolean;
+        };
+        /**
+         * FieldMatrix
+         * @description Success in families at difficulty 1.
+         */
+        FieldMatrix: {
+            /**
+             * Asked
+             * @description What was asked for here at difficulty 1: 20 maps, 200 scenarios, attempts as long as the policy's own.
+             */
+            asked: components["schemas"]["FieldDriver"][];
+            /**
+             * Command
+             * @description What measured that which ships.
+             */
+            command: string;
+            /**
+             * Date
+             * @description When, ISO 8601.
+             */
+            date: string;
+            /**
+             * Families
+             * @description The hardest for the best shipped policy first.
+             */
+            families: string[];
+            /**
+             * Sights
+             * @description What was measured with the project, the narrowest sight first.
+             */
+            sights: components["schemas"]["FieldSight"][];
+        };
+        /**
+         * FieldSight
+         * @description Drivers that see equally much.
+         */
+        FieldSight: {
+            /**
+             * Drivers
+             * @description Policies first, then baselines; of each the best first.
+             */
+            drivers: components["schemas"]["FieldDriver"][];
+            /**
+             * Field Of View
+             * @description Degrees.
+             */
+            field_of_view: number;
+            /** Rays */
+            rays: number;
         };
         /**
          * FormulaTerm
@@ -14860,6 +14974,35 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_field_api_field_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FieldMatrix"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };

@@ -1,6 +1,6 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import { episodes, form, live, policy, replay } from '../testing/examples'
+import { episodes, field, form, live, policy, replay } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -9,6 +9,7 @@ vi.stubGlobal('EventSource', FakeEventSource)
 const { checkpoint_id: _, ...policyEpisodes } = episodes
 
 const routes = {
+  'GET /api/field': field,
   'GET /api/policies': [policy],
   'GET /api/policies/crowd': policy,
   'GET /api/policies/crowd/live': live,
@@ -44,6 +45,40 @@ test('every policy with its figures, and what can be done with it', async () => 
       .getAllByRole('menuitem')
       .map((item) => item.getAttribute('href')),
   ).toEqual(['/api/policies/crowd/download', '/api/policies/crowd/bundle'])
+})
+
+test('every family stands there, the hardest first, beside baselines that see as much', async () => {
+  startServer(routes)
+  open('/policies')
+  const table = await screen.findByRole('table', { name: 'Success by family' })
+  expect(
+    within(table)
+      .getAllByRole('columnheader')
+      .map((cell) => cell.textContent),
+  ).toEqual(['Who drives', 'Maze', 'Clutter'])
+  expect(within(table).getByText('See 360° with 60 rays')).toBeInTheDocument()
+  const [crowd, baseline, mine] = within(table).getAllByTestId('field-row')
+  expect(crowd).toHaveTextContent(/Crowd19\.0\s%.*worst tenth 0\.00, N = 100.*99\.0\s%.*worst tenth 0\.62/)
+  expect(within(crowd as HTMLElement).getByRole('link', { name: 'Crowd' })).toHaveAttribute(
+    'href',
+    '/policies/crowd',
+  )
+  expect(baseline).toHaveTextContent(/Dynamic window18\.0\s%.*–$/)
+  expect(mine).toHaveTextContent(/Mine, step 200–93\.0\s%/)
+  expect(within(mine as HTMLElement).getByRole('link')).toHaveAttribute('href', '/evaluations/ev1')
+})
+
+test('where nothing was asked for, it says how', async () => {
+  startServer({ ...routes, 'GET /api/field': { ...field, asked: [] } })
+  open('/policies')
+  expect(await screen.findByRole('link', { name: 'Evaluate' })).toHaveAttribute('href', '/evaluations')
+})
+
+test('a matrix that does not come leaves the policies', async () => {
+  startServer({ ...routes, 'GET /api/field': refusal(500, 'The file is gone.') })
+  open('/policies')
+  expect(await screen.findByText('The file is gone.')).toBeInTheDocument()
+  expect(screen.getByTestId('policy')).toBeInTheDocument()
 })
 
 test('a list that does not come says so', async () => {

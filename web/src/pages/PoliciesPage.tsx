@@ -4,6 +4,7 @@ import { Link } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
 import { ArenaPicture } from '../components/ArenaPicture'
+import { FieldMatrix } from '../components/FieldMatrix'
 import { IconPlayerPlay } from '../components/icons'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { PolicyActions } from '../components/PolicyActions'
@@ -39,6 +40,9 @@ export function PoliciesPage() {
             : [0, 1].map((key) => <Skeleton key={key} height={240} />)}
         </ul>
       )}
+      <div className={classes.matrix}>
+        <FieldMatrix />
+      </div>
     </Page>
   )
 }

@@ -8,6 +8,7 @@ import type {
   Episodes,
   Estimate,
   Experiment,
+  FieldMatrix,
   ListedExperiment,
   LiveState,
   Profiles,
@@ -282,6 +283,30 @@ export const policy: ShippedPolicy = {
       baselines: [row('go-to-goal', 0.25, 500), row('dynamic window', 0.998, 500)],
     },
   ],
+}
+
+const family = (value: number, evaluation: string | null = null) => ({
+  success: onePolicy(value, value - 0.1, value, 100),
+  collision: 0.05,
+  worst_tenth_spl: value > 0.9 ? 0.62 : 0,
+  evaluation,
+})
+
+export const field: FieldMatrix = {
+  families: ['maze', 'clutter'],
+  sights: [
+    {
+      rays: 60,
+      field_of_view: 360,
+      drivers: [
+        { title: 'Crowd', policy: 'crowd', trained: true, cells: [family(0.19), family(0.99)] },
+        { title: 'dynamic window', policy: null, trained: false, cells: [family(0.18), null] },
+      ],
+    },
+  ],
+  asked: [{ title: 'Mine, step 200', policy: null, trained: true, cells: [null, family(0.93, 'ev1')] }],
+  command: 'python -m benchmarks.field',
+  date: '2026-11-22',
 }
 
 export const curves: Curves = {

@@ -1,0 +1,1 @@
+"""Families by policies: what ships, baselines of equal sight, and what people had measured themselves."""

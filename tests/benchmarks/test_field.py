@@ -1,0 +1,79 @@
+"""The matrices at their smallest: what is kept is gone on with, and the docs and the package say the same."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.field.__main__ import main
+from benchmarks.field.candidates import baselines, knows_the_map, policies
+from benchmarks.field.report import DOCS, tables, written
+from benchmarks.field.results import Kept, drive, key_of, rows
+from benchmarks.field.suites import FAMILIES, FROZEN, Piece, pieces, suite_of_piece
+from workers.shipped.field import field
+
+SIZE = 3
+
+
+def test_a_run_goes_on_with_what_was_kept_and_prints_what_all_of_it_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keep = tmp_path / "field.jsonl"
+
+    def run(*arguments: str) -> str:
+        main(["--only", "families", "--families", "clutter", "--keep", str(keep), "--size", str(SIZE), *arguments])
+        return capsys.readouterr().out
+
+    first = run("--policies", "simple", "--baselines", "go-to-goal")
+    lines = keep.read_text().splitlines()
+    # A policy, and the baseline with three sights.
+    assert len(lines) == 4
+    assert all(len(json.loads(line)["outcomes"]) == SIZE for line in lines)
+    assert run("--policies", "simple", "--baselines", "go-to-goal").split("{")[0] == first.split("{")[0]
+    assert keep.read_text().splitlines() == lines
+    assert "| *Simple arena* | 3 | 1 |" in first
+    assert json.loads(first.splitlines()[-1])["targets"] == {"clutter, best policy": 99.5}
+
+
+def test_pieces_are_the_same_scenarios_whatever_the_size() -> None:
+    assert [(each.first, each.count) for each in pieces("families", "maze", 250)] == [(0, 100), (100, 100), (200, 50)]
+    assert sum(each.count for each in pieces("barn", FROZEN["barn"][0], 1000)) == 120
+    # A part of the frozen suite mixes its scenes, and no scenario is driven twice.
+    seen = [suite_of_piece(each).arena_indices.tolist() for each in pieces("people", "people-500", 500)]
+    assert sorted(index for piece in seen for index in piece) == list(range(500))
+    assert len({index // 50 for index in seen[0]}) == 10
+
+
+def test_who_drives_where() -> None:
+    everywhere = [(each.name, each.task_under(None).lidar.rays) for each in baselines(["VFH+", "MPPI"], "families")]  # type: ignore[arg-type]
+    assert everywhere == [("VFH+", 30), ("VFH+", 60), ("VFH+", 120), ("MPPI", 60)]
+    orca = "ORCA, told where people are"
+    assert [len(baselines([orca], part)) for part in ("families", "barn", "people")] == [0, 0, 1]
+    (simple,) = policies(["simple"], None)
+    assert (simple.policy, simple.seed) == ("simple", 0)
+
+
+def test_the_planner_with_the_map_scores_in_barn_and_what_was_kept_is_read_back(tmp_path: Path) -> None:
+    (piece,) = pieces("barn", "barn-jackal-120", 1)
+    kept = Kept(tmp_path / "field.jsonl")
+    kept.add(drive(knows_the_map(), piece))
+    (row,) = rows(iter(Kept(tmp_path / "field.jsonl")))
+    assert row.episodes == 1
+    assert row.score is not None
+    assert 0.0 <= row.score <= 0.5
+    again = Kept(tmp_path / "field.jsonl")
+    assert again.get(key_of(knows_the_map(), piece), piece) is not None
+    assert again.get(key_of(knows_the_map(), piece), Piece("barn", "barn-jackal-120", 0, 100)) is None
+
+
+def test_the_docs_are_its_output() -> None:
+    assert tables(field()) in DOCS.read_text()
+    assert written(DOCS.read_text(), field()) == DOCS.read_text()
+    with pytest.raises(ValueError, match="unpack"):
+        written("a page without the marks", field())
+
+
+def test_every_shipped_policy_stands_in_every_family() -> None:
+    measured = {(row.policy, row.suite) for row in field().rows if row.policy}
+    shipped = {each.policy for each in policies([row.policy for row in field().rows if row.policy], None)}
+    assert measured == {(policy, family) for policy in shipped for family in FAMILIES}
