@@ -38,7 +38,7 @@ function Loaded({ matrix }: { matrix: Matrix }) {
         as long as the shortest path takes.
       </Text>
       <Table.ScrollContainer type="native" minWidth={860} tabIndex={0}>
-        <Table className={experiments.table} aria-label="Success by family">
+        <Table className={`${experiments.table} ${classes.matrix}`} aria-label="Success by family">
           <Table.Thead>
             <Table.Tr>
               <Table.Th className={classes.who}>Who drives</Table.Th>
@@ -95,7 +95,7 @@ function Rows({ title, drivers, columns, children }: RowsProps) {
         <Table.Tr key={`${driver.trained} ${driver.title}`} data-testid="field-row">
           <Table.Th scope="row" className={`${classes.who} ${driver.trained ? classes.trained : ''}`}>
             {driver.policy ? (
-              <Anchor component={Link} to={`/policies/${driver.policy}`} size="sm">
+              <Anchor component={Link} to={`/policies/${driver.policy}`} size="sm" fw={550}>
                 {driver.title}
               </Anchor>
             ) : driver.trained ? (
