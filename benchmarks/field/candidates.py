@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sim.arrays import Floats
@@ -55,9 +56,8 @@ def baselines(names: Sequence[str], part: Part) -> list[Candidate]:
         if part != "families":
             drivers.append(_baseline(name, SuiteRules.task))
             continue
-        for sight in SIGHTS[1:2] if name in DEAR else SIGHTS:
-            task = TaskConfig(lidar=sight)
-            drivers.append(_baseline(name, lambda _, task=task: task))
+        sights = SIGHTS[1:2] if name in DEAR else SIGHTS
+        drivers += [_baseline(name, partial(_whatever_the_rules, TaskConfig(lidar=sight))) for sight in sights]
     return drivers
 
 
@@ -90,6 +90,10 @@ def policies(names: Sequence[str], seeds: Path | None) -> list[Candidate]:
 
 def _baseline(name: str, task_under: Callable[[SuiteRules], TaskConfig]) -> Candidate:
     return Candidate(name, None, None, task_under, lambda task, _: controller_of(TABLED[name], task))
+
+
+def _whatever_the_rules(task: TaskConfig, _: SuiteRules) -> TaskConfig:
+    return task
 
 
 def _policy(shipped: ShippedPolicy, archive: Path, seed: int) -> Candidate:

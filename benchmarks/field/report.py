@@ -44,8 +44,7 @@ def _families(field: Field) -> str:
         return ""
     names = [name for name in FAMILIES if any(row.suite == name for row in field.rows)]
     sights = sorted({(group[0].field_of_view, group[0].rays) for group in groups})
-    difficulty = {name: max(group[0].success for group in groups if group[0].suite == name) for name in names}
-    names.sort(key=difficulty.__getitem__)
+    names.sort(key=lambda name: max((row.success for row in field.rows if row.policy and row.suite == name), default=0.0))
     lines = ["Success, %, in families at difficulty 1, beside it the SPL of the worst tenth of the episodes.", ""]
     lines += ["| | N | seeds | " + " | ".join(names) + " |", "|---|---|---|" + "---|" * len(names)]
     for view, rays in sights:

@@ -4,8 +4,10 @@ import math
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.field.candidates import Candidate
 from benchmarks.field.suites import Piece, rules_of, suite_of_piece
@@ -146,7 +148,7 @@ def rows(results: Iterator[PieceResult]) -> tuple[FieldRow, ...]:
 
 
 def _row(key: Key, found: list[PieceResult]) -> FieldRow:
-    def joined(name: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def joined(name: str) -> NDArray[np.floating[Any]]:
         return np.array([value for result in found for value in getattr(result, name)], dtype=np.float64)
 
     def mean(name: str) -> float | None:
@@ -178,5 +180,5 @@ def _efficiencies(table: EpisodeTable, suite: Suite, arrival_distance: float) ->
     )
 
 
-def _rounded(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, ...]:
+def _rounded(values: NDArray[np.floating[Any]]) -> tuple[float, ...]:
     return tuple(round(float(value), 3) if math.isfinite(value) else 0.0 for value in values)

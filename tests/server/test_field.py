@@ -1,5 +1,7 @@
 """Families by policies: what ships, beside baselines of equal sight, and what people had measured themselves."""
 
+from typing import Any
+
 from fastapi.testclient import TestClient
 
 from server.services import Services
@@ -15,7 +17,7 @@ def test_what_ships_stands_beside_baselines_that_see_as_much_the_hardest_family_
     assert best == sorted(best)
     assert found["families"][0] == "maze"
     assert found["asked"] == []
-    policies = {}
+    policies: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
     for sight in found["sights"]:
         assert {driver["title"] for driver in sight["drivers"] if not driver["trained"]} >= {"VFH+"}
         trained = [driver["trained"] for driver in sight["drivers"]]
