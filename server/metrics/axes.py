@@ -22,12 +22,12 @@ class AxisRepository:
 
     def keep(self, run_id: str, points: Points) -> str:
         """The id of the axis on which the points lie, which is written where it is new."""
-        digest = blake2b(points.steps.tobytes() + points.times.tobytes(), digest_size=8).hexdigest()
-        if (run_id, digest) not in self._kept:
-            if self._session.get(tables.MetricAxis, (run_id, digest)) is None:
-                self._session.add(tables.MetricAxis(run_id=run_id, id=digest, data=points.encode_axis()))
-            self._kept.add((run_id, digest))
-        return digest
+        key = digest(points)
+        if (run_id, key) not in self._kept:
+            if self._session.get(tables.MetricAxis, (run_id, key)) is None:
+                self._session.add(tables.MetricAxis(run_id=run_id, id=key, data=points.encode_axis()))
+            self._kept.add((run_id, key))
+        return key
 
     def decoded(self, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, Points]]:
         """The chunks with their points, in order; an axis that many lie on is read and decoded once."""
@@ -57,3 +57,8 @@ class AxisRepository:
             query = select(axis.run_id, axis.id, axis.data).where(tuple_(axis.run_id, axis.id).in_(some))
             axes |= {(run_id, key): Axis.decode(data) for run_id, key, data in self._session.execute(query)}
         return axes
+
+
+def digest(points: Points) -> str:
+    """What the axis of these points is called: the same for the same steps and times."""
+    return blake2b(points.steps.tobytes() + points.times.tobytes(), digest_size=8).hexdigest()

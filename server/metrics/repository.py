@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session
 
 from server.abandoned import stop_if_abandoned
 from server.database import tables
-from server.metrics.axes import AxisRepository
+from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
-from server.metrics.summaries import SummaryRepository, summarized
+from server.metrics.summaries import SummaryRepository, summarized, summary_of
 
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
 COMPACT_AFTER = 500
@@ -86,11 +86,17 @@ class MetricRepository:
         self._session.flush()
 
     def add_series(self, run_id: str, series: Mapping[str, Points]) -> None:
-        """Add whole series at once, as chunks: what a benchmark or an import brings, without a row for every step."""
+        """Add whole series at once, as chunks: what a benchmark brings, without a row for every step."""
         self._extend(run_id, series)
         self._session.flush()
         newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
         self._set_latest(run_id, newest)
+
+    def add_packed(self, run_id: str, packed: "PackedSeries") -> None:
+        """Add the series of a run that has none yet: nothing is left to compute while the database is held."""
+        self._session.add_all(packed.rows)
+        self._session.flush()
+        self._set_latest(run_id, packed.newest)
 
     def drop_beyond(self, run_id: str, step: int) -> None:
         """Forget every point after `step`: what a lost attempt did after the checkpoint from which the next one resumes."""
@@ -296,19 +302,8 @@ class MetricRepository:
         return {chunk.name: chunk for chunk in self._session.scalars(query)}
 
     def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
-        for start in range(0, len(points), _CHUNK_POINTS):
-            part = points[start : start + _CHUNK_POINTS]
-            self._session.add(
-                tables.MetricChunk(
-                    run_id=run_id,
-                    name=name,
-                    first_step=int(part.steps[0]),
-                    last_step=int(part.steps[-1]),
-                    count=len(part),
-                    points=part.encode_values(),
-                    axis=self._axes.keep(run_id, part),
-                )
-            )
+        for part in _chunked(points):
+            self._session.add(_chunk(run_id, name, part, self._axes.keep(run_id, part)))
 
     def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
         if not newest:
@@ -320,6 +315,47 @@ class MetricRepository:
             ),
             [{"run_id": run_id, "name": name, "step": step, "value": value} for name, (step, value) in newest.items()],
         )
+
+
+@dataclass(frozen=True)
+class PackedSeries:
+    """All series of a run as rows of the database, before they are in it, and the newest number of each."""
+
+    rows: Sequence[tables.Base]
+    newest: Mapping[str, tuple[int, float]]
+
+    @classmethod
+    def of(cls, run_id: str, series: Mapping[str, Points]) -> "PackedSeries":
+        """Packs series: the long part of bringing in a run, without a transaction."""
+        rows: list[tables.Base] = []
+        axes: dict[str, tables.MetricAxis] = {}
+        for name, points in series.items():
+            for part in _chunked(points):
+                axis = digest(part)
+                if axis not in axes:
+                    axes[axis] = tables.MetricAxis(run_id=run_id, id=axis, data=part.encode_axis())
+                rows.append(_chunk(run_id, name, part, axis))
+            if len(points) > _LONG:
+                rows.append(summary_of(run_id, name, Buckets.of(points)))
+        newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
+        return cls([*axes.values(), *rows], newest)
+
+
+def _chunked(points: Points) -> Iterator[Points]:
+    for start in range(0, len(points), _CHUNK_POINTS):
+        yield points[start : start + _CHUNK_POINTS]
+
+
+def _chunk(run_id: str, name: str, points: Points, axis: str) -> tables.MetricChunk:
+    return tables.MetricChunk(
+        run_id=run_id,
+        name=name,
+        first_step=int(points.steps[0]),
+        last_step=int(points.steps[-1]),
+        count=len(points),
+        points=points.encode_values(),
+        axis=axis,
+    )
 
 
 def _portions(run_ids: Collection[str]) -> Iterator[list[str]]:

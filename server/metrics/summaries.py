@@ -28,18 +28,7 @@ class SummaryRepository:
         """Add points that follow on what is `known`; all of the series' where nothing is."""
         before = [summarized(known)] if known is not None else []
         buckets = Buckets.joined([*before, Buckets.of(points)])
-        # The newest point stays apart: a curve ends where it ends, not with a mean.
-        summary = buckets[:-1].widened()
-        self._session.merge(
-            tables.MetricSummary(
-                run_id=run_id,
-                name=name,
-                buckets=len(summary),
-                last_step=int(buckets.steps[-1]),
-                newest=float(buckets.mean[-1]) if buckets.finite[-1] else None,
-                data=summary.encode(),
-            )
-        )
+        self._session.merge(summary_of(run_id, name, buckets))
 
     def cut(self, run_id: str, step: int) -> None:
         """Forget every bucket that reaches beyond `step`, and the newest point with it."""
@@ -53,6 +42,20 @@ class SummaryRepository:
             else:
                 summary.last_step, summary.newest = int(steps[summary.buckets - 1]), None
         self._session.flush()
+
+
+def summary_of(run_id: str, name: str, buckets: Buckets) -> tables.MetricSummary:
+    """The summary of a series of which these are all the buckets."""
+    # The newest point stays apart: a curve ends where it ends, not with a mean.
+    summary = buckets[:-1].widened()
+    return tables.MetricSummary(
+        run_id=run_id,
+        name=name,
+        buckets=len(summary),
+        last_step=int(buckets.steps[-1]),
+        newest=float(buckets.mean[-1]) if buckets.finite[-1] else None,
+        data=summary.encode(),
+    )
 
 
 def summarized(summary: tables.MetricSummary) -> Buckets:

@@ -21,20 +21,24 @@ from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
 from server.files import StoredFile
 from server.metrics.points import Points
-from server.metrics.repository import MetricRepository
+from server.metrics.repository import MetricRepository, PackedSeries
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import (
     ArchivedCheckpoint,
     ArchivedEvaluation,
     ArchivedExperiment,
+    ArchivedLog,
     ArchivedPoints,
     ArchivedRun,
+    ArchivedStudy,
     ArchiveManifest,
     ImportedRun,
     ProjectImport,
 )
+from server.project_archives.studies import take_study
 from server.project_archives.tar import IncomingTar
 from server.projects.repository import ProjectRepository
+from server.run_log.repository import HEAD_BYTES, TAIL_BYTES, LogRepository
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.services import Services
@@ -48,6 +52,8 @@ _MAX_DOCUMENT = 64 * 2**20
 # Of a run, in memory before it is written.
 _MAX_POINTS = 10_000_000
 _POINT_BYTES = 20
+# Of a run's printed lines as they stand in the archive: twice what a server keeps of them.
+_MAX_LOG = 2 * (HEAD_BYTES + TAIL_BYTES)
 
 _Document = TypeVar("_Document", bound=BaseModel)
 
@@ -61,6 +67,8 @@ class _Run:
     evaluations: dict[str, ArchivedEvaluation] = field(default_factory=dict)
     series: dict[str, list[Points]] = field(default_factory=dict)
     points: int = 0
+    printed: list[ArchivedLog] = field(default_factory=list)
+    printed_bytes: int = 0
 
 
 class ProjectArrival:
@@ -94,6 +102,8 @@ class ProjectArrival:
                 parts = name.split("/")
                 if len(parts) == 2 and parts[1] == "experiment.json":
                     experiment = _read(ArchivedExperiment, await incoming.whole(_MAX_DOCUMENT))
+                elif len(parts) == 2 and parts[0] == "studies":
+                    await self._lane.run(self._study, _read(ArchivedStudy, await incoming.whole(_MAX_DOCUMENT)))
                 elif experiment is not None and parts[0] == experiment.id and len(parts) == 3 and parts[2] == "run.json":
                     await self._run(experiment, _read(ArchivedRun, await incoming.whole(_MAX_DOCUMENT)), incoming)
                 else:
@@ -157,6 +167,8 @@ class ProjectArrival:
             run.evaluations[stem] = _read(ArchivedEvaluation, await incoming.whole(_MAX_DOCUMENT))
         elif kind == "points":
             await self._lane.run(_add_points, run, await incoming.whole(_MAX_DOCUMENT))
+        elif kind == "log":
+            _add_log(run, await incoming.whole(_MAX_DOCUMENT))
         else:
             raise InvalidRequestError(f"This is no project's archive: {name} has no place in a run.")
 
@@ -166,6 +178,11 @@ class ProjectArrival:
         run.files[checkpoint.id] = StoredFile(checkpoint.id, 0, "")
         run.files[checkpoint.id] = await self._services.files.write(checkpoint.id, incoming.blocks(), checkpoint.sha256)
         await self._lane.run(self._check, checkpoint.id)
+
+    def _study(self, archived: ArchivedStudy) -> None:
+        with self._services.database.write() as session:
+            ProjectRepository(session).get(self._project_id)
+            take_study(session, self._project_id, archived)
 
     def _announce(self, archive_id: str) -> None:
         with self._services.database.write() as session:
@@ -207,14 +224,17 @@ class ProjectArrival:
         missing = {each.id for each in archived.checkpoints} - arrived.files.keys()
         if missing:
             raise ConflictError(f"The archive of checkpoint {min(missing)} is missing.")
+        # Packed before the database is held: a long run takes seconds of it.
         series = {name: Points.joined(pieces) for name, pieces in arrived.series.items()}
+        packed = PackedSeries.of(archived.id, series)
         with self._services.database.write() as session:
             experiment = session.get(tables.Experiment, wanted.id)
             _check_same(experiment, wanted, self._project_id)
             if session.get(tables.Run, archived.id) is not None:
                 raise ConflictError("This server has another run of that id.")
             if experiment is None:
-                experiment = _experiment(wanted, self._project_id)
+                study = session.get(tables.Study, wanted.study_id) if wanted.study_id else None
+                experiment = _experiment(wanted, self._project_id, study)
                 ExperimentRepository(session).add(experiment)
                 session.add_all(tables.ExperimentTag(experiment_id=wanted.id, tag=tag) for tag in dict.fromkeys(wanted.tags))
             session.add(_run(wanted.id, archived))
@@ -223,7 +243,9 @@ class ProjectArrival:
                 tables.RunEvent(run_id=archived.id, at=event.at, step=event.step, level=event.level, message=event.message)
                 for event in archived.events
             )
-            MetricRepository(session).add_series(archived.id, series)
+            MetricRepository(session).add_packed(archived.id, packed)
+            for log in arrived.printed:
+                LogRepository(session).add_chunk(archived.id, log.attempt, log.first, log.lines)
             for each in archived.checkpoints:
                 if not LooseArchives(session).register(each.id):
                     raise ConflictError("The archive took too long: import it again.")
@@ -258,7 +280,7 @@ def _check_same(experiment: tables.Experiment | None, wanted: ArchivedExperiment
         raise ConflictError(f"The training {wanted.id} lies in the trash: take it back, or remove it.")
 
 
-def _experiment(wanted: ArchivedExperiment, project_id: str) -> tables.Experiment:
+def _experiment(wanted: ArchivedExperiment, project_id: str, study: tables.Study | None) -> tables.Experiment:
     return tables.Experiment(
         id=wanted.id,
         project_id=project_id,
@@ -268,6 +290,9 @@ def _experiment(wanted: ArchivedExperiment, project_id: str) -> tables.Experimen
         notes=wanted.notes,
         starred_at=wanted.starred_at,
         archived_at=wanted.archived_at,
+        campaign=wanted.campaign,
+        campaign_row=wanted.campaign_row,
+        study_id=study.id if study is not None and study.project_id == project_id else None,
     )
 
 
@@ -309,6 +334,13 @@ def _add_points(run: _Run, content: bytes) -> None:
     run.series.setdefault(head.name, []).append(
         Points.of(points.steps.tolist(), points.times.tolist(), points.values.tolist())
     )
+
+
+def _add_log(run: _Run, content: bytes) -> None:
+    run.printed_bytes += len(content)
+    if run.printed_bytes > _MAX_LOG:
+        raise CorruptUploadError(f"a run may have {_MAX_LOG // 2**20} MiB of printed lines")
+    run.printed.append(_read(ArchivedLog, content))
 
 
 def _read(model: type[_Document], content: bytes) -> _Document:

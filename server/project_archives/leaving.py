@@ -18,11 +18,14 @@ from server.project_archives.schemas import (
     ArchivedEvaluation,
     ArchivedEvent,
     ArchivedExperiment,
+    ArchivedLog,
     ArchivedPoints,
     ArchivedRun,
     ArchiveManifest,
 )
+from server.project_archives.studies import archived_study
 from server.projects.repository import ProjectRepository
+from server.run_log.repository import LogRepository
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.version import version
@@ -30,7 +33,9 @@ from server.workbench.marks import MarkRepository
 
 
 def leaving(services: Services, project_id: str) -> OutgoingFile:
-    """The project as one file: experiments with tags and notes, runs with events, points, checkpoints and evaluations.
+    """The project as one file: studies, experiments with tags and notes, runs with all that hangs on them.
+
+    That is events, printed lines, points, checkpoints and their evaluations.
 
     What lies in the trash stays, and so do a damaged checkpoint and one whose archive is gone. A run that goes on leaves
     as it is when its turn comes. Only one run's documents are held at a time.
@@ -42,12 +47,21 @@ def leaving(services: Services, project_id: str) -> OutgoingFile:
         project = ProjectRepository(session).get(project_id)
         AuditRepository(session).add("project.exported", target=project.id, name=project.name, project_id=project.id)
         experiment_ids = ProjectArchiveRepository(session).experiments(project_id)
+        study_ids = ProjectArchiveRepository(session).studies(project_id)
     manifest = ArchiveManifest(version=version(), project=project.name)
-    return OutgoingFile(f"mapless-{slug(project.name)}.tar", "application/x-tar", _whole(services, manifest, experiment_ids))
+    blocks = _whole(services, manifest, study_ids, experiment_ids)
+    return OutgoingFile(f"mapless-{slug(project.name)}.tar", "application/x-tar", blocks)
 
 
-def _whole(services: Services, manifest: ArchiveManifest, experiment_ids: Sequence[str]) -> Iterator[bytes]:
+def _whole(
+    services: Services, manifest: ArchiveManifest, study_ids: Sequence[str], experiment_ids: Sequence[str]
+) -> Iterator[bytes]:
     yield from _document("manifest.json", manifest)
+    for study_id in study_ids:
+        with services.database.read() as session:
+            study = archived_study(session, study_id)
+        if study is not None:
+            yield from _document(f"studies/{study_id}.json", study)
     for experiment_id in experiment_ids:
         with services.database.read() as session:
             experiment = session.get(tables.Experiment, experiment_id)
@@ -81,6 +95,11 @@ def _run(services: Services, folder: str, run_id: str) -> Iterator[bytes]:
                 f"{folder}/{checkpoint.id}.json",
                 ArchivedEvaluation(created_at=evaluation.created_at, result=evaluation_result(evaluation)),
             )
+    with services.database.read() as session:
+        # Two megabytes at most.
+        printed = list(LogRepository(session).chunks(run_id))
+    for number, (attempt, first, lines) in enumerate(printed):
+        yield from _document(f"{folder}/{number}.log", ArchivedLog(attempt=attempt, first=first, lines=lines))
     for number, (name, points) in enumerate(read_series(services.database, run_id)):
         head = ArchivedPoints(name=name, count=len(points)).model_dump_json().encode() + b"\n"
         content = head + points.encode()
@@ -111,6 +130,9 @@ def _experiment(experiment: tables.Experiment, tags: list[str]) -> ArchivedExper
         starred_at=experiment.starred_at,
         archived_at=experiment.archived_at,
         tags=tags,
+        campaign=experiment.campaign,
+        campaign_row=experiment.campaign_row,
+        study_id=experiment.study_id,
     )
 
 

@@ -20,6 +20,18 @@ class ProjectArchiveRepository:
         query = select(row.id).where(row.project_id == project_id, row.deleted_at.is_(None))
         return self._session.scalars(query.order_by(row.created_at, row.id)).all()
 
+    def studies(self, project_id: str) -> Sequence[str]:
+        """The ids of a project's studies, the oldest first."""
+        row = tables.Study
+        return self._session.scalars(
+            select(row.id).where(row.project_id == project_id).order_by(row.created_at, row.id)
+        ).all()
+
+    def trials(self, study_id: str) -> Sequence[tables.StudyTrial]:
+        """A study's trials, by number."""
+        row = tables.StudyTrial
+        return self._session.scalars(select(row).where(row.study_id == study_id).order_by(row.number)).all()
+
     def runs(self, experiment_id: str) -> Sequence[str]:
         """The ids of an experiment's runs, by seed."""
         query = select(tables.Run.id).where(tables.Run.experiment_id == experiment_id)

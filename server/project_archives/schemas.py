@@ -1,11 +1,13 @@
 """What stands in a project's archive, and what came of one that was brought in.
 
 manifest.json                     ArchiveManifest
+studies/STUDY.json                ArchivedStudy
 EXPERIMENT/experiment.json        ArchivedExperiment
 EXPERIMENT/RUN/run.json           ArchivedRun
 EXPERIMENT/RUN/CHECKPOINT.zip     the archive of a checkpoint
 EXPERIMENT/RUN/CHECKPOINT.json    its evaluation, where it has one
 EXPERIMENT/RUN/NUMBER.points      a line of JSON (ArchivedPoints), then the points as the database keeps them
+EXPERIMENT/RUN/NUMBER.log         lines that its trainer printed (ArchivedLog)
 EXPERIMENT/RUN/end                behind all of a run
 """
 
@@ -13,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.database.tables import RunState
+from server.database.tables import RunState, StudyState, TrialState
 from server.schemas import Schema
 from workers.reporting import EvaluationResult, EventLevel
 
@@ -25,9 +27,9 @@ Step = Annotated[int, Field(ge=0, lt=2**62)]
 
 
 class ArchiveManifest(Schema):
-    """What an archive is."""
+    """What an archive is. Those of the first format have neither studies nor logs."""
 
-    format: Literal[1] = 1
+    format: Literal[1, 2] = 2
     version: ShortLine
     project: ShortLine
 
@@ -43,6 +45,52 @@ class ArchivedExperiment(Schema):
     starred_at: Time | None
     archived_at: Time | None
     tags: list[Annotated[ShortLine, StringConstraints(max_length=40)]] = Field(max_length=100)
+    campaign: Id | None = None
+    campaign_row: Annotated[ShortLine, StringConstraints(max_length=64)] | None = None
+    study_id: Id | None = None
+
+
+class ArchivedTrial(Schema):
+    """One choice of a study's settings."""
+
+    number: int = Field(ge=0, lt=2**31)
+    experiment_id: Id | None
+    state: TrialState
+    values: dict[str, Any]
+    rungs: dict[str, list[float | None]]
+    success: float | None
+    seconds_to_target: float | None
+    score: float | None
+    cost: float | None
+    reason: Text | None
+    created_at: Time
+    finished_at: Time | None
+
+
+class ArchivedStudy(Schema):
+    """A study with its trials."""
+
+    id: Id
+    name: ShortLine
+    spec: dict[str, Any]
+    state: StudyState
+    budget: int = Field(ge=0, lt=2**31)
+    asked: int = Field(ge=0, lt=2**31)
+    created_at: Time
+    finished_at: Time | None
+    suite_hash: Annotated[ShortLine, StringConstraints(max_length=64)] | None
+    importances: dict[str, float] | None
+    judged_trial: int | None = Field(ge=0, lt=2**31)
+    judgement_id: Id | None
+    trials: list[ArchivedTrial] = Field(max_length=100_000)
+
+
+class ArchivedLog(Schema):
+    """Lines that one attempt of a run printed one after another, each with its time; `first` counts from 1."""
+
+    attempt: int = Field(ge=0, lt=2**31)
+    first: int = Field(ge=1, lt=2**62)
+    lines: list[tuple[float, Text]] = Field(min_length=1, max_length=100_000)
 
 
 class ArchivedEvent(Schema):

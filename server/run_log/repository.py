@@ -60,11 +60,24 @@ class LogRepository:
             self._session.delete(middle)
         return True
 
+    def chunks(self, run_id: str) -> Iterator[tuple[int, int, list[tuple[float, str]]]]:
+        """All that is kept, piece by piece: its attempt, the number of its first line, and the lines with their times."""
+        for chunk in self._session.scalars(_chunks_of(run_id)):
+            yield chunk.attempt, chunk.first, _unpack(chunk.lines)
+
+    def add_chunk(self, run_id: str, attempt: int, first: int, lines: list[tuple[float, str]]) -> None:
+        """Add such a piece as it is, behind those that are there."""
+        self._session.add(
+            tables.RunLogChunk(
+                run_id=run_id, attempt=attempt, first=first, count=len(lines), size=_size(lines), lines=_pack(lines)
+            )
+        )
+
     def lines(self, run_id: str) -> Iterator[PrintedLine]:
         """All that are kept, the oldest first, a chunk at a time."""
-        for chunk in self._session.scalars(_chunks_of(run_id)):
-            for number, (at, text) in enumerate(_unpack(chunk.lines), start=chunk.first):
-                yield PrintedLine(chunk.attempt, number, at, text)
+        for attempt, first, lines in self.chunks(run_id):
+            for number, (at, text) in enumerate(lines, start=first):
+                yield PrintedLine(attempt, number, at, text)
 
 
 def _chunks_of(run_id: str) -> Select[tables.RunLogChunk]:

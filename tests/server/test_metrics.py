@@ -19,7 +19,7 @@ from server.database.engine import Database
 from server.database.migrate import migration_config, upgrade
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
 from server.metrics.points import Axis, Points
-from server.metrics.repository import MetricRepository, ReportedRow
+from server.metrics.repository import MetricRepository, PackedSeries, ReportedRow
 from server.metrics.service import json_numbers
 from server.services import Services
 
@@ -299,6 +299,29 @@ def test_a_long_curve_is_read_from_its_summary_as_the_points_say(database: Datab
         MetricRepository(session).drop_beyond("r", -1)
     add(database, 1, 9_000)
     agrees(database)
+
+
+def test_what_is_packed_before_the_database_is_held_is_what_would_be_written(database: Database) -> None:
+    steps = np.arange(1, 10_001, dtype=np.int64)
+    values = np.random.default_rng(0).normal(size=steps.size).astype(np.float32)
+    points = Points(steps, steps / 3, values)
+    series = {"a": points, "b": points[:5_000], "rare": points[::50]}
+    kinds = (tables.MetricAxis, tables.MetricChunk, tables.MetricSummary, tables.LatestMetric)
+
+    def written() -> list[list[dict[str, Any]]]:
+        with database.read() as session:
+            rows = [[dict(row) for row in session.execute(select(*kind.__table__.columns)).mappings()] for kind in kinds]
+        return [sorted(each, key=str) for each in rows]
+
+    with database.write() as session:
+        MetricRepository(session).add_series("r", series)
+    one_by_one = written()
+    with database.write() as session:
+        for kind in kinds:
+            session.execute(delete(kind))
+    with database.write() as session:
+        MetricRepository(session).add_packed("r", PackedSeries.of("r", series))
+    assert written() == one_by_one
 
 
 def test_looking_at_a_curve_costs_the_same_however_long_the_run_is(database: Database) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import json
 import tarfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -21,10 +22,16 @@ from server.files import StoredFile
 from server.ids import new_id
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
+from server.run_log.repository import LogRepository
 from server.services import Services
 from server.settings import Settings
+from server.studies.schemas import StudySpec
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+from workers.protocol import LogBatch, LogLine
 
+SEARCHED = StudySpec.model_validate(
+    {"training": {}, "settings": [{"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}]}
+).model_dump(mode="json")
 SHIPPED = Path(__file__).parents[2] / "workers" / "shipped" / "policies" / "simple" / "policy.zip"
 
 
@@ -39,14 +46,21 @@ class Server:
 
 
 @pytest.fixture
-def servers(tmp_path: Path) -> Iterator[tuple[Server, Server]]:
-    """Two that know nothing of one another."""
+def servers(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Server, Server]]:
+    """Two that know nothing of one another; on SQLite, unless a test says which of them is on PostgreSQL."""
+    on_postgres = getattr(request, "param", None)
     with ExitStack() as stack:
 
         def server(name: str) -> Server:
             folder = tmp_path / name
             settings = Settings.model_validate(
-                {"data_dir": folder, "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": folder / "dist"}
+                {
+                    "data_dir": folder,
+                    "token": TOKEN,
+                    "worker_token": WORKER_TOKEN,
+                    "web_dist": folder / "dist",
+                    "database_url": request.getfixturevalue("postgres_url") if name == on_postgres else None,
+                }
             )
             app = create_app(settings)
             headers = {"Authorization": f"Bearer {TOKEN}"}
@@ -75,9 +89,29 @@ def trained(servers: tuple[Server, Server]) -> dict[str, Any]:
     here, _ = servers
     experiment = here.reports.experiment("Corridor, once more", seeds=(3, 4), algorithm={"name": "ppo", "gamma": 0.97})
     first, second = experiment["runs"]
-    points = Points.of(range(1, 5_001), [float(i) for i in range(5_000)], [i / 7 if i % 100 else None for i in range(5_000)])
+    points = Points.of(range(1, 9_001), [float(i) for i in range(9_000)], [i / 7 if i % 100 else None for i in range(9_000)])
     with here.services.database.write() as session:
         MetricRepository(session).add_series(first["id"], {"train/return": points, "loss/value": points[:10]})
+        study = tables.Study(
+            id="s", project_id="default", name="Search", spec=SEARCHED, state="done", budget=2, asked=1, created_at=5.0
+        )
+        session.add(study)
+        session.flush()
+        session.add(
+            tables.StudyTrial(
+                study_id="s",
+                number=0,
+                experiment_id=experiment["id"],
+                values={"algorithm.gamma": 0.97},
+                rungs={"3": [0.5, None]},
+                created_at=6.0,
+            )
+        )
+        kept = session.get_one(tables.Experiment, experiment["id"])
+        kept.study_id, kept.campaign, kept.campaign_row = "s", "c1", "simple"
+        for attempt, first_line in ((1, 1), (2, 1), (2, 400)):
+            lines = [LogLine(at=1.0 + i, text=f"línea {i}") for i in range(2)]
+            LogRepository(session).append(first["id"], attempt, LogBatch(first=first_line, lines=tuple(lines)))
         session.add(tables.ExperimentTag(experiment_id=experiment["id"], tag="baseline"))
         session.get_one(tables.Experiment, experiment["id"]).notes = "# It *works*"
     checkpoint(here, first, 1_000, 8)
@@ -96,7 +130,9 @@ def everything(server: Server, experiment: dict[str, Any]) -> list[Any]:
     return [
         shown | {"runs": shown["runs"][:1], "state": None},
         get(f"/api/experiments/{experiment['id']}/marks"),
-        get(f"/api/runs/{run}/metrics?points=5000"),
+        get(f"/api/runs/{run}/metrics?points=9000"),
+        get(f"/api/runs/{run}/metrics?points=100"),
+        get(f"/api/runs/{run}/log"),
         [{key: value for key, value in each.items() if key != "evaluation"} for each in checkpoints],
         [each["evaluation"] and each["evaluation"]["success"] for each in checkpoints],
         get(f"/api/checkpoints/{checkpoints[1]['id']}/episodes"),
@@ -105,6 +141,15 @@ def everything(server: Server, experiment: dict[str, Any]) -> list[Any]:
     ]
 
 
+@pytest.mark.parametrize(
+    "servers",
+    [
+        "neither",
+        pytest.param("here", marks=pytest.mark.services),
+        pytest.param("there", marks=pytest.mark.services),
+    ],
+    indirect=True,
+)
 def test_a_project_comes_over_whole_with_the_same_ids(
     servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -121,12 +166,19 @@ def test_a_project_comes_over_whole_with_the_same_ids(
         run = trained["runs"][0]["id"]
         left, right = (MetricRepository(each).read(run)["train/return"] for each in (mine, theirs))
     assert np.array_equal(left.values, right.values, equal_nan=True)
+    # A study comes with its trials, and does not go on by itself.
+    with there.services.database.read() as session:
+        study, trial = session.get_one(tables.Study, "s"), session.get_one(tables.StudyTrial, ("s", 0))
+        assert (study.name, study.spec, study.state, study.created_at) == ("Search", SEARCHED, "done", 5.0)
+        assert (trial.experiment_id, trial.state, trial.rungs) == (trained["id"], "stopped", {"3": [0.5, None]})
+        kept = session.get_one(tables.Experiment, trained["id"])
+        assert (kept.study_id, kept.campaign, kept.campaign_row) == ("s", "c1", "simple")
     # Who went on there waits here, to be resumed.
     second = there.http.get(f"/api/runs/{trained['runs'][1]['id']}").json()
     assert second["state"] == "stopped"
     assert there.http.post(f"/api/runs/{second['id']}/resume").status_code == 200
     # It is found by its settings.
-    assert there.http.get("/api/experiments?query=algorithm.gamma%20%3D%200.97").json()["total"] == 1
+    assert there.http.get("/api/experiments?query=algorithm.gamma%20%3D%200.97%20study%20%3D%20s").json()["total"] == 1
     actions = [each["action"] for each in here.http.get("/api/audit?action=project").json()["items"]]
     assert actions == ["project.exported"]
     (entry,) = there.http.get("/api/audit?action=project").json()["items"]
@@ -229,6 +281,36 @@ def renamed(archive: Path, old: str, new: str) -> bytes:
             info.size = len(content)
             target.addfile(info, io.BytesIO(content))
     return out.getvalue()
+
+
+def test_an_archive_of_the_first_format_is_read(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+
+    def before(name: str, content: bytes) -> bytes | None:
+        if name.startswith("studies/") or name.endswith(".log"):
+            return None
+        if name.endswith("experiment.json"):
+            told = json.loads(content)
+            return json.dumps({key: told[key] for key in told.keys() - {"campaign", "campaign_row", "study_id"}}).encode()
+        return content.replace(b'"format":2', b'"format":1') if name == "manifest.json" else content
+
+    archive = rewritten(here.client.export_project("default", tmp_path), before)
+    assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]
+
+
+def test_more_printed_lines_than_a_server_keeps_are_refused(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    flood = json.dumps({"attempt": 1, "first": 1, "lines": [[1.0, "x" * 60_000]] * 30}).encode()
+
+    archive = rewritten(
+        here.client.export_project("default", tmp_path), lambda name, content: flood if name.endswith(".log") else content
+    )
+    first, _ = send(there, archive).json()["runs"]
+    assert (first["outcome"], "printed lines" in first["why"]) == ("refused", True)
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive at all", bytes(10_000), b"x" * 10_000])
