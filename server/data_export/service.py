@@ -3,6 +3,9 @@
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+from sqlalchemy.orm import Session
+
+from server.audit.repository import AuditRepository
 from server.comparison.service import ComparisonService
 from server.data_export.comparison import figure_rows, mean_rows, seed_rows
 from server.data_export.document import document, exported
@@ -35,8 +38,9 @@ class DataExportService:
         Raises:
             NotFoundError: there is no such run.
         """
-        with self._database.read() as session:
+        with self._database.write() as session:
             run = RunRepository(session).get(run_id)
+            _note(session, run.experiment, data_format, target=run.id)
             experiment, runs = exported(run.experiment), _seeds([run])
             stem = f"mapless-{slug(experiment.name)}-seed{run.seed}-{run_id}"
             began = run.created_at
@@ -50,8 +54,9 @@ class DataExportService:
         Raises:
             NotFoundError: there is no such experiment.
         """
-        with self._database.read() as session:
+        with self._database.write() as session:
             found = ExperimentRepository(session).get(experiment_id)
+            _note(session, found, data_format)
             experiment, runs = exported(found), _seeds(found.runs)
             began = {run.id: run.created_at for run in found.runs}
         stem = f"mapless-{slug(experiment.name)}-{experiment_id}"
@@ -73,6 +78,9 @@ class DataExportService:
         """
         service = ComparisonService(self._services)
         compared, curves = service.compare(experiment_ids, margin), service.curves(experiment_ids, name, points)
+        with self._database.write() as session:
+            for experiment in ExperimentRepository(session).get_many(experiment_ids):
+                _note(session, experiment, f"compared, {data_format}")
         if data_format == "json":
             whole = ExportedComparison(comparison=compared, curves=curves).model_dump_json().encode()
             return OutgoingFile("mapless-comparison.json", "application/json", iter([whole]))
@@ -93,6 +101,17 @@ class DataExportService:
         yield HEADING
         for run_id, seed in runs.items():
             yield from point_rows(run_id, seed, read_series(self._database, run_id))
+
+
+def _note(session: Session, experiment: tables.Experiment, details: str, target: str | None = None) -> None:
+    """What has left, in the audit log of its project."""
+    AuditRepository(session).add(
+        "data.exported",
+        target=target or experiment.id,
+        name=experiment.name,
+        project_id=experiment.project_id,
+        details=details,
+    )
 
 
 def _seeds(runs: Sequence[tables.Run]) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """What a person may do with evaluations: ask for some, look at them, call them off, delete them."""
 
 import hashlib
+from collections.abc import Mapping
 
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
@@ -30,6 +31,7 @@ from server.replays.subject import Subject
 from server.security.principal import Principal
 from server.services import Services
 from sim.config import ImportedArenaConfig, TaskConfig
+from sim.extending.discovery import UsedExtension
 from workers.job_protocol import AnyPolicy, ArenaSuite, CheckpointPolicy, EvaluateJob, SuiteChoice, UploadedPolicy
 from workers.reporting import EvaluationResult
 
@@ -47,7 +49,7 @@ def ask(services: Services, request: EvaluationRequest, principal: Principal) ->
         BusyError: as many jobs wait as may.
     """
     choices = [_with_stored_arena(services, suite) for suite in request.suites]
-    asked: list[AskedEvaluation] = []
+    asked: list[tuple[tables.PolicyEvaluation, tables.Job | None, str | None]] = []
     with services.database.write() as session:
         policies = wanted_policies(session, request.policies, principal)
         if len(policies) * len(choices) > MAX_AT_ONCE:
@@ -59,9 +61,10 @@ def ask(services: Services, request: EvaluationRequest, principal: Principal) ->
             for choice in choices:
                 evaluation = _queued(session, subject, EvaluateJob(policy=policy, suite=choice))
                 job = session.get(tables.Job, evaluation.job_id)
-                asked.append(_view(services, evaluation, job, PolicyEvaluationRepository(session).run_of(evaluation)))
+                asked.append((evaluation, job, PolicyEvaluationRepository(session).run_of(evaluation)))
     services.board.ring()
-    return asked
+    lacking = JobService(services).lacking_each(job for _, job, _ in asked if job is not None)
+    return [_view(services, *each, lacking) for each in asked]
 
 
 def _queued(session: Session, subject: Measured, spec: EvaluateJob) -> tables.PolicyEvaluation:
@@ -88,8 +91,9 @@ def some(services: Services, window: Window, wanted: Wanted) -> AskedEvaluationP
     with services.database.read() as session:
         rows, total = PolicyEvaluationRepository(session).page(window, wanted)
         jobs = JobRepository(session).several([row.job_id for row, _ in rows])
+    lacking = JobService(services).lacking_each(jobs.values())
     return AskedEvaluationPage(
-        items=[_view(services, row, jobs.get(row.job_id), run_id) for row, run_id in rows], total=total
+        items=[_view(services, row, jobs.get(row.job_id), run_id, lacking) for row, run_id in rows], total=total
     )
 
 
@@ -103,7 +107,8 @@ def one(services: Services, evaluation_id: str) -> AskedEvaluation:
         repository = PolicyEvaluationRepository(session)
         evaluation = repository.get(evaluation_id)
         job, run_id = session.get(tables.Job, evaluation.job_id), repository.run_of(evaluation)
-    return _view(services, evaluation, job, run_id)
+    lacking = JobService(services).lacking_each([job] if job is not None else [])
+    return _view(services, evaluation, job, run_id, lacking)
 
 
 def episodes(services: Services, evaluation_id: str) -> AskedEpisodes:
@@ -186,7 +191,11 @@ def _whole(services: Services, evaluation_id: str) -> tables.PolicyEvaluation:
 
 
 def _view(
-    services: Services, evaluation: tables.PolicyEvaluation, job: tables.Job | None, run_id: str | None
+    services: Services,
+    evaluation: tables.PolicyEvaluation,
+    job: tables.Job | None,
+    run_id: str | None,
+    lacking: Mapping[str, tuple[UsedExtension, ...]],
 ) -> AskedEvaluation:
     ended: tables.JobState = "done" if evaluation.suite is not None else "failed"
     is_open = job is not None and job.state in OPEN
@@ -202,7 +211,7 @@ def _view(
         progress=services.board.progress(evaluation.job_id) if is_open else float(evaluation.suite is not None),
         seconds_left=seconds_left(job, services.board.progress(evaluation.job_id)) if job is not None else None,
         error=evaluation.error,
-        waits_for=[] if job is None else list(JobService(services).lacking(job)),
+        waits_for=list(lacking.get(evaluation.job_id, ())),
         suite=evaluation.suite,
         suite_hash=evaluation.suite_hash,
         figures=None if evaluation.figures is None else EvaluationFigures.model_validate(evaluation.figures),

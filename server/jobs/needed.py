@@ -20,6 +20,23 @@ def needed_by(session: Session, spec: Mapping[str, Any]) -> tuple[UsedExtension,
         session: to look the policy up with.
         spec: `workers.job_protocol.JobSpec` as it was stored, whether this version can read it or not.
     """
+    return needed_by_each(session, [spec])[0]
+
+
+def needed_by_each(session: Session, specs: Sequence[Mapping[str, Any]]) -> list[tuple[UsedExtension, ...]]:
+    """The same of several, in one query."""
+    ids = {spec["policy"]["id"] for spec in specs if spec["policy"]["source"] == "checkpoint"}
+    query = (
+        select(tables.Checkpoint.id, tables.Experiment.training)
+        .join(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
+        .join(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+        .where(tables.Checkpoint.id.in_(ids))
+    )
+    trainings = {row[0]: row[1] for row in session.execute(query)} if ids else {}
+    return [_needed(spec, trainings) for spec in specs]
+
+
+def _needed(spec: Mapping[str, Any], trainings: Mapping[str, Mapping[str, Any]]) -> tuple[UsedExtension, ...]:
     needed: dict[str, UsedExtension] = {}
     policy, suite = spec["policy"], spec.get("suite") or {}
     family, dot, _ = str((suite.get("arena") or {}).get("name", "")).partition(".")
@@ -27,13 +44,7 @@ def needed_by(session: Session, spec: Mapping[str, Any]) -> tuple[UsedExtension,
         if extension.name == family:
             needed[family] = UsedExtension(name=family, version=extension.version, source=extension.source)
     if policy["source"] == "checkpoint":
-        training = session.scalar(
-            select(tables.Experiment.training)
-            .join(tables.Run, tables.Run.experiment_id == tables.Experiment.id)
-            .join(tables.Checkpoint, tables.Checkpoint.run_id == tables.Run.id)
-            .where(tables.Checkpoint.id == policy["id"])
-        )
-        used = _USED.validate_python((training or {}).get("extensions", ()))
+        used = _USED.validate_python(trainings.get(policy["id"], {}).get("extensions", ()))
         needed |= {extension.name: extension for extension in used}
     return tuple(needed[name] for name in sorted(needed))
 

@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from pydantic import ValidationError
 from sqlalchemy.exc import IntegrityError
@@ -14,7 +14,7 @@ from server.errors import BusyError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository
 from server.ids import new_id
 from server.jobs.asked import Asked
-from server.jobs.needed import needed_by
+from server.jobs.needed import needed_by, needed_by_each
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.schemas import JobPage
 from server.jobs.views import job_view
@@ -93,11 +93,18 @@ class JobService:
 
     def lacking(self, job: tables.Job) -> tuple[UsedExtension, ...]:
         """The extensions that a queued job waits for; none where it does not wait, or a worker is there that has them."""
-        if job.state != "queued":
-            return ()
+        return self.lacking_each([job]).get(job.id, ())
+
+    def lacking_each(self, jobs: Iterable[tables.Job]) -> dict[str, tuple[UsedExtension, ...]]:
+        """The same of several by their ids, in one query; who lacks nothing is absent."""
+        queued = [job for job in jobs if job.state == "queued"]
+        if not queued:
+            return {}
         with self._services.database.read() as session:
-            needed = needed_by(session, job.spec)
-        return () if self.board.workers(needed) else needed
+            each = needed_by_each(session, [job.spec for job in queued])
+        return {
+            job.id: needed for job, needed in zip(queued, each, strict=True) if needed and not self.board.workers(needed)
+        }
 
     def current(self, job_id: str, attempt: int) -> tables.Job:
         """The job, where this attempt has it.
@@ -112,7 +119,8 @@ class JobService:
         """Some of the jobs, and how many workers take them up."""
         with self._services.database.read() as session:
             rows, total = JobRepository(session).page(window)
-        items = [job_view(row, self.board, self.lacking(row)) for row in rows]
+        lacking = self.lacking_each(rows)
+        items = [job_view(row, self.board, lacking.get(row.id, ())) for row in rows]
         return JobPage(items=items, total=total, workers=self.board.machines())
 
     def cancel(self, job_id: str) -> tables.Job:

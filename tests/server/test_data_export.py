@@ -40,6 +40,23 @@ def rows_of(response: Response) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(response.text)))
 
 
+def test_what_leaves_stands_in_the_audit_log(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("Corridor")
+    run = experiment["runs"][0]
+    export(client, "runs", run, "csv")
+    export(client, "experiments", experiment, "tensorboard")
+    client.get("/api/compare/export", params={"experiment": [experiment["id"]], "format": "json"})
+
+    entries = client.get("/api/audit", params={"action": "data.exported"}).json()["items"]
+
+    told = [(entry["target"], entry["name"], entry["project_id"], entry["details"]) for entry in entries]
+    assert told == [
+        (experiment["id"], "Corridor", "default", "compared, json"),
+        (experiment["id"], "Corridor", "default", "tensorboard"),
+        (run["id"], "Corridor", "default", "csv"),
+    ]
+
+
 def test_every_point_is_a_row(client: TestClient, services: Services, reports: Reports) -> None:
     experiment = reports.experiment("Corridor", seeds=(3, 8))
     first, second = experiment["runs"]
