@@ -193,7 +193,7 @@ def test_a_long_series_is_never_held_whole(services: Services, reports: Reports)
     pieces = [len(points) for _, points in read_series(services.database, run["id"])]
 
     assert sum(pieces) == 150_000
-    assert max(pieces) <= 4_096
+    assert max(pieces) <= 8_192
 
 
 def test_what_lies_in_the_trash_does_not_leave(client: TestClient, services: Services, reports: Reports) -> None:
