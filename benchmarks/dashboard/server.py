@@ -33,13 +33,16 @@ class Server:
     process: psutil.Process
 
     def cpu_ms(self) -> float:
-        """Processor time that it has taken so far, milliseconds."""
-        times = self.process.cpu_times()
-        return 1000.0 * (float(times.user) + float(times.system))
+        """Processor time that it and what it has started have taken so far, milliseconds."""
+        times = [process.cpu_times() for process in self._processes()]
+        return 1000.0 * sum(float(each.user) + float(each.system) for each in times)
 
     def memory_mb(self) -> float:
         """Resident memory, MB."""
-        return float(self.process.memory_info().rss) / 1e6
+        return sum(float(process.memory_info().rss) for process in self._processes()) / 1e6
+
+    def _processes(self) -> list[psutil.Process]:
+        return [self.process, *self.process.children(recursive=True)]
 
     def client(self, token: str | None = None) -> httpx.Client:
         """A client of its API, a person's unless another token is given."""
