@@ -164,6 +164,7 @@ def test_fifty_runs_report_while_people_write_too_and_nothing_is_lost(services: 
         stored = session.execute(
             select(tables.MetricRow.run_id, tables.MetricRow.step).order_by(tables.MetricRow.run_id, tables.MetricRow.seq)
         ).all()
-        messages = session.scalars(select(tables.RunEvent.message).where(tables.RunEvent.run_id == "r7")).all()
+        said = select(tables.RunEvent.message).where(tables.RunEvent.run_id == "r7").order_by(tables.RunEvent.id)
+        messages = session.scalars(said).all()
     assert [tuple(row) for row in stored] == sorted((f"r{run}", step) for run in range(50) for step in range(1, batches + 1))
     assert messages == [f"step {step}" for step in range(1, batches + 1)]
