@@ -18,7 +18,7 @@ def test_adam_steps_as_torchs(path: str, monkeypatch: pytest.MonkeyPatch) -> Non
     ours, theirs = make_network(), make_network()
     adam = FlatAdam(ours, learning_rate=1e-2)
     if path == "tensors":  # as on any other device than a CPU
-        monkeypatch.setattr(flat, "adam_step", lambda *vectors: adam._step_in_tensors(slice(None), *vectors[-2:]))
+        monkeypatch.setattr(flat, "adam_step", lambda *vectors: adam._step_in_tensors(*vectors[-2:]))
     reference = torch.optim.Adam(theirs.parameters(), lr=1e-2)
     for step in range(50):
         inputs = torch.randn(16, 3, generator=torch.Generator().manual_seed(step))

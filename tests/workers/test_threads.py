@@ -1,14 +1,17 @@
 """A training on two threads ends at the same bits; how many it takes follows what others leave free."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from tests.workers.test_trainer import Recorder
+from workers.algorithms.gradients.ppo import WrittenPpo
 from workers.algorithms.ppo import Ppo
 from workers.config import EvaluationConfig, MlpNetwork, Network, PpoConfig, ResBlockNetwork, Threads, TrainingConfig
+from workers.kernels.ppo import CRITIC
 from workers.live.viewing import Unwatched
 from workers.training.threads import ThreadCount, runnable_threads
 from workers.training.trainer import Training
@@ -38,6 +41,17 @@ def test_two_threads_end_at_the_same_bits(network: Network, tmp_path: Path) -> N
         assert np.array_equal(array, beside[name]), name
 
 
+def test_all_minibatches_in_one_call_end_where_one_after_the_other_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled = trained("1", MlpNetwork(hidden_sizes=(48, 32)), tmp_path)
+    monkeypatch.setattr(Ppo, "_learn_compiled", lambda ppo, _, *rest: ppo._learn(*rest))
+    by_turns = trained("1", MlpNetwork(hidden_sizes=(48, 32)), tmp_path)
+    assert compiled.keys() == by_turns.keys()
+    for name, array in compiled.items():
+        assert np.array_equal(array, by_turns[name]), name
+
+
 def test_the_other_thread_flushes_denormal_numbers_too(tmp_path: Path) -> None:
     """Adam's moments of dead units decay into them; a thread that kept them would end at other bits."""
     torch.set_flush_denormal(True)
@@ -49,10 +63,14 @@ def test_the_other_thread_flushes_denormal_numbers_too(tmp_path: Path) -> None:
 
 
 def test_a_fault_of_the_other_thread_ends_the_update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
-        raise MemoryError
+    learn = WrittenPpo.learn
 
-    monkeypatch.setattr("workers.algorithms.flat.FlatAdam.step_of", broken)
+    def broken(self: WrittenPpo, whose: int, *rest: Any) -> torch.Tensor:
+        if whose == CRITIC:
+            raise MemoryError
+        return learn(self, whose, *rest)
+
+    monkeypatch.setattr(WrittenPpo, "learn", broken)
     with pytest.raises(MemoryError):
         trained("2", MlpNetwork(hidden_sizes=(8,)), tmp_path)
 

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from workers.kernels.adam import BETA1, BETA2, EPSILON, adam_step, clip_norm
+from workers.kernels.adam import BETA1, BETA2, EPSILON, AdamSteps, adam_step, clip_norm
 
 
 class FlatParameters:
@@ -50,16 +50,12 @@ class FlatParameters:
 
     def clip_gradients(self, max_norm: float) -> None:
         """Scales each module's gradient to at most this 2-norm (Pascanu et al. 2013)."""
-        for module in range(len(self._modules)):
-            self.clip_gradient(module, max_norm)
-
-    def clip_gradient(self, module: int, max_norm: float) -> None:
-        """The same for one module, by its place."""
-        gradient = self.gradients[self._modules[module]]
-        if gradient.device.type == "cpu":
-            clip_norm(gradient.numpy(), max_norm)
-        else:
-            gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
+        for part in self._modules:
+            gradient = self.gradients[part]
+            if gradient.device.type == "cpu":
+                clip_norm(gradient.numpy(), max_norm)
+            else:
+                gradient.mul_(torch.clamp(max_norm / (torch.linalg.vector_norm(gradient) + 1e-6), max=1.0))
 
 
 class FlatAdam(FlatParameters):
@@ -71,37 +67,36 @@ class FlatAdam(FlatParameters):
     def __init__(self, *modules: nn.Module, learning_rate: float) -> None:
         super().__init__(*modules)
         self.learning_rate = learning_rate
-        self._steps = [0] * len(modules)
+        self._steps = 0
         self._mean = torch.zeros_like(self.values)
         self._square = torch.zeros_like(self.values)
 
     @torch.no_grad()
     def step(self) -> None:
         """One step against `gradients`."""
-        self._steps = [steps + 1 for steps in self._steps]
-        self._move(slice(None), self._steps[0])
-
-    @torch.no_grad()
-    def step_of(self, module: int) -> None:
-        """The same for one module, by its place; all must have come as far before `step` or `state`."""
-        self._steps[module] += 1
-        self._move(self._modules[module], self._steps[module])
-
-    def _move(self, part: slice, steps: int) -> None:
-        # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
-        correction = math.sqrt(1.0 - BETA2**steps)
-        rate, epsilon = self.learning_rate * correction / (1.0 - BETA1**steps), correction * EPSILON
+        rate, epsilon = self._next()
         if self.values.device.type == "cpu":
             vectors = (self.values, self.gradients, self._mean, self._square)
-            adam_step(*(vector.numpy()[part] for vector in vectors), rate, epsilon)
+            adam_step(*(vector.numpy() for vector in vectors), rate, epsilon)
         else:
-            self._step_in_tensors(part, rate, epsilon)
+            self._step_in_tensors(rate, epsilon)
 
-    def _step_in_tensors(self, part: slice, rate: float, epsilon: float) -> None:
-        values, gradients, mean, square = self.values[part], self.gradients[part], self._mean[part], self._square[part]
-        mean.lerp_(gradients, 1.0 - BETA1)
-        square.mul_(BETA2).addcmul_(gradients, gradients, value=1.0 - BETA2)
-        values.addcdiv_(mean, torch.sqrt(square).add_(epsilon), value=-rate)
+    def _step_in_tensors(self, rate: float, epsilon: float) -> None:
+        self._mean.lerp_(self.gradients, 1.0 - BETA1)
+        self._square.mul_(BETA2).addcmul_(self.gradients, self.gradients, value=1.0 - BETA2)
+        self.values.addcdiv_(self._mean, torch.sqrt(self._square).add_(epsilon), value=-rate)
+
+    def next_steps(self, count: int, max_norm: float) -> AdamSteps:
+        """What compiled code needs to take the next `count` steps, which count as taken; on a CPU."""
+        rates, epsilons = np.array([self._next() for _ in range(count)], np.float64).reshape(count, 2).T.copy()
+        starts = np.array([0, *(module.stop for module in self._modules)], np.int64)
+        return AdamSteps(self._mean.numpy(), self._square.numpy(), starts, rates, epsilons, max_norm)
+
+    def _next(self) -> tuple[float, float]:
+        # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
+        self._steps += 1
+        correction = math.sqrt(1.0 - BETA2**self._steps)
+        return self.learning_rate * correction / (1.0 - BETA1**self._steps), correction * EPSILON
 
     def descend(self, loss: Tensor) -> None:
         """One step against the gradient of a scalar, by autograd."""
@@ -111,11 +106,11 @@ class FlatAdam(FlatParameters):
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Parameters and moments, for `load_state`."""
         tensors = {"values": self.values, "mean": self._mean, "square": self._square}
-        return {name: tensor.cpu().numpy().copy() for name, tensor in tensors.items()} | {"steps": np.array(self._steps[0])}
+        return {name: tensor.cpu().numpy().copy() for name, tensor in tensors.items()} | {"steps": np.array(self._steps)}
 
     @torch.no_grad()
     def load_state(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Continues where `state` was taken."""
         for name, tensor in (("values", self.values), ("mean", self._mean), ("square", self._square)):
             tensor.copy_(torch.from_numpy(np.array(state[name], np.float32)))
-        self._steps = [int(state["steps"])] * len(self._steps)
+        self._steps = int(state["steps"])

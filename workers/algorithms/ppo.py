@@ -9,7 +9,7 @@ layers (14), orthogonal initialisation (2).
 Read `workers.algorithms.plain_ppo` first: the same on one page.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -25,7 +25,7 @@ from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenP
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import RolloutStorage, Samples, generalized_advantages
 from workers.config import PpoConfig, RecurrentNetworkConfig
-from workers.kernels.ppo import ACTOR, CRITIC
+from workers.kernels.ppo import ACTOR, BOTH, CRITIC
 from workers.networks.compiled import inference, is_compiled
 from workers.networks.inputs import Inputs, as_inputs
 from workers.networks.modules import Described, GaussianActor, build_network, take_weights
@@ -109,8 +109,8 @@ class Ppo:
         samples = storage.samples(log_prob(storage.noise, self.actor.log_std), normalised, returns)
 
         minibatches = [minibatch for _ in range(config.epochs) for minibatch in self.minibatches()]
-        if self.threads > 1 and isinstance(self._gradients, WrittenPpo):
-            totals = self._learn_side_by_side(self._gradients, samples, minibatches)
+        if isinstance(self._gradients, WrittenPpo):
+            totals = self._learn_compiled(self._gradients, samples, minibatches)
         else:
             totals = self._learn(samples, minibatches)
         storage.clear()
@@ -138,26 +138,15 @@ class Ppo:
             self.actor.log_std.clamp_(*LOG_STD_RANGE)
         return totals
 
-    def _learn_side_by_side(
-        self, gradients: WrittenPpo, samples: Samples, minibatches: Iterable[torch.Tensor]
-    ) -> torch.Tensor:
-        """The same bit for bit on two threads: neither network's gradients, clipping or steps look at the other's."""
-
-        @torch.no_grad()  # of this thread alone
-        def learn(whose: int, module: int) -> torch.Tensor:
-            totals = torch.zeros(4, dtype=torch.float64)
-            for minibatch in minibatches:
-                totals += gradients.of(whose, samples, minibatch)
-                self._optimizer.clip_gradient(module, self.config.max_grad_norm)
-                self._optimizer.step_of(module)
-                if whose == ACTOR:
-                    self.actor.log_std.clamp_(*LOG_STD_RANGE)
-            return totals
-
+    def _learn_compiled(self, gradients: WrittenPpo, samples: Samples, minibatches: Sequence[torch.Tensor]) -> torch.Tensor:
+        """The same in one call; on two threads bit for bit alike, since neither network looks at the other."""
+        steps = self._optimizer.next_steps(len(minibatches), self.config.max_grad_norm)
+        if self.threads == 1:
+            return gradients.learn(BOTH, samples, minibatches, steps, LOG_STD_RANGE)
         # Made anew each time: a thread flushes denormal numbers as the one did that started it.
         with ThreadPoolExecutor(1, "critic") as another:
-            critic = another.submit(learn, CRITIC, 1)
-            return learn(ACTOR, 0) + critic.result()
+            critic = another.submit(gradients.learn, CRITIC, samples, minibatches, steps, LOG_STD_RANGE)
+            return gradients.learn(ACTOR, samples, minibatches, steps, LOG_STD_RANGE) + critic.result()
 
     def minibatches(self) -> Iterator[torch.Tensor]:
         """The rows of the rollout's samples once, in a new order."""

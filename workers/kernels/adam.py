@@ -1,13 +1,35 @@
 """Adam and clipping over flat float32 vectors, one compiled pass each; the formulas are in `workers.algorithms.flat`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workers.kernels.options import kernel
 
 BETA1, BETA2 = 0.9, 0.999
 EPSILON = 1e-8
+
+
+class AdamSteps(NamedTuple):
+    """Steps to be taken in compiled code, each module's gradient clipped by itself.
+
+    Attributes:
+        mean: (n,) float32, Adam's first moments.
+        square: (n,) float32, its second.
+        starts: (modules + 1,) int64, where each module begins in the vectors, and their end.
+        rates: (steps,) float64, see `adam_step`.
+        epsilons: (steps,) float64.
+        max_norm: of a module's gradient.
+    """
+
+    mean: NDArray[np.float32]
+    square: NDArray[np.float32]
+    starts: NDArray[np.int64]
+    rates: NDArray[np.float64]
+    epsilons: NDArray[np.float64]
+    max_norm: float
 
 
 @kernel()
@@ -35,3 +57,22 @@ def clip_norm(gradients, max_norm):
         factor = np.float32(max_norm / norm)
         for i in range(gradients.shape[0]):
             gradients[i] *= factor
+
+
+@kernel()
+def clipped_step(values, gradients, steps, module, step):
+    """Clip a module's gradient and move its values against it.
+
+    Args:
+        values: (n,) of all modules.
+        gradients: (n,).
+        steps: `AdamSteps`.
+        module: its place.
+        step: which of the steps.
+    """
+    start, end = steps.starts[module], steps.starts[module + 1]
+    clip_norm(gradients[start:end], steps.max_norm)
+    adam_step(
+        values[start:end], gradients[start:end], steps.mean[start:end], steps.square[start:end],
+        steps.rates[step], steps.epsilons[step],
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The gradients of PPO's losses over a minibatch, in one compiled call.
+"""PPO's minibatches, one after the other, in one compiled call: the gradients of the losses, clipping, Adam.
 
 `workers.algorithms.gradients.ppo` has the formulas, and the reference by autograd that a test compares this with.
 """
@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from workers.kernels.adam import clipped_step
 from workers.kernels.networks import backward, forward
 from workers.kernels.options import kernel
 
@@ -18,6 +19,53 @@ STATISTICS = 4
 
 ACTOR, CRITIC, BOTH = 1, 2, 3
 """Whose gradients: they share nothing, so two threads may take one each."""
+
+
+@kernel(allocates=True)
+def learn(
+    actor, critic, whose, samples, rows, ends, at_once, log_std, log_std_range, lows, clip_range, entropy_coefficient,
+    grad_log_std, steps, statistics,
+):  # fmt: skip
+    """`differentiate` and a step of Adam for each minibatch, for both networks or for one.
+
+    Args:
+        actor: see `differentiate`; the critic's parameters lie behind it in the same vectors.
+        critic: likewise.
+        whose: likewise.
+        samples: likewise.
+        rows: (n,) rows of the samples, the minibatches one after the other.
+        ends: (m,) of each minibatch in `rows`.
+        at_once: see `differentiate`.
+        log_std: (A,), parameters of the actor.
+        log_std_range: its lowest and highest values.
+        lows: see `differentiate`.
+        clip_range: likewise.
+        entropy_coefficient: what the entropy counts in the actor's loss.
+        grad_log_std: (A,), the gradient of `log_std`.
+        steps: `AdamSteps`, m of them.
+        statistics: (4,) float64, added to: `STATISTICS`, sums over the minibatches.
+    """
+    low, high = np.float32(log_std_range[0]), np.float32(log_std_range[1])
+    first = 0
+    for step in range(ends.shape[0]):
+        found, by_log_std = np.zeros(STATISTICS), np.full(lows.shape[0], -entropy_coefficient)
+        minibatch = rows[first : ends[step]]
+        differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lows, clip_range, by_log_std, found)
+        if whose & ACTOR:
+            for k in range(lows.shape[0]):
+                grad_log_std[k] = by_log_std[k]
+            clipped_step(actor.values, actor.gradients, steps, 0, step)
+            # What is not a number stays none.
+            for k in range(lows.shape[0]):
+                if log_std[k] < low:
+                    log_std[k] = low
+                elif log_std[k] > high:
+                    log_std[k] = high
+        if whose & CRITIC:
+            clipped_step(critic.values, critic.gradients, steps, 1, step)
+        for number in range(STATISTICS):
+            statistics[number] += found[number]
+        first = ends[step]
 
 
 @kernel(allocates=True)

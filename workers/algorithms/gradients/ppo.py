@@ -8,14 +8,17 @@ The losses, over a minibatch of n samples (Schulman et al. 2017):
 Actor and critic share nothing, so each gradient is that of its own loss and needs no weighing against the other.
 """
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from workers.algorithms.storage.rollout import Samples
-from workers.kernels.ppo import ACTOR, BOTH, LOG_SQRT_2PI, STATISTICS, differentiate
+from workers.kernels.adam import AdamSteps
+from workers.kernels.ppo import BOTH, LOG_SQRT_2PI, STATISTICS, differentiate, learn
 from workers.networks.compiled import ROWS_AT_ONCE, passes_of
 from workers.networks.modules import GaussianActor
 
@@ -91,16 +94,42 @@ class WrittenPpo:
 
     def __call__(self, samples: Samples, rows: Tensor) -> Tensor:
         """See `PpoGradients`."""
-        return self.of(BOTH, samples, rows)
-
-    def of(self, whose: int, samples: Samples, rows: Tensor) -> Tensor:
-        """The same for the `ACTOR` or the `CRITIC` alone, perhaps while another thread does the other; its numbers are 0."""
         statistics, grad_log_std = np.zeros(STATISTICS), np.full(len(self._lows), -self._entropy_coefficient)
-        arrays = tuple(column.numpy() for column in samples)
         differentiate(
-            self._actor, self._critic, whose, arrays, rows.numpy(), ROWS_AT_ONCE,
+            self._actor, self._critic, BOTH, _arrays(samples), rows.numpy(), ROWS_AT_ONCE,
             self._log_std, self._lows, self._clip_range, grad_log_std, statistics,
         )  # fmt: skip
-        if whose & ACTOR:
-            self._grad_log_std[:] = grad_log_std
+        self._grad_log_std[:] = grad_log_std
         return torch.from_numpy(statistics)
+
+    def learn(
+        self,
+        whose: int,
+        samples: Samples,
+        minibatches: Sequence[Tensor],
+        steps: AdamSteps,
+        log_std_range: tuple[float, float],
+    ) -> Tensor:
+        """Gradients, clipping and a step of Adam for each minibatch, in one call.
+
+        Args:
+            whose: `BOTH`, or `ACTOR` or `CRITIC` alone, perhaps while another thread does the other.
+            samples: a rollout's.
+            minibatches: (n,) int64 each, rows of the samples.
+            steps: one for each minibatch.
+            log_std_range: within which the log deviations are kept.
+
+        Returns:
+            (4,): sums over the minibatches of what `PpoGradients` returns; of one network alone the other's are 0.
+        """
+        statistics = np.zeros(STATISTICS)
+        rows, ends = torch.cat(list(minibatches)).numpy(), np.cumsum([len(minibatch) for minibatch in minibatches])
+        learn(
+            self._actor, self._critic, whose, _arrays(samples), rows, ends, ROWS_AT_ONCE, self._log_std, log_std_range,
+            self._lows, self._clip_range, self._entropy_coefficient, self._grad_log_std, steps, statistics,
+        )  # fmt: skip
+        return torch.from_numpy(statistics)
+
+
+def _arrays(samples: Samples) -> tuple[NDArray[np.float32], ...]:
+    return tuple(column.numpy() for column in samples)
