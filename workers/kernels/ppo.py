@@ -48,12 +48,12 @@ def learn(
     low, high = np.float32(log_std_range[0]), np.float32(log_std_range[1])
     first = 0
     for step in range(ends.shape[0]):
-        found, by_log_std = np.zeros(STATISTICS), np.full(lows.shape[0], -entropy_coefficient)
+        found, grad_sum = np.zeros(STATISTICS), np.full(lows.shape[0], -entropy_coefficient)
         minibatch = rows[first : ends[step]]
-        differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lows, clip_range, by_log_std, found)
+        differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lows, clip_range, grad_sum, found)
         if whose & ACTOR:
             for k in range(lows.shape[0]):
-                grad_log_std[k] = by_log_std[k]
+                grad_log_std[k] = grad_sum[k]
             clipped_step(actor.values, actor.gradients, steps, 0, step)
             # What is not a number stays none.
             for k in range(lows.shape[0]):
