@@ -126,7 +126,7 @@ class Planner:
         self._step = -1
         self._world: World
 
-    def watch(self, active: NDArray[np.int64], world: World) -> None:
+    def watch(self, active: NDArray[np.int64], world: World, actions: Floats) -> None:
         """Sees everything: the observer of `run_controller`."""
         self._step += 1
         self._world = world

@@ -18,6 +18,8 @@ _MODULES: dict[str, Part] = {
     "celery": "server",
     "fastapi": "server",
     "fsspec": "server",
+    "mcap": "server",
+    "mcap_ros2": "server",
     "msgspec": "server",
     "optuna": "server",
     "prometheus_client": "server",

@@ -11,6 +11,8 @@ MANIFEST = "manifest.json"
 POLICY = "policy.safetensors"
 STATE_ARRAYS = "state.safetensors"
 STATE_COUNTERS = "state.json"
+USUAL_GAMMA = 0.99
+"""Discount of a step, of policies that do not say theirs."""
 
 
 class Number(Frozen):
@@ -84,6 +86,11 @@ class Manifest(Frozen):
     evaluation: EvaluationSummary | None
     versions: dict[str, str]
     files: dict[str, FileEntry]
+
+    @property
+    def gamma(self) -> float:
+        """Discount of a step in its training; a usual one of an algorithm that has none."""
+        return float(getattr(self.training.algorithm, "gamma", USUAL_GAMMA))
 
 
 class TrainingCounters(Frozen):

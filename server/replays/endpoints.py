@@ -1,59 +1,76 @@
-"""Routes of replays: driving an episode again, and the page that plays it."""
+"""Routes of replays: driving a scenario again by one policy or several, its numbers, and the page that plays it."""
 
+import asyncio
+from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from starlette.concurrency import run_in_threadpool
 
-from server.evaluations.service import replayed
 from server.live.page import HEADERS
-from server.problems import NOT_FOUND, REPLAY_FAILED
-from server.replays import service
-from server.replays.recordings import recording_of
-from server.replays.schemas import Replay
+from server.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
+from server.replays import repository, service
+from server.replays.recordings import progress_of, recording_of
+from server.replays.references import Reference, references
+from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, Replay, ReplayProgress
+from server.replays.service import Part
 from server.replays.subject import Subject
-from server.replays.subjects import checkpoint_subject, policy_subject
+from server.replays.subjects import subject_of
 from server.scene.themes import Theme
-from server.security.permissions import SIGNED_IN, view
-from server.services import ServicesDep
+from server.security.permissions import SIGNED_IN, VIEW_REPLAYED, view
+from server.security.principal import PrincipalDep
+from server.services import Services, ServicesDep
 
 router = APIRouter(tags=["replays"])
 
 _DOWNLOAD = "download"
 
 
-def _checkpoint(checkpoint_id: str, services: ServicesDep) -> Subject:
-    return checkpoint_subject(services, checkpoint_id)
+class Replayed:
+    """Everything that an address of replays names."""
 
-
-def _evaluation(evaluation_id: str, services: ServicesDep) -> Subject:
-    return replayed(services, evaluation_id)
-
-
-class Player:
-    """Answers with an episode's page, made in the replays' lane."""
-
-    def __init__(self, services: ServicesDep) -> None:
+    def __init__(self, named: Sequence[Reference], services: Services) -> None:
+        self.references = named
         self._services = services
 
-    async def __call__(self, request: Request, subject: Subject, episode: int, theme: Theme) -> Response:
-        """The episode is inside the page. viser's client would do more that its address asks for: what is not ours goes."""
-        if request.query_params.keys() - {_DOWNLOAD}:
-            return RedirectResponse(request.url.path)
-        headers = dict(HEADERS)
-        if _DOWNLOAD in request.query_params:
-            name = f"{subject.file_name.removesuffix('.zip')}-episode{episode}.html"
-            headers["Content-Disposition"] = f'attachment; filename="{name}"'
-        service.check_episode(subject, episode)
-        recording = await recording_of(self._services, subject)
-        page = await self._services.lanes.replays.run(service.filmed, subject, recording, episode, theme)
-        return HTMLResponse(page, headers=headers)
+    async def subjects(self) -> list[Subject]:
+        """Whose episodes they are.
+
+        Raises:
+            NotFoundError: one is not there.
+        """
+        return [await run_in_threadpool(subject_of, self._services, each) for each in self.references]
+
+    async def parts(self, episode: int) -> list[Part]:
+        """All that they did, driven again where that is not kept.
+
+        Raises:
+            NotFoundError: one is not there, or there is no such episode.
+            ConflictError: they were measured on different suites.
+            ReplayFailedError: see `recording_of`, also for more.
+        """
+        subjects = await self.subjects()
+        service.check_episode(subjects, episode)
+        tasks = [asyncio.create_task(recording_of(self._services, subject)) for subject in subjects]
+        try:
+            recordings = await asyncio.gather(*tasks)
+        finally:
+            # Where one fails, or the client has left, nobody waits for the others.
+            for task in tasks:
+                task.cancel()
+        return [Part(*each) for each in zip(self.references, subjects, recordings, strict=True)]
+
+    async def one(self, episode: int) -> Replay:
+        """An episode of the first of them."""
+        return service.prepared((await self.parts(episode))[0], episode)
 
 
-PlayerDep = Annotated[Player, Depends()]
-EvaluationDep = Annotated[Subject, Depends(_evaluation)]
-CheckpointDep = Annotated[Subject, Depends(_checkpoint)]
-PolicyDep = Annotated[Subject, Depends(policy_subject)]
+async def _replayed(subjects: str, services: ServicesDep) -> Replayed:
+    return Replayed(references(subjects), services)
+
+
+ReplayedDep = Annotated[Replayed, Depends(_replayed)]
 
 
 @router.get(
@@ -61,21 +78,17 @@ PolicyDep = Annotated[Subject, Depends(policy_subject)]
     responses=NOT_FOUND | REPLAY_FAILED,
     dependencies=[view("checkpoint_id")],
 )
-async def replay_checkpoint(checkpoint_id: str, subject: CheckpointDep, episode: int, services: ServicesDep) -> Replay:
+async def replay_checkpoint(checkpoint_id: str, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of a checkpoint's evaluation again: a few seconds for the first one, then at once."""
-    page = f"/replays/checkpoints/{checkpoint_id}/{episode}/"
-    service.check_episode(subject, episode)
-    return service.prepared(subject, await recording_of(services, subject), episode, page)
+    return await Replayed([Reference("checkpoint", checkpoint_id)], services).one(episode)
 
 
 @router.get(
     "/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[SIGNED_IN]
 )
-async def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int, services: ServicesDep) -> Replay:
+async def replay_policy(name: str, suite: str, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of a shipped policy again: a few seconds for the first one, then at once."""
-    page = f"/replays/policies/{name}/{suite}/{episode}/"
-    service.check_episode(subject, episode)
-    return service.prepared(subject, await recording_of(services, subject), episode, page)
+    return await Replayed([Reference("policy", name, suite)], services).one(episode)
 
 
 @router.get(
@@ -83,34 +96,71 @@ async def replay_policy(name: str, suite: str, subject: PolicyDep, episode: int,
     responses=NOT_FOUND | REPLAY_FAILED,
     dependencies=[view("evaluation_id")],
 )
-async def replay_evaluation(evaluation_id: str, subject: EvaluationDep, episode: int, services: ServicesDep) -> Replay:
+async def replay_evaluation(evaluation_id: str, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of an evaluation again: a few seconds for the first one, then at once."""
-    page = f"/replays/evaluations/{evaluation_id}/{episode}/"
-    service.check_episode(subject, episode)
-    return service.prepared(subject, await recording_of(services, subject), episode, page)
+    return await Replayed([Reference("evaluation", evaluation_id)], services).one(episode)
+
+
+@router.get("/api/replays/{subjects}/progress", responses=NOT_FOUND, dependencies=[VIEW_REPLAYED])
+async def replay_progress(replayed: ReplayedDep, services: ServicesDep) -> ReplayProgress:
+    """How far it is, while the replay itself is waited for."""
+    return await progress_of(services, await replayed.subjects())
+
+
+@router.get("/api/replays/{subjects}/beside", responses=NOT_FOUND, dependencies=[VIEW_REPLAYED])
+async def list_beside(replayed: ReplayedDep, services: ServicesDep, principal: PrincipalDep) -> BesideList:
+    """Who else drove the same scenarios, to be shown beside."""
+    recorded = (await replayed.subjects())[0].recorded
+
+    def read() -> BesideList:
+        with services.database.read() as session:
+            items = repository.beside(session, recorded.suite_hash, principal.visible, replayed.references)
+        return BesideList(suite=recorded.suite, items=items)
+
+    return await run_in_threadpool(read)
 
 
 @router.get(
-    "/replays/checkpoints/{checkpoint_id}/{episode}/{theme}/", include_in_schema=False, dependencies=[view("checkpoint_id")]
+    "/api/replays/{subjects}/{episode}", responses=NOT_FOUND | CONFLICT | REPLAY_FAILED, dependencies=[VIEW_REPLAYED]
 )
-async def play_checkpoint(
-    request: Request, subject: CheckpointDep, episode: int, theme: Theme, player: PlayerDep
-) -> Response:
-    """The player of an episode of a checkpoint's evaluation."""
-    return await player(request, subject, episode, theme)
+async def replay(replayed: ReplayedDep, episode: int) -> EpisodeReplay:
+    """Drive one scenario again by one policy or several, which were measured on the same suite."""
+    return service.together(await replayed.parts(episode), episode)
 
 
 @router.get(
-    "/replays/evaluations/{evaluation_id}/{episode}/{theme}/", include_in_schema=False, dependencies=[view("evaluation_id")]
+    "/api/replays/{subjects}/{episode}/series", responses=NOT_FOUND | CONFLICT | REPLAY_FAILED, dependencies=[VIEW_REPLAYED]
 )
-async def play_evaluation(
-    request: Request, subject: EvaluationDep, episode: int, theme: Theme, player: PlayerDep
-) -> Response:
-    """The player of an episode of an evaluation."""
-    return await player(request, subject, episode, theme)
+async def replay_series(replayed: ReplayedDep, episode: int, services: ServicesDep) -> EpisodeSeries:
+    """What the charts beside it show: range ahead, commands, speeds, return to come and reward terms over time."""
+    parts = await replayed.parts(episode)
+    return await services.lanes.replays.run(service.charted, parts, episode)
 
 
-@router.get("/replays/policies/{name}/{suite}/{episode}/{theme}/", include_in_schema=False, dependencies=[SIGNED_IN])
-async def play_policy(request: Request, subject: PolicyDep, episode: int, theme: Theme, player: PlayerDep) -> Response:
-    """The player of an episode of a shipped policy."""
-    return await player(request, subject, episode, theme)
+@router.get(
+    "/api/replays/{subjects}/{episode}/mcap",
+    response_class=Response,
+    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"application/octet-stream": {}}}},
+    dependencies=[VIEW_REPLAYED],
+)
+async def replay_messages(replayed: ReplayedDep, episode: int, services: ServicesDep) -> Response:
+    """The episode as an MCAP file of ROS 2 messages: scans, odometry, commands, the goal, and transforms."""
+    parts = await replayed.parts(episode)
+    data = await services.lanes.replays.run(service.recorded_as_messages, parts, episode)
+    return Response(data, media_type="application/octet-stream", headers=_attached(parts, episode, "mcap"))
+
+
+@router.get("/replays/{subjects}/{episode}/{theme}/", include_in_schema=False, dependencies=[VIEW_REPLAYED])
+async def play(replayed: ReplayedDep, request: Request, episode: int, theme: Theme, services: ServicesDep) -> Response:
+    """The player, with the scenario inside. What viser's client would do besides is cut off."""
+    if request.query_params.keys() - {_DOWNLOAD}:
+        return RedirectResponse(request.url.path)
+    parts = await replayed.parts(episode)
+    headers = HEADERS | (_attached(parts, episode, "html") if _DOWNLOAD in request.query_params else {})
+    page = await services.lanes.replays.run(service.filmed, parts, episode, theme)
+    return HTMLResponse(page, headers=headers)
+
+
+def _attached(parts: Sequence[Part], episode: int, suffix: str) -> dict[str, str]:
+    name = parts[0].subject.file_name.removesuffix(".zip") + (f"-and-{len(parts) - 1}-more" if len(parts) > 1 else "")
+    return {"Content-Disposition": f'attachment; filename="{name}-episode{episode}.{suffix}"'}

@@ -1,5 +1,7 @@
-"""An episode as a recording for viser's own player: robot, rays and trail over time, and where it ended."""
+"""A scenario as a recording for viser's own player: robots, rays and trails over time, and where they ended."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +12,7 @@ from server.scene.camera import CameraRig
 from server.scene.meshes import ring
 from server.scene.quiet import start_viser, stop_viser
 from server.scene.scene import Scene
-from server.scene.themes import COLOURS, OUTCOMES, ROBOTS, Theme, linear
+from server.scene.themes import COLOURS, OUTCOMES, Theme, linear, robot_colours
 from sim.config import ImportedArenaConfig, TaskConfig
 from workers.frames import Frame
 from workers.replays.recording import Track
@@ -31,49 +33,85 @@ _END_HEIGHT = 0.032
 _END_RADIUS = 0.28
 
 
-def film(track: Track, result: EpisodeResult, task: TaskConfig, theme: Theme) -> bytes:
-    """A `.viser` file; takes about half a second.
+@dataclass(frozen=True, eq=False)
+class Filmed:
+    """What one robot did, how it ended, and with which robot, LiDAR and limits."""
+
+    track: Track
+    result: EpisodeResult
+    task: TaskConfig
+
+    @property
+    def seconds(self) -> float:
+        """Of simulated time."""
+        return (len(self.track.poses) - 1) * self.task.control_period
+
+
+def film(filmed: Sequence[Filmed], theme: Theme) -> bytes:
+    """A `.viser` file of one scenario; takes about half a second for each robot.
 
     Args:
-        track: what the robot did.
-        result: how it ended.
-        task: robot, LiDAR and limits.
+        filmed: the robots that drove it; the rays drawn are those of the first, the movers those that the longest met.
         theme: light or dark.
     """
-    place = task.model_copy(update={"arena": ImportedArenaConfig.of(track.arena)})
+    first, longest = filmed[0], max(filmed, key=lambda each: each.seconds)
+    place = first.task.model_copy(update={"arena": ImportedArenaConfig.of(first.track.arena)})
+    times = np.linspace(0.0, longest.seconds, min(_MAX_FRAMES, round(longest.seconds * _FRAMES_PER_SECOND)) + 1)
+    movers = _movers(longest, times)
+    reels = [_frames(each, times, movers) for each in filmed]
     server = start_viser()
     try:
         scene = Scene(server, place, theme)
         CameraRig(server, scene.half_size)
-        _draw_path(server.scene, track.poses, theme)
-        duration = (len(track.poses) - 1) * task.control_period
-        times = np.linspace(0.0, duration, min(_MAX_FRAMES, round(duration * _FRAMES_PER_SECOND)) + 1)
-        frames = _frames(track, times, task.control_period)
-        scene.update(frames[0], 0.0)
+        for number, each in enumerate(filmed):
+            _draw_path(server.scene, each.track.poses, number, theme)
+        scene.update(reels[0][0], 0.0)
+        beside = [scene.add_robots(each.task, reels[number][0], number) for number, each in enumerate(filmed) if number]
+        for robots, reel in zip(beside, reels[1:], strict=True):
+            robots.update(reel[0], 0.0)
         serializer = server.get_scene_serializer()
-        for before, frame in pairwise(frames):
-            serializer.insert_sleep(frame.sim_time - before.sim_time)
-            scene.update(frame, frame.sim_time)
-        _mark_end(server.scene, track.poses[-1], result)
+        ended: set[int] = set()
+        for before, after in pairwise(range(len(times))):
+            now = float(times[after])
+            serializer.insert_sleep(now - float(times[before]))
+            scene.update(reels[0][after], now)
+            for robots, reel in zip(beside, reels[1:], strict=True):
+                robots.update(reel[after], now)
+            for number, each in enumerate(filmed):
+                if number not in ended and each.seconds <= now + 1e-9:
+                    ended.add(number)
+                    _mark_end(server.scene, each, number)
         serializer.insert_sleep(_LAST_PICTURE_SECONDS)
         return serializer.serialize()
     finally:
         stop_viser(server)
 
 
-def _frames(track: Track, times: NDArray[np.float64], period: float) -> list[Frame]:
-    """What to draw at each of these times, seconds: between two recorded moments, which are `period` apart."""
-    moments = times / period
-    before = np.minimum(moments.astype(np.int64), len(track.poses) - 1)
-    after = np.minimum(before + 1, len(track.poses) - 1)
-    share = (moments - before)[:, None]
+def _between(filmed: Filmed, times: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """The moments before and after each of these times, seconds, and how far it is from the one to the other, 0 to 1."""
+    moments, last = times / filmed.task.control_period, len(filmed.track.poses) - 1
+    before = np.minimum(moments.astype(np.int64), last)
+    return before, np.minimum(before + 1, last), moments - before
+
+
+def _movers(filmed: Filmed, times: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(T, movers, 3) what moves at each of these times, seconds."""
+    before, after, share = _between(filmed, times)
+    movers = filmed.track.movers
+    return (movers[before] + share[:, None, None] * (movers[after] - movers[before])).astype(np.float32)
+
+
+def _frames(filmed: Filmed, times: NDArray[np.float64], movers: NDArray[np.float32]) -> list[Frame]:
+    """What to draw at each of these times, seconds: between two recorded moments; a robot that has ended stands."""
+    track = filmed.track
+    before, after, share = _between(filmed, times)
+    share = share[:, None]
     change = track.poses[after] - track.poses[before]
     change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     poses = (track.poses[before] + share * change).astype(np.float32)
     jump = track.ranges[after] - track.ranges[before]
     sweep = np.where(np.abs(jump) < _SAME_THING, share * jump, np.where(share < 0.5, 0.0, jump))
     ranges = (track.ranges[before] + sweep).astype(np.float32)
-    movers = track.movers[before] + share[:, None] * (track.movers[after] - track.movers[before])
     return [
         Frame(
             mode="policy",
@@ -86,18 +124,18 @@ def _frames(track: Track, times: NDArray[np.float64], period: float) -> list[Fra
             fields_of_view=track.fields_of_view[before[index], None],
             rewards=np.zeros(1, np.float32),
             outcomes=np.zeros(1, np.uint8),
-            movers=movers[index].astype(np.float32),
+            movers=movers[index],
         )
         for index, seconds in enumerate(times)
     ]
 
 
-def _draw_path(scene: viser.SceneApi, poses: NDArray[np.float32], theme: Theme) -> None:
+def _draw_path(scene: viser.SceneApi, poses: NDArray[np.float32], number: int, theme: Theme) -> None:
     """The whole way, faint, so that one sees from the beginning where it leads."""
     points = np.column_stack([poses[:, :2], np.full(len(poses), _PATH_HEIGHT, np.float32)])
-    colour = _PATH_STRENGTH * np.array(ROBOTS[0]) + (1.0 - _PATH_STRENGTH) * np.array(COLOURS[theme].floor)
+    colour = _PATH_STRENGTH * robot_colours(1, number)[0] + (1.0 - _PATH_STRENGTH) * np.array(COLOURS[theme].floor)
     scene.add_line_segments(
-        "/world/path",
+        f"/world/paths/{number}",
         np.stack([points[:-1], points[1:]], axis=1),
         np.broadcast_to(linear(colour), (len(points) - 1, 2, 3)).copy(),
         thickness=1.5,
@@ -105,14 +143,15 @@ def _draw_path(scene: viser.SceneApi, poses: NDArray[np.float32], theme: Theme) 
     )
 
 
-def _mark_end(scene: viser.SceneApi, pose: NDArray[np.float32], result: EpisodeResult) -> None:
+def _mark_end(scene: viser.SceneApi, filmed: Filmed, number: int) -> None:
     """A ring around the robot in the outcome's colour."""
+    pose = filmed.track.poses[-1]
     mesh = ring(0.75 * _END_RADIUS, _END_RADIUS, corners=48)
     scene.add_mesh_simple(
-        "/world/end",
+        f"/world/ends/{number}",
         mesh.vertices,
         mesh.faces,
-        color=OUTCOMES[_OUTCOME_NUMBERS[result.outcome]],
+        color=OUTCOMES[_OUTCOME_NUMBERS[filmed.result.outcome]],
         position=(float(pose[0]), float(pose[1]), _END_HEIGHT),
         cast_shadow=False,
         receive_shadow=False,

@@ -2,11 +2,12 @@
 
 import base64
 import html
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from server.live.page import asset, viser_page
-from server.scene.themes import Theme
+from server.scene.themes import Theme, css_colour
 from workers.reporting import EpisodeResult
 
 _DIRECTORY = Path(__file__).parent / "assets"
@@ -33,35 +34,50 @@ def replay_page(theme: Theme, recording: bytes, caption: "Caption") -> str:
 
 
 @dataclass(frozen=True)
-class Caption:
-    """What a replay shows.
+class Driver:
+    """Who drove.
 
     Attributes:
         title: of the policy.
-        suite: its name.
-        episode: its place in the suite, from 0.
         result: how it ended now.
         seconds: of simulated time.
         faithful: whether it ended as recorded.
     """
 
     title: str
-    suite: str
-    episode: int
     result: EpisodeResult
     seconds: float
     faithful: bool
 
+
+@dataclass(frozen=True)
+class Caption:
+    """What a replay shows.
+
+    Attributes:
+        suite: its name.
+        episode: its place in the suite, from 0.
+        drivers: who drove it, in the order of their colours.
+    """
+
+    suite: str
+    episode: int
+    drivers: Sequence[Driver]
+
     def html(self) -> str:
         """The caption over the picture."""
-        outcome, steps = self.result.outcome, self.result.steps
-        lines = (
+        lines = [
             f'<div class="title"><span class="mode">Episode {self.episode + 1}</span>',
             f"<span>of {html.escape(self.suite)}</span></div>",
-            f'<div class="step">{html.escape(self.title)}</div>',
-            f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {steps:,} steps, {self.seconds:.1f} s</div>',
-            "" if self.faithful else f'<div class="note">{_UNFAITHFUL}</div>',
-        )
+        ]
+        for number, driver in enumerate(self.drivers):
+            outcome, steps = driver.result.outcome, driver.result.steps
+            dot = f'<i style="background:{css_colour(number)}"></i>' if len(self.drivers) > 1 else ""
+            lines += [
+                f'<div class="step">{dot}{html.escape(driver.title)}</div>',
+                f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {steps:,} steps, {driver.seconds:.1f} s</div>',
+                "" if driver.faithful else f'<div class="note">{_UNFAITHFUL}</div>',
+            ]
         return f'<div id="display">{"".join(lines)}</div>'
 
 

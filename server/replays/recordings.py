@@ -1,10 +1,14 @@
 """Evaluations driven once more: by a worker on demand, and kept for a while."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from server.errors import JobFailedError, ReplayFailedError
 from server.jobs.asked import Asked
+from server.jobs.names import result_name
+from server.jobs.repository import JobRepository
 from server.jobs.waiting import result_of
+from server.replays.schemas import ReplayProgress
 from server.replays.simulator import simulator
 from server.replays.subject import Subject
 from server.services import Services
@@ -47,6 +51,26 @@ async def recording_of(services: Services, subject: Subject) -> Recording:
 def recording_key(subject: Subject) -> str:
     """Says what decides how the episodes go: policy, suite, and what drives."""
     return f"{subject.identity[:32]}-{subject.recorded.suite_hash[:16]}-{simulator()}"
+
+
+async def progress_of(services: Services, subjects: Sequence[Subject]) -> ReplayProgress:
+    """How far the recordings of these are made."""
+    shares = await services.lanes.jobs.run(_shares, services, subjects)
+    return ReplayProgress(
+        ready=sum(share == 1.0 for share in shares), policies=len(shares), share=sum(shares) / max(1, len(shares))
+    )
+
+
+def _shares(services: Services, subjects: Sequence[Subject]) -> list[float]:
+    """Of each the share that is made; one that is there counts as looked at."""
+    keys = [recording_key(subject) for subject in subjects]
+    kept = [services.results.find(result_name("replay", key)) is not None for key in keys]
+    with services.database.read() as session:
+        jobs = [None if there else JobRepository(session).open_of(key) for key, there in zip(keys, kept, strict=True)]
+    return [
+        1.0 if there else min(0.99, services.board.progress(job.id)) if job is not None else 0.0
+        for there, job in zip(kept, jobs, strict=True)
+    ]
 
 
 def _load(path: Path) -> Recording | None:

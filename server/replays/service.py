@@ -1,62 +1,121 @@
-"""What a person may do with the episodes of an evaluation: look at any of them, and take it away."""
+"""What a person may do with episodes that were measured: look at any, alone or beside others', and take it away."""
 
-from server.errors import NotFoundError
-from server.replays.page import Caption, replay_page
-from server.replays.schemas import Replay
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from server.errors import ConflictError, NotFoundError
+from server.replays.page import Caption, Driver, replay_page
+from server.replays.references import Reference
+from server.replays.schemas import EpisodeReplay, EpisodeSeries, PolicySeries, Replay, ReplayedPolicy
+from server.replays.series import series_of, times
 from server.replays.subject import Subject
-from server.scene.themes import Theme
+from server.scene.themes import Theme, css_colour
 from workers.replays.recording import Recording
 
 
-def check_episode(subject: Subject, episode: int) -> None:
-    """Whether there is such an episode.
+@dataclass(frozen=True)
+class Part:
+    """One policy of a replay: how addresses name it, whose it is, and all that it did."""
+
+    reference: Reference
+    subject: Subject
+    recording: Recording
+
+
+def check_episode(subjects: Sequence[Subject], episode: int) -> None:
+    """Whether there is such an episode, and whether it is the same scenario of all.
 
     Raises:
         NotFoundError: there is not.
+        ConflictError: they were measured on different suites.
     """
-    count = len(subject.recorded.episodes)
+    if len({subject.recorded.suite_hash for subject in subjects}) > 1:
+        raise ConflictError("These were measured on different suites: no scenario is the same for all of them.")
+    count = len(subjects[0].recorded.episodes)
     if not 0 <= episode < count:
         raise NotFoundError(f"This evaluation has {count} episodes, 0 to {count - 1}: there is no {episode}.")
 
 
-def prepared(subject: Subject, recording: Recording, episode: int, page: str) -> Replay:
-    """An episode that was driven again, so that its page opens at once.
+def page_of(references: Sequence[Reference], episode: int) -> str:
+    """Path of the player, without the theme."""
+    return f"/replays/{','.join(map(str, references))}/{episode}/"
 
-    Args:
-        subject: whose.
-        recording: of its evaluation.
-        episode: its place in the suite, from 0.
-        page: path of the player.
-    """
-    found = recording.evaluation.episodes[episode]
+
+def prepared(part: Part, episode: int) -> Replay:
+    """An episode of one policy that was driven again, so that its page opens at once."""
+    found = part.recording.evaluation.episodes[episode]
     return Replay(
         episode=episode,
-        suite=subject.recorded.suite,
+        suite=part.subject.recorded.suite,
         outcome=found.outcome,
         steps=found.steps,
-        seconds=found.steps * subject.task.control_period,
-        faithful=_faithful(subject, recording, episode),
-        page=page,
+        seconds=found.steps * part.subject.task.control_period,
+        faithful=_faithful(part, episode),
+        page=page_of([part.reference], episode),
     )
 
 
-def filmed(subject: Subject, recording: Recording, episode: int, theme: Theme) -> str:
-    """The episode's player as HTML that needs nothing else; takes about half a second."""
-    # viser takes a second to import, so nobody pays for it before somebody looks.
-    from server.replays.film import film
-
-    result = recording.evaluation.episodes[episode]
-    caption = Caption(
-        title=subject.title,
-        suite=subject.recorded.suite,
+def together(parts: Sequence[Part], episode: int) -> EpisodeReplay:
+    """One scenario that one policy or several drove again, so that its page opens at once."""
+    policies = [
+        ReplayedPolicy(
+            of=str(part.reference),
+            title=part.subject.title,
+            colour=css_colour(place),
+            outcome=found.outcome,
+            steps=found.steps,
+            seconds=found.steps * part.subject.task.control_period,
+            faithful=_faithful(part, episode),
+        )
+        for place, part in enumerate(parts)
+        for found in [part.recording.evaluation.episodes[episode]]
+    ]
+    return EpisodeReplay(
         episode=episode,
-        result=result,
-        seconds=result.steps * subject.task.control_period,
-        faithful=_faithful(subject, recording, episode),
+        suite=parts[0].subject.recorded.suite,
+        seconds=max(policy.seconds for policy in policies),
+        page=page_of([part.reference for part in parts], episode),
+        policies=policies,
     )
-    return replay_page(theme, film(recording.track(episode), result, subject.task, theme), caption)
 
 
-def _faithful(subject: Subject, recording: Recording, episode: int) -> bool:
-    again, then = recording.evaluation.episodes[episode], subject.recorded.episodes[episode]
+def charted(parts: Sequence[Part], episode: int) -> EpisodeSeries:
+    """The numbers of that scenario over time."""
+    found = []
+    for part in parts:
+        track, task = part.recording.track(episode), part.subject.task
+        found.append(PolicySeries(of=str(part.reference), times=times(track, task), series=series_of(track, task)))
+    return EpisodeSeries(policies=found)
+
+
+def filmed(parts: Sequence[Part], episode: int, theme: Theme) -> str:
+    """The scenario's player as HTML that needs nothing else; takes about half a second for each policy."""
+    # viser takes a second to import, so nobody pays for it before somebody looks.
+    from server.replays.film import Filmed, film
+
+    results = [part.recording.evaluation.episodes[episode] for part in parts]
+    drivers = [
+        Driver(
+            title=part.subject.title,
+            result=result,
+            seconds=result.steps * part.subject.task.control_period,
+            faithful=_faithful(part, episode),
+        )
+        for part, result in zip(parts, results, strict=True)
+    ]
+    reels = [
+        Filmed(part.recording.track(episode), result, part.subject.task) for part, result in zip(parts, results, strict=True)
+    ]
+    return replay_page(theme, film(reels, theme), Caption(parts[0].subject.recorded.suite, episode, drivers))
+
+
+def recorded_as_messages(parts: Sequence[Part], episode: int) -> bytes:
+    """The scenario as an MCAP file of ROS 2 messages."""
+    from server.replays.messages import as_mcap
+
+    return as_mcap([(part.subject, part.recording.track(episode)) for part in parts], episode)
+
+
+def _faithful(part: Part, episode: int) -> bool:
+    again, then = part.recording.evaluation.episodes[episode], part.subject.recorded.episodes[episode]
     return (again.outcome, again.steps) == (then.outcome, then.steps)

@@ -1,15 +1,31 @@
-"""Finds whose episodes are to be replayed: a checkpoint's or a shipped policy's."""
+"""Finds whose episodes are to be replayed: a checkpoint's, an evaluation's, or a shipped policy's."""
 
 from server.checkpoints.repository import CheckpointRepository, evaluation_result
 from server.checkpoints.service import CheckpointService
+from server.checkpoints.views import policy_title
 from server.errors import NotFoundError
+from server.evaluations.service import replayed
 from server.experiments.stored import training_of
 from server.policies.service import find, shipped_hash
+from server.replays.references import Reference
 from server.replays.subject import Subject
 from server.runs.repository import RunRepository
 from server.services import Services
 from workers.errors import UnknownPolicyError
 from workers.job_protocol import OWN_SUITE, CheckpointPolicy, NamedSuite, ShippedPolicyName
+
+
+def subject_of(services: Services, reference: Reference) -> Subject:
+    """What an address of replays names.
+
+    Raises:
+        NotFoundError: there is nothing of that name, or it was not measured.
+    """
+    if reference.kind == "checkpoint":
+        return checkpoint_subject(services, reference.id)
+    if reference.kind == "evaluation":
+        return replayed(services, reference.id)
+    return policy_subject(reference.id, reference.suite)
 
 
 def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
@@ -23,7 +39,7 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
         checkpoint = checkpoints.get(checkpoint_id)
         run = RunRepository(session).get(checkpoint.run_id)
         recorded = evaluation_result(checkpoints.evaluation(checkpoint_id))
-        title = f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
+        title = policy_title(run, checkpoint)
         training = training_of(run.experiment)
     archive = CheckpointService(services).described(checkpoint_id)
     return Subject(

@@ -38,16 +38,26 @@ class RobotNodes:
         task: geometry of robot and LiDAR.
         colours: of the theme.
         frame: the first frame to draw.
+        first: number of the first robot, for its colour.
     """
 
-    def __init__(self, server: viser.ViserServer, parent: str, task: TaskConfig, colours: Colours, frame: Frame) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        parent: str,
+        task: TaskConfig,
+        colours: Colours,
+        frame: Frame,
+        *,
+        first: int = 0,
+    ) -> None:
         robots, rays = frame.ranges.shape
         scanners = len(task.lidar.mount.places)
         scene = server.scene
         chassis, shell = _body(task)
         halo = max(task.collision_distance, 1.5 * task.robot.inscribed_radius)
         few = robots <= _FEW
-        own = robot_colours(robots)
+        own = robot_colours(robots, first)
         still = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (robots, 1))
         nowhere = np.zeros((robots, 3), np.float32)
 

@@ -44,6 +44,19 @@ class Scene:
         """Nodes for what a playground draws, below the world that moves under the camera."""
         return StageNodes(self._server, self._world, stage, self._task, self._colours)
 
+    def add_robots(self, task: TaskConfig, frame: Frame, number: int) -> RobotNodes:
+        """Robots of another task in the same place, without rays; whoever adds them updates them.
+
+        Args:
+            task: geometry of robot and LiDAR.
+            frame: the first frame to draw.
+            number: of the first of them, for its colour.
+        """
+        parent = f"{_WORLD}/beside{number}"
+        robots = RobotNodes(self._server, parent, task, self._colours, frame, first=number)
+        robots.show_rays(visible=False)
+        return robots
+
     @property
     def half_size(self) -> float:
         """Half the longer side of the arena, metres."""

@@ -95,6 +95,11 @@ def linear(colours: NDArray[np.float64] | Rgb) -> NDArray[np.uint8]:
     return np.round((np.asarray(colours, np.float64) / 255.0) ** 2.2 * 255.0).astype(np.uint8)
 
 
-def robot_colours(robots: int) -> NDArray[np.float64]:
-    """A colour for each robot, (robots, 3) sRGB 0 to 255; they repeat after eight."""
-    return np.array([ROBOTS[index % len(ROBOTS)] for index in range(robots)], np.float64).reshape(-1, 3)
+def robot_colours(robots: int, first: int = 0) -> NDArray[np.float64]:
+    """A colour for each robot from that number on, (robots, 3) sRGB 0 to 255; they repeat after eight."""
+    return np.array([ROBOTS[(first + index) % len(ROBOTS)] for index in range(robots)], np.float64).reshape(-1, 3)
+
+
+def css_colour(robot: int) -> str:
+    """A robot's colour as CSS writes it: `#339af0`."""
+    return "#{:02x}{:02x}{:02x}".format(*ROBOTS[robot % len(ROBOTS)])

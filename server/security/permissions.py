@@ -18,6 +18,7 @@ from server.errors import ForbiddenError, NotFoundError, ServiceError, Unauthori
 from server.live.watched import POLICY_PREFIX
 from server.playground.registry import PLAY_PREFIX
 from server.projects.repository import ProjectRepository
+from server.replays.references import references
 from server.security.principal import Principal, principal_of
 from server.services import Services, ServicesDep
 
@@ -116,6 +117,18 @@ class _OwnPlayground(Permission):
         services.playgrounds.of(connection.path_params["playground_id"], principal)
 
 
+class _Replayed(Permission):
+    """Looking at everything that an address of replays names."""
+
+    async def check(self, principal: Principal, connection: HTTPConnection, services: Services) -> None:
+        _somebody(principal)
+        named = references(connection.path_params["subjects"])
+        for kind in ("checkpoint", "evaluation"):
+            identifiers = [each.id for each in named if each.kind == kind]
+            if identifiers and principal.everywhere != "admin":
+                await run_in_threadpool(_CHECKED[kind].look, principal, identifiers, services)
+
+
 class _Kind(Permission):
     """A program with a door of its own; `administrates` lets administrators in as well."""
 
@@ -174,9 +187,10 @@ class InProject(Permission):
         identifiers = [given] if given is not None else connection.query_params.getlist(self._parameter)
         identifiers = [each for each in dict.fromkeys(identifiers) if not each.startswith(POLICY_PREFIX)][:200]
         if identifiers:
-            await run_in_threadpool(self._look, principal, identifiers, services)
+            await run_in_threadpool(self.look, principal, identifiers, services)
 
-    def _look(self, principal: Principal, identifiers: list[str], services: Services) -> None:
+    def look(self, principal: Principal, identifiers: list[str], services: Services) -> None:
+        """Whether somebody may do that with these; raises as `Permission.__call__`."""
         with services.database.read() as session:
             found = self._find(ProjectRepository(session), identifiers)
         for identifier in identifiers:
@@ -187,6 +201,12 @@ class InProject(Permission):
                 raise ForbiddenError(f"This takes the role {self._role} in some project.")
             for project in projects:
                 principal.require(self._role, project)
+
+
+_CHECKED = {
+    "checkpoint": InProject("view checkpoint_id", "viewer", "checkpoint_id"),
+    "evaluation": InProject("view evaluation_id", "viewer", "evaluation_id"),
+}
 
 
 def _somebody(principal: Principal) -> None:
@@ -214,6 +234,7 @@ ADMINISTRATE = _dependency(_Installation("administrate"))
 OWN_PLAYGROUND = _dependency(_OwnPlayground("own playground"))
 OWN_ACCOUNT = _dependency(_OwnAccount("own account"))
 OWN_ALERTS = _dependency(_OwnAlerts("own alerts"))
+VIEW_REPLAYED = _dependency(_Replayed("view"))
 WORK = _dependency(_Kind("work", "worker"))
 SCRAPE = _dependency(_Kind("scrape", "scraper", administrators=True))
 

@@ -16,8 +16,9 @@ from sim.suites.scenarios import scenario_world
 from sim.suites.suite import Suite
 from sim.world import World
 
-Observer = Callable[[NDArray[np.int64], World], None]
-"""Told before the first step, and after each one, the scenarios that were under way, and the world as it is now."""
+Observer = Callable[[NDArray[np.int64], World, Floats], None]
+"""Told before the first step, and after each one, the scenarios that were under way, the world as it is now, and the actions
+(S, A) that were asked for in that step, zeros before the first one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ def run_controller(
     active = np.arange(len(suite))
     tiles = world.tiles()
     if observer is not None:
-        observer(active, world)
+        observer(active, world, actions)
     while len(active):
         situation = Situation(
             observations=robots.observations[active],
@@ -118,7 +119,7 @@ def run_controller(
         late = active[(robots.outcomes[active] == 0) & (robots.records["steps"][active] >= limits[active])]
         robots.outcomes[late] = TIMEOUT
         if observer is not None:
-            observer(active, world)
+            observer(active, world, actions)
         done = active[robots.outcomes[active] > 0]
         if len(done):
             outcomes[done] = robots.outcomes[done]

@@ -121,7 +121,7 @@ def run_among_people(controller: Callable[[Situation], Floats], task: TaskConfig
     alone.park(np.arange(count))
     standing = np.zeros((count, 2), dtype=np.float32)
 
-    def watch(active: NDArray[np.int64], world: World) -> None:
+    def watch(active: NDArray[np.int64], world: World, _actions: Floats) -> None:
         tiles = world.tiles()
         if not walks:
             walks.extend((_Walks(world, tiles), _Walks(alone, tiles)))

@@ -1,10 +1,13 @@
 """A replay plays in a real browser, with the service and without: it moves, stops, and shows any moment asked for."""
 
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from playwright.sync_api import BrowserContext, Page, expect
 
 pytestmark = pytest.mark.browser
@@ -12,7 +15,7 @@ pytestmark = pytest.mark.browser
 # Milliseconds: two busy cores, and rendering in software.
 SOON = 90_000
 # An episode of a shipped policy: nothing has to be trained.
-EPISODE = "policies/complex/complex-200/7"
+EPISODE = "policy:complex:complex-200/7"
 
 
 def prepare(context: BrowserContext) -> dict[str, Any]:
@@ -78,3 +81,49 @@ def test_what_is_taken_away_shows_any_moment_without_mapless(context: BrowserCon
     assert picture(page) != early
     seek(page, 0.3 * seconds)
     assert picture(page) == early
+
+
+def test_two_policies_drive_one_scenario_beside_their_charts_below_one_cursor(
+    context: BrowserContext, tmp_path: Path
+) -> None:
+    asked = {"policies": [{"source": "baseline", "name": "go-to-goal"}], "suites": [{"by": "name", "name": "complex-200"}]}
+    (evaluation,) = context.request.post("/api/evaluations", data=asked, timeout=SOON).json()
+    page = context.new_page()
+    page.goto("/policies/complex?suite=complex-200&replay=8")
+    dialog = page.get_by_role("dialog", name="Episode 8")
+    expect(dialog.get_by_test_id("chart").first).to_be_visible(timeout=SOON)
+    other = f"evaluation:{evaluation['id']}"
+    page.wait_for_function(
+        "async (id) => (await (await fetch(`/api/evaluations/${id}`)).json()).figures !== null", arg=evaluation["id"]
+    )
+    # As a link that was passed on.
+    page.goto(f"/policies/complex?suite=complex-200&replay=8&with={other}")
+    expect(dialog.get_by_test_id("replay-ends").get_by_role("button")).to_have_count(2, timeout=SOON)
+    charts = dialog.get_by_test_id("chart")
+    expect(charts).to_have_count(5, timeout=SOON)
+    frame = dialog.get_by_test_id("replay-frame")
+    expect(frame).to_have_attribute("data-seconds", re.compile(r"[0-9.]+"), timeout=SOON)
+    # The way it ended: a press shows the moment, in the picture and on every chart.
+    ends = context.request.get(f"/api/replays/policy:complex:complex-200,{other}/7").json()["policies"]
+    dialog.get_by_test_id("replay-ends").get_by_role("button").nth(1).click()
+    seconds = ends[1]["seconds"]
+    expect(frame).to_have_attribute("data-seconds", re.compile(rf"^{seconds:.1f}"))
+    for chart in charts.all():
+        expect(chart).to_contain_text(f"Seconds {seconds:.1f}")
+    # A press on a chart seeks as well.
+    plot = charts.first.locator(".u-over")
+    plot.click(position={"x": 5, "y": 20})
+    expect(page.frame_locator("[data-testid=replay-frame]").get_by_label("Seconds", exact=True)).not_to_have_value(
+        f"{seconds:.1f}"
+    )
+    with page.expect_download() as download:
+        dialog.get_by_role("link", name="MCAP").click()
+    file = tmp_path / "episode.mcap"
+    download.value.save_as(file)
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        scans = Counter(channel.topic for _, channel, _, _ in reader.iter_decoded_messages())
+    assert [scans["/policy1/scan"], scans["/policy2/scan"]] == [each["steps"] + 1 for each in ends]
+    page.reload()
+    expect(dialog.get_by_test_id("replay-ends").get_by_role("button")).to_have_count(2, timeout=SOON)
+    page.close()

@@ -75,7 +75,6 @@ TABLE = {
         PUT /api/policies/{name}/live
         POST /api/playgrounds
         GET /api/policies/{name}/suites/{suite}/replays/{episode}
-        GET /replays/policies/{name}/{suite}/{episode}/{theme}/
     """,
     "launch": """
         POST /api/workbench/actions
@@ -114,12 +113,16 @@ TABLE = {
         GET /api/checkpoints/{checkpoint_id}/episodes
         GET /api/checkpoints/{checkpoint_id}/bundle
         GET /api/checkpoints/{checkpoint_id}/replays/{episode}
-        GET /replays/checkpoints/{checkpoint_id}/{episode}/{theme}/
         GET /api/evaluations/{evaluation_id}
         GET /api/evaluations/{evaluation_id}/episodes
         GET /api/evaluations/{evaluation_id}/ways
         GET /api/evaluations/{evaluation_id}/replays/{episode}
-        GET /replays/evaluations/{evaluation_id}/{episode}/{theme}/
+        GET /api/replays/{subjects}/progress
+        GET /api/replays/{subjects}/beside
+        GET /api/replays/{subjects}/{episode}
+        GET /api/replays/{subjects}/{episode}/series
+        GET /api/replays/{subjects}/{episode}/mcap
+        GET /replays/{subjects}/{episode}/{theme}/
         GET /api/runs/{run_id}/export
         GET /api/projects/{project_id}/export
         GET /api/experiments/{experiment_id}/export
@@ -417,6 +420,7 @@ def everybody(
                 "study_id": study["id"],
                 "playground_id": ground["id"],
                 "campaign_id": campaign.json()["campaign"]["id"],
+                "subjects": f"policy:simple:simple-200,checkpoint:{checkpoint},evaluation:{evaluation['id']}",
                 "theme": "light",
                 "step": "1",
                 "episode": "1",

@@ -2,23 +2,31 @@
 
 import asyncio
 import base64
+import io
+import math
 import os
 import re
 import shutil
 import time
+from collections import defaultdict
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 import zstandard
 from fastapi.testclient import TestClient
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
 from server.jobs.results import ResultStore
 from server.services import Services
 from server.settings import Settings
+from sim.scan import scan
+from sim.suites import load_suite
 from tests.server.harness import BASE_URL, TOKEN
 from workers.reporting import EpisodeResult, EvaluationResult
 from workers.shipped.library import shipped_policy
@@ -134,15 +142,138 @@ def test_what_ended_otherwise_than_recorded_says_so(client: TestClient, services
     assert "ended otherwise than recorded" in client.get(f"{replay['page']}light/").text
 
 
+SHIPPED = "policy:complex:complex-200"
+
+
+def test_two_policies_drive_one_scenario_side_by_side(client: TestClient, services: Services, kept: Path) -> None:
+    services.results = ResultStore(kept, max_bytes=2**30)
+    other = store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
+    both = f"{SHIPPED},checkpoint:{other}"
+    replay = client.get(f"/api/replays/{both}/7").json()
+    assert [each["of"] for each in replay["policies"]] == both.split(",")
+    assert [each["colour"] for each in replay["policies"]] == ["#339af0", "#ff922b"]
+    assert {(each["steps"], each["outcome"], each["faithful"]) for each in replay["policies"]} == {
+        (RECORDED.episodes[7].steps, RECORDED.episodes[7].outcome, True)
+    }
+    # One archive on one suite is driven once, whoever asks for it.
+    assert client.get(f"/api/replays/{both}/progress").json() == {"ready": 2, "policies": 2, "share": 1.0}
+    page = client.get(f"{replay['page']}light/")
+    assert page.status_code == 200
+    names = {name for _, message in recording_in(page.text)["messages"] if (name := message.get("name"))}  # type: ignore[attr-defined]
+    assert {"/world/chassis", "/world/beside1/chassis", "/world/ends/0", "/world/ends/1"} <= names
+    assert "Tür &lt;b&gt;, seed 4, step 81,920" in page.text
+    download = client.get(f"{replay['page']}light/?download")
+    assert download.headers["content-disposition"] == 'attachment; filename="mapless-complex-and-1-more-episode7.html"'
+
+
+def test_who_drove_the_same_scenarios_is_offered(client: TestClient, services: Services) -> None:
+    mine = store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
+    offered = client.get(f"/api/replays/checkpoint:{mine}/beside").json()
+    assert offered["suite"] == "complex-200"
+    rates = {each["of"]: each["success"] for each in offered["items"]}
+    arrived = sum(episode.outcome == "arrival" for episode in RECORDED.episodes)
+    assert rates[SHIPPED] == arrived / len(RECORDED.episodes)
+    assert f"checkpoint:{mine}" not in rates
+    (evaluation,) = client.post(
+        "/api/evaluations",
+        json={"policies": [{"source": "baseline", "name": "go-to-goal"}], "suites": [{"by": "name", "name": "complex-200"}]},
+    ).json()
+    while client.get(f"/api/evaluations/{evaluation['id']}").json()["figures"] is None:
+        time.sleep(0.2)
+    offered = client.get(f"/api/replays/checkpoint:{mine}/beside").json()["items"]
+    (baseline,) = (each for each in offered if each["of"] == f"evaluation:{evaluation['id']}")
+    assert baseline["title"] == "go-to-goal"
+    # A baseline has no archive, and is driven again like any other.
+    replay = client.get(f"/api/replays/checkpoint:{mine},{baseline['of']}/3").json()
+    assert [each["faithful"] for each in replay["policies"]] == [True, True]
+
+
+def test_series_are_those_of_the_episode(client: TestClient, checkpoint: str) -> None:
+    (series,) = client.get(f"/api/replays/checkpoint:{checkpoint}/7/series").json()["policies"]
+    steps = RECORDED.episodes[7].steps
+    assert series["times"] == pytest.approx([0.2 * moment for moment in range(steps + 1)])
+    by_name = {(each["chart"], each["name"]): each["values"] for each in series["series"]}
+    assert all(len(values) == steps + 1 for values in by_name.values())
+    assert by_name["linear", "asked for"][1:] == pytest.approx(by_name["linear", "driven"][1:], abs=1e-3)
+    terms = [values for (chart, name), values in by_name.items() if chart == "reward" and name != "all"]
+    assert {name for chart, name in by_name if chart == "reward"} == {"all"} | {
+        term.name for term in POLICY.card.training.task.reward.terms
+    }
+    assert sum(map(sum, terms)) == pytest.approx(RECORDED.episodes[7].reward, rel=1e-3)
+    assert max(by_name["ahead", "range ahead"]) <= 3.5
+    assert by_name["value", "return to come"][-1] == 0.0
+
+
+def test_an_episode_is_read_back_from_its_mcap_by_the_public_reader(client: TestClient, checkpoint: str) -> None:
+    """As Foxglove and ROS read it: by the schemas in the file."""
+    response = client.get(f"/api/replays/checkpoint:{checkpoint}/7/mcap")
+    assert response.headers["content-disposition"].endswith('-episode7.mcap"')
+    by_topic: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    schemas = {}
+    reader = make_reader(io.BytesIO(response.content), decoder_factories=[DecoderFactory()])
+    assert reader.get_header().profile == "ros2"
+    for schema, channel, message, decoded in reader.iter_decoded_messages():
+        assert schema is not None
+        schemas[channel.topic] = schema.name
+        by_topic[channel.topic].append((message.log_time, decoded))
+    assert schemas == {
+        "/scan": "sensor_msgs/msg/LaserScan",
+        "/odom": "nav_msgs/msg/Odometry",
+        "/cmd_vel": "geometry_msgs/msg/TwistStamped",
+        "/goal_pose": "geometry_msgs/msg/PoseStamped",
+        "/tf": "tf2_msgs/msg/TFMessage",
+    }
+    steps = RECORDED.episodes[7].steps
+    assert {topic: len(messages) for topic, messages in by_topic.items()} == {
+        "/scan": steps + 1,
+        "/odom": steps + 1,
+        "/cmd_vel": steps,
+        "/goal_pose": 1,
+        "/tf": steps + 1,
+    }
+    suite = load_suite("complex-200")
+    lidar = POLICY.card.training.task.lidar
+    stamp, odometry = by_topic["/odom"][5]
+    assert stamp == 2 * 10**9
+    assert (odometry.header.stamp.sec, odometry.header.stamp.nanosec) == (2, 0)
+    assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_link")
+    start = by_topic["/odom"][0][1].pose.pose
+    assert (start.position.x, start.position.y) == pytest.approx(suite.starts[7, :2], abs=1e-5)
+    assert 2.0 * math.atan2(start.orientation.z, start.orientation.w) == pytest.approx(suite.starts[7, 2], abs=1e-5)
+    goal = by_topic["/goal_pose"][0][1].pose.position
+    assert (goal.x, goal.y) == pytest.approx(suite.targets[7], abs=1e-5)
+    # The command of a moment is what the robot does until the next one.
+    assert by_topic["/cmd_vel"][4][1].twist.linear.x == pytest.approx(odometry.twist.twist.linear.x, abs=1e-3)
+    assert by_topic["/cmd_vel"][4][1].twist.angular.z == pytest.approx(odometry.twist.twist.angular.z, abs=1e-3)
+    scanned = by_topic["/scan"][0][1]
+    assert len(scanned.ranges) == lidar.rays
+    assert scanned.angle_max == pytest.approx(scanned.angle_min + (lidar.rays - 1) * scanned.angle_increment)
+    true = scan(suite.arenas[suite.arena_indices[7]], suite.starts[7:8], lidar)[0]
+    assert [min(each, 3.5) for each in scanned.ranges] == pytest.approx(true, abs=2e-3)
+    assert {each.child_frame_id for each in by_topic["/tf"][0][1].transforms} == {"base_link", "base_scan"}
+
+
+def test_what_was_not_measured_on_one_suite_is_not_shown_together(client: TestClient) -> None:
+    response = client.get("/api/replays/policy:complex:complex-200,policy:simple:simple-200/0")
+    assert response.status_code == 409
+    assert "different suites" in response.json()["detail"]
+
+
 @pytest.mark.parametrize(
     "path",
     [
+        "/api/replays/nothing/0",
+        "/api/replays/checkpoint:0123456789abcdef/0",
+        "/api/replays/policy:complex/0",
+        "/api/replays/policy:complex:simple-200/0/series",
+        f"/api/replays/{SHIPPED}/200/mcap",
+        f"/api/replays/{SHIPPED},{','.join(f'checkpoint:{number}' for number in range(6))}/0",
         "/api/checkpoints/0123456789abcdef/replays/0",
         "/api/policies/nobody/suites/simple-200/replays/0",
         "/api/policies/simple/suites/clutter-500/replays/0",
         "/api/policies/simple/suites/simple-200/replays/200",
         "/api/policies/simple/suites/simple-200/replays/-1",
-        "/replays/policies/simple/simple-200/200/dark/",
+        "/replays/policy:simple:simple-200/200/dark/",
     ],
 )
 def test_there_is_no_other_replay(client: TestClient, path: str) -> None:
@@ -182,13 +313,13 @@ def test_a_suite_that_has_changed_is_not_passed_off_as_the_old_one(
 
 def test_players_need_a_login(settings: Settings) -> None:
     with TestClient(create_app(settings), base_url=BASE_URL) as stranger:
-        assert stranger.get("/replays/policies/simple/simple-200/0/dark/").status_code == 401
+        assert stranger.get("/replays/policy:simple:simple-200/0/dark/").status_code == 401
         stranger.headers["Authorization"] = f"Bearer {TOKEN}"
         # viser's client would play any file that its address names.
         redirected = stranger.get(
-            "/replays/policies/simple/simple-200/0/dark/?playbackPath=//evil.example/x.viser", follow_redirects=False
+            "/replays/policy:simple:simple-200/0/dark/?playbackPath=//evil.example/x.viser", follow_redirects=False
         )
-        assert redirected.headers["location"] == "/replays/policies/simple/simple-200/0/dark/"
+        assert redirected.headers["location"] == "/replays/policy:simple:simple-200/0/dark/"
 
 
 def test_recordings_that_nobody_looked_at_go_first(client: TestClient, checkpoint: str, kept: Path) -> None:

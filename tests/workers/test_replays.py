@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim.arenas import build_arena
+from sim.config import ArenaFile, ImportedArenaConfig
+from sim.config.arena_file import Pedestrian
 from sim.scan import scan
 from sim.suites import load_suite
 from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
-from workers.job_protocol import NamedSuite, ShippedPolicyName
+from workers.job_protocol import ArenaSuite, NamedSuite, ShippedPolicyName
 from workers.policy import torch_policy
 from workers.replays import record as recorder
 from workers.replays.record import record
@@ -67,12 +70,52 @@ def test_movers_are_where_the_rays_met_them() -> None:
             np.testing.assert_allclose(ranges, scan(arena, pose[None], task.lidar, movers=movers)[0], atol=2e-3)
 
 
+def test_people_who_give_way_are_where_the_rays_met_them() -> None:
+    """In one arena, every robot meets people of its own: where they go depends on where it goes."""
+    person = Pedestrian(kind="pedestrian", sees_robots=True)
+    arena = ArenaFile(name="Hall", width=8.0, height=6.0, movers=(person,) * 3)
+    suite = ArenaSuite(arena=ImportedArenaConfig.of(arena))
+    recording = record(POLICY.archive, SHIPPED, suite)
+    task = POLICY.card.training.task
+    ways = set()
+    for episode in (0, 60, 120):
+        track = recording.track(episode)
+        ways.add(track.movers[min(len(track.movers) - 1, 20)].tobytes())
+        for pose, ranges, movers in zip(track.poses, track.ranges, track.movers, strict=True):
+            np.testing.assert_allclose(
+                ranges, scan(build_arena(suite.arena, 0), pose[None], task.lidar, movers=movers)[0], atol=2e-3
+            )
+    assert len(ways) > 1
+
+
+def test_commands_speeds_and_reward_terms_are_those_of_each_step(recording: Recording) -> None:
+    task = POLICY.card.training.task
+    for episode in (0, 7, 199):
+        track, result = recording.track(episode), recording.evaluation.episodes[episode]
+        for numbers in (track.commands, track.twists, track.terms):
+            assert len(numbers) == result.steps + 1
+            assert not numbers[0].any()
+        # Nothing limits or delays this robot: it does as it is told, and that is how it moved.
+        np.testing.assert_allclose(track.twists[1:, [0, 2]], track.commands[1:], atol=1e-5)
+        moved = np.hypot(*np.diff(track.poses[:-1, :2], axis=0).T) / task.control_period
+        half = 0.5 * task.control_period * track.twists[1:-1, 2].astype(np.float64)
+        np.testing.assert_allclose(moved, track.twists[1:-1, 0] * np.sinc(half / np.pi), atol=1e-4)
+        assert track.terms.sum() == pytest.approx(result.reward, rel=1e-4)
+        values = track.values()
+        assert values[-1] == 0.0
+        assert values[-2] == pytest.approx(track.terms[-1].sum())
+        rewards = track.terms[1:].sum(axis=1, dtype=np.float64)
+        assert values[0] == pytest.approx((recording.gamma ** np.arange(len(rewards)) * rewards).sum())
+
+
 def test_its_file_gives_everything_back(recording: Recording, tmp_path: Path) -> None:
     recording.save(tmp_path / "recording.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["recording.npz"]
     again = Recording.load(tmp_path / "recording.npz")
     assert (again.evaluation, again.arenas) == (recording.evaluation, recording.arenas)
-    for name in ("arena_indices", "targets", "offsets", "poses", "ranges", "movers"):
+    assert again.gamma == recording.gamma
+    arrays = ("arena_indices", "targets", "offsets", "poses", "ranges", "movers", "mover_indices")
+    for name in (*arrays, "commands", "twists", "terms"):
         np.testing.assert_array_equal(getattr(again, name), getattr(recording, name))
 
 

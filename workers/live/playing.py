@@ -11,6 +11,7 @@ from workers.checkpoints import read_policy
 from workers.job_protocol import JobOrders, PlayJob, UploadedPolicy
 from workers.live.playground import Playground
 from workers.live.viewer import FRAME_RATE
+from workers.manifest import USUAL_GAMMA
 from workers.onnx_policy import OnnxPolicy
 from workers.play_protocol import PlaySeen
 
@@ -19,7 +20,6 @@ _SEEN_SECONDS = 1.0
 _SOON_SECONDS = 0.3
 # This far behind, it gives up catching up.
 _TOO_LATE = 0.25
-_USUAL_GAMMA = 0.99
 
 
 class Audience(Protocol):
@@ -43,11 +43,10 @@ def open_playground(archive: Path, job: PlayJob) -> Playground:
     policy: PolicyFunction
     if isinstance(job.policy, UploadedPolicy):
         task = job.policy.task or TaskConfig()
-        policy, gamma, step = OnnxPolicy(archive.read_bytes(), task), _USUAL_GAMMA, 0
+        policy, gamma, step = OnnxPolicy(archive.read_bytes(), task), USUAL_GAMMA, 0
     else:
         manifest, policy = read_policy(archive)
-        task, step = manifest.training.task, manifest.step
-        gamma = getattr(manifest.training.algorithm, "gamma", _USUAL_GAMMA)
+        task, gamma, step = manifest.training.task, manifest.gamma, manifest.step
     return Playground(policy, task, job.arena, gamma, step)
 
 

@@ -9,35 +9,52 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actions import action_layout
 from sim.arenas.document import to_document
+from sim.arrays import Floats
+from sim.config import TaskConfig
+from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
+from sim.suites import Observer, Suite
 from sim.world import World
 from workers.errors import EpisodesTooLongError
 from workers.job_protocol import OWN_SUITE, AnyPolicy, SuiteChoice
 from workers.replays.recording import Recording
 from workers.training.evaluation import to_result
-from workers.training.measuring import drive
+from workers.training.measuring import Driven, DrivenShare, Progress, drive
 
 MAX_MOMENT_NUMBERS = 2**27
 """Numbers of all moments together: a quarter of a gigabyte in memory, 200 episodes of 20,000 steps with 30 rays."""
 
 
-class _Moments:
-    """An observer of a suite that keeps what is drawn."""
+class Moments:
+    """An observer of a suite that keeps what is drawn and charted.
 
-    def __init__(self) -> None:
+    Args:
+        task: that is driven.
+    """
+
+    def __init__(self, task: TaskConfig) -> None:
+        self._layout = action_layout(task.robot)
         self._numbers = 0
+        self._mover_rows = self._mover_indices = np.empty(0, np.int64)
         self._scenarios: list[NDArray[np.int64]] = []
         self._poses: list[NDArray[np.float32]] = []
         self._ranges: list[NDArray[np.float16]] = []
         self._fields: list[NDArray[np.float32]] = []
         self._movers: list[NDArray[np.float32]] = []
+        self._commands: list[NDArray[np.float32]] = []
+        self._twists: list[NDArray[np.float32]] = []
+        self._terms: list[NDArray[np.float32]] = []
 
-    def __call__(self, under_way: NDArray[np.int64], world: World) -> None:
+    def __call__(self, under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
         """One step of all; see `sim.suites.Observer`."""
         poses, ranges = world.robots.poses[under_way], world.robots.ranges[under_way].astype(np.float16)
-        # Every scenario of an arena meets the same movers, so those of its first copy do for all.
-        movers = world.movers.discs[: len(world.arenas), :, :3].copy()
-        self._numbers += poses.size + ranges.size + movers.size
+        if not self._scenarios:
+            self._mover_rows, self._mover_indices = _mover_rows(world)
+        movers = world.movers.discs[self._mover_rows, :, :3]
+        commands = self._in_units(actions[under_way], world.robots.drawn[under_way])
+        twists, terms = world.twists()[under_way], world.robots.terms[under_way]
+        self._numbers += sum(array.size for array in (poses, ranges, movers, commands, twists, terms))
         if self._numbers > MAX_MOMENT_NUMBERS:
             raise EpisodesTooLongError(
                 "these episodes are too long, with too many rays, to be kept for a replay: lower the step limit"
@@ -47,47 +64,83 @@ class _Moments:
         self._ranges.append(ranges)
         self._fields.append(world.fields_of_view[under_way].astype(np.float32))
         self._movers.append(movers)
+        self._commands.append(commands)
+        self._twists.append(twists)
+        self._terms.append(terms)
 
-    def movers(self) -> NDArray[np.float32]:
-        """(T, A, K, 3) x, y, radius in every arena at every moment."""
-        return np.stack(self._movers)
+    def _in_units(self, actions: Floats, drawn: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Fractions of the limits that these robots have in this episode, as what they stand for."""
+        limits = np.tile(np.array(self._layout.limits), (len(actions), 1))
+        # What a robot draws is its top speeds; sideways it goes a share of the former, and a steering angle is the drive's.
+        fastest = drawn[:, MAX_LINEAR] / self._layout.limits[0]
+        for column, component in enumerate(self._layout.components):
+            if component.name in ("linear", "lateral"):
+                limits[:, column] *= fastest
+            elif component.name == "angular":
+                limits[:, column] = drawn[:, MAX_ANGULAR]
+        asked: NDArray[np.float32] = (actions * limits).astype(np.float32)
+        return asked
 
-    def by_scenario(
-        self, scenarios: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float16], NDArray[np.float32]]:
-        """Offsets (S + 1,), poses (M, 3), ranges (M, rays) and fields of view (M,), one episode after another."""
+    def recording(self, driven: Driven) -> Recording:
+        """All of it, one episode after another, once all have ended."""
+        suite = driven.suite
         scenario = np.concatenate(self._scenarios)
         order = np.argsort(scenario, kind="stable")
-        offsets = np.concatenate([[0], np.cumsum(np.bincount(scenario, minlength=scenarios))])
-        poses, ranges = np.concatenate(self._poses)[order], np.concatenate(self._ranges)[order]
-        return offsets, poses, ranges, np.concatenate(self._fields)[order]
+        return Recording(
+            evaluation=to_result(driven.table, suite),
+            arenas=tuple(to_document(arena) for arena in suite.arenas),
+            gamma=driven.gamma,
+            arena_indices=suite.arena_indices,
+            targets=suite.targets.astype(np.float32),
+            offsets=np.concatenate([[0], np.cumsum(np.bincount(scenario, minlength=len(suite)))]),
+            poses=np.concatenate(self._poses)[order],
+            ranges=np.concatenate(self._ranges)[order],
+            fields_of_view=np.concatenate(self._fields)[order],
+            movers=np.stack(self._movers),
+            mover_indices=self._mover_indices,
+            commands=np.concatenate(self._commands)[order],
+            twists=np.concatenate(self._twists)[order],
+            terms=np.concatenate(self._terms)[order],
+        )
 
 
-def record(archive: Path | None, policy: AnyPolicy, choice: SuiteChoice = OWN_SUITE) -> Recording:
+def _mover_rows(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows (G,) of the movers' discs that differ, and (S,) which of them each scenario meets."""
+    tiles = world.tiles().astype(np.int64)
+    if not any(mover.sees_robots for arena in world.arenas for mover in arena.movers):
+        # Nobody gives way to a robot: all copies of an arena have the same movers in the same places.
+        tiles %= len(world.arenas)
+    rows, indices = np.unique(tiles, return_inverse=True)
+    return rows, indices
+
+
+def record(
+    archive: Path | None, policy: AnyPolicy, choice: SuiteChoice = OWN_SUITE, progress: Progress = lambda _: None
+) -> Recording:
     """Every episode of a policy on a suite.
 
     Args:
         archive: of the policy; None for a baseline.
         policy: which one.
         choice: of the suite.
+        progress: told the share that is driven, 0 to 1.
 
     Raises:
         ArchiveError: it is not an archive that this release reads.
         SuiteError: there is no such suite.
         EpisodesTooLongError: it would not fit into memory.
     """
-    moments = _Moments()
-    driven = drive(archive, policy, choice, lambda *_: moments)
-    suite = driven.suite
-    offsets, poses, ranges, fields = moments.by_scenario(len(suite))
-    return Recording(
-        evaluation=to_result(driven.table, suite),
-        arenas=tuple(to_document(arena) for arena in suite.arenas),
-        arena_indices=suite.arena_indices,
-        targets=suite.targets.astype(np.float32),
-        offsets=offsets,
-        poses=poses,
-        ranges=ranges,
-        fields_of_view=fields,
-        movers=moments.movers(),
-    )
+    kept: list[Moments] = []
+
+    def observer(suite: Suite, task: TaskConfig) -> Observer:
+        kept.append(Moments(task))
+        told = DrivenShare(suite, task, progress)
+
+        def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
+            kept[0](under_way, world, actions)
+            told(under_way, world, actions)
+
+        return look
+
+    driven = drive(archive, policy, choice, observer)
+    return kept[0].recording(driven)

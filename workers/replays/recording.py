@@ -27,6 +27,10 @@ class Track:
         fields_of_view: (n + 1,) float32, degrees that the rays cover.
         target: (2,) float32.
         movers: (n + 1, movers, 3) float32: x, y, radius.
+        commands: (n + 1, A) float32: what was asked for in the step that led there, see `sim.actions`, in m/s, rad/s, rad.
+        twists: (n + 1, 3) float32: speeds forwards and to the left, m/s, and turning rate, rad/s, in that step.
+        terms: (n + 1, terms) float32: of the reward for that step. All three are zeros at the start.
+        gamma: discount of a step.
     """
 
     arena: ArenaFile
@@ -35,6 +39,18 @@ class Track:
     fields_of_view: NDArray[np.float32]
     target: NDArray[np.float32]
     movers: NDArray[np.float32]
+    commands: NDArray[np.float32]
+    twists: NDArray[np.float32]
+    terms: NDArray[np.float32]
+    gamma: float
+
+    def values(self) -> NDArray[np.float64]:
+        """(n + 1,) the return that is still to come at each moment, discounted: what a critic should say there."""
+        rewards = self.terms.sum(axis=1, dtype=np.float64)
+        values = np.zeros(len(rewards))
+        for moment in range(len(rewards) - 2, -1, -1):
+            values[moment] = rewards[moment + 1] + self.gamma * values[moment + 1]
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +60,24 @@ class Recording:
     Attributes:
         evaluation: how they ended.
         arenas: the suite's.
+        gamma: discount of a step, see `Track.values`.
         arena_indices: (S,) the arena of each episode.
         targets: (S, 2) float32.
         offsets: (S + 1,) where the moments of each episode begin, and the last one ends.
         poses: (M, 3) float32.
         ranges: (M, rays) float16: fine enough to draw.
         fields_of_view: (M,) float32.
-        movers: (T, A, K, 3) float32 x, y, radius of what moves in each of the A arenas, from the first moment of all
-            episodes to the last of the longest; a radius below zero is none.
+        movers: (T, G, K, 3) float32 x, y, radius of what moves, from the first moment of all episodes to the last of the
+            longest; a radius below zero is none.
+        mover_indices: (S,) which of the G each episode met: one for each arena, or for each episode where people give way.
+        commands: (M, A) float32.
+        twists: (M, 3) float32.
+        terms: (M, terms) float32.
     """
 
     evaluation: EvaluationResult
     arenas: tuple[ArenaFile, ...]
+    gamma: float
     arena_indices: NDArray[np.int32]
     targets: NDArray[np.float32]
     offsets: NDArray[np.int64]
@@ -63,6 +85,10 @@ class Recording:
     ranges: NDArray[np.float16]
     fields_of_view: NDArray[np.float32]
     movers: NDArray[np.float32]
+    mover_indices: NDArray[np.int64]
+    commands: NDArray[np.float32]
+    twists: NDArray[np.float32]
+    terms: NDArray[np.float32]
 
     def track(self, episode: int) -> Track:
         """One of the episodes.
@@ -73,7 +99,7 @@ class Recording:
         if not 0 <= episode < len(self.arena_indices):
             raise IndexError(f"there are {len(self.arena_indices)} episodes: no {episode}")
         moments = slice(self.offsets[episode], self.offsets[episode + 1])
-        discs = self.movers[: moments.stop - moments.start, self.arena_indices[episode]]
+        discs = self.movers[: moments.stop - moments.start, self.mover_indices[episode]]
         return Track(
             arena=self.arenas[self.arena_indices[episode]],
             poses=self.poses[moments],
@@ -81,6 +107,10 @@ class Recording:
             fields_of_view=self.fields_of_view[moments],
             target=self.targets[episode],
             movers=discs[:, discs[0, :, 2] > 0.0],
+            commands=self.commands[moments],
+            twists=self.twists[moments],
+            terms=self.terms[moments],
+            gamma=self.gamma,
         )
 
     def save(self, path: Path) -> None:
@@ -91,6 +121,7 @@ class Recording:
                 file,
                 evaluation=np.frombuffer(self.evaluation.model_dump_json().encode(), np.uint8),
                 arenas=np.frombuffer(_ARENAS.dump_json(self.arenas), np.uint8),
+                gamma=np.float64(self.gamma),
                 arena_indices=self.arena_indices,
                 targets=self.targets,
                 offsets=self.offsets,
@@ -98,6 +129,10 @@ class Recording:
                 ranges=self.ranges,
                 fields_of_view=self.fields_of_view,
                 movers=self.movers,
+                mover_indices=self.mover_indices,
+                commands=self.commands,
+                twists=self.twists,
+                terms=self.terms,
             )
         torn.replace(path)
 
@@ -115,6 +150,7 @@ class Recording:
             return cls(
                 evaluation=EvaluationResult.model_validate_json(arrays.pop("evaluation").tobytes()),
                 arenas=_ARENAS.validate_json(arrays.pop("arenas").tobytes()),
+                gamma=float(arrays.pop("gamma")),
                 **arrays,
             )
         except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError) as error:

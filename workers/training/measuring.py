@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from sim.arenas.document import to_document
+from sim.arrays import Floats
 from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
 from sim.suites import EpisodeTable, Observer, Suite, run_controller, run_suite, suite_for, suite_named
@@ -25,6 +26,7 @@ from workers.job_protocol import (
     SuiteChoice,
     UploadedPolicy,
 )
+from workers.manifest import USUAL_GAMMA
 from workers.onnx_policy import OnnxPolicy
 from workers.policy import torch_policy
 from workers.training.evaluation import to_result
@@ -40,11 +42,13 @@ class Driven:
         suite: of which.
         task: robot, LiDAR and limits that were driven with.
         table: how every episode ended.
+        gamma: by which it was trained to discount a step; a usual one where that is not known.
     """
 
     suite: Suite
     task: TaskConfig
     table: EpisodeTable
+    gamma: float = USUAL_GAMMA
 
 
 def drive(
@@ -81,7 +85,8 @@ def drive(
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     try:
-        return Driven(suite, task, run_suite(torch_policy(read), task, suite, observer(suite, task)))
+        table = run_suite(torch_policy(read), task, suite, observer(suite, task))
+        return Driven(suite, task, table, manifest.gamma)
     finally:
         torch.set_flush_denormal(False)
 
@@ -102,11 +107,11 @@ def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> Measu
 
     def observer(suite: Suite, task: TaskConfig) -> Observer:
         ways.append(_Ways(suite, task))
-        told = _Progress(suite, task, progress)
+        told = DrivenShare(suite, task, progress)
 
-        def look(under_way: NDArray[np.int64], world: World) -> None:
+        def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
             ways[0].look(under_way, world)
-            told(under_way)
+            told(under_way, world, actions)
 
         return look
 
@@ -185,8 +190,14 @@ class _Ways:
         return self._jerk / np.maximum(1, self._steps - 2)
 
 
-class _Progress:
-    """Tells how far it is: the more of scenarios ended and of the longest one's steps."""
+class DrivenShare:
+    """An observer that tells how far it is: the more of scenarios ended and of the longest one's steps.
+
+    Args:
+        suite: that is driven.
+        task: its limits.
+        progress: told the share, 0 to 1.
+    """
 
     def __init__(self, suite: Suite, task: TaskConfig, progress: Progress) -> None:
         self._scenarios = len(suite)
@@ -194,6 +205,7 @@ class _Progress:
         self._step = 0
         self._progress = progress
 
-    def __call__(self, under_way: NDArray[np.int64]) -> None:
+    def __call__(self, under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
+        """One step of all; see `sim.suites.Observer`."""
         self._step += 1
         self._progress(min(1.0, max(1.0 - len(under_way) / self._scenarios, self._step / self._steps)))

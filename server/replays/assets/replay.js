@@ -11,6 +11,29 @@ addEventListener("DOMContentLoaded", () => {
     seconds?.setAttribute("aria-label", "Seconds");
     speed?.setAttribute("aria-label", "Speed");
     observer.disconnect();
+    if (parent !== window) share(slider.querySelector("[role=slider]"), seconds);
+  };
+  // Inside Mapless' own page: it hears which moment is shown, and asks for others. The player itself can do neither.
+  const share = (time, field) => {
+    const type = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+    let told = NaN;
+    let due = 0;
+    const tell = (now) => {
+      const shown = Number(time.getAttribute("aria-valuenow"));
+      if (shown !== told && now >= due) {
+        told = shown;
+        due = now + 60;
+        parent.postMessage({ replaySeconds: shown }, location.origin);
+      }
+      requestAnimationFrame(tell);
+    };
+    requestAnimationFrame(tell);
+    addEventListener("message", (event) => {
+      const seconds = event.data?.replaySeek;
+      if (event.origin !== location.origin || event.source !== parent || !Number.isFinite(seconds)) return;
+      type.call(field, Math.max(0, seconds).toFixed(3));
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+    });
   };
   const observer = new MutationObserver(name);
   observer.observe(document.body, { childList: true, subtree: true });

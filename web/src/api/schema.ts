@@ -1693,6 +1693,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/replays/{subjects}/{episode}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay
+         * @description Drive one scenario again by one policy or several, which were measured on the same suite.
+         */
+        get: operations["replay_api_replays__subjects___episode__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/{episode}/mcap": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Messages
+         * @description The episode as an MCAP file of ROS 2 messages: scans, odometry, commands, the goal, and transforms.
+         */
+        get: operations["replay_messages_api_replays__subjects___episode__mcap_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/{episode}/series": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Series
+         * @description What the charts beside it show: range ahead, commands, speeds, return to come and reward terms over time.
+         */
+        get: operations["replay_series_api_replays__subjects___episode__series_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/beside": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Beside
+         * @description Who else drove the same scenarios, to be shown beside.
+         */
+        get: operations["list_beside_api_replays__subjects__beside_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/progress": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Progress
+         * @description How far it is, while the replay itself is waited for.
+         */
+        get: operations["replay_progress_api_replays__subjects__progress_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/reproduction": {
         parameters: {
             query?: never;
@@ -3619,6 +3719,37 @@ export interface components {
             name: "bearing";
         };
         /**
+         * Beside
+         * @description Somebody else who drove the same scenarios.
+         */
+        Beside: {
+            /**
+             * Of
+             * @description As addresses of replays name it: checkpoint:ID, evaluation:ID or policy:NAME:SUITE.
+             */
+            of: string;
+            /**
+             * Success
+             * @description Share of the suite's episodes that arrived.
+             */
+            success: number;
+            /** Title */
+            title: string;
+        };
+        /**
+         * BesideList
+         * @description Who else drove the same scenarios.
+         */
+        BesideList: {
+            /**
+             * Items
+             * @description Those of the same run first, then what ships, then what was asked for.
+             */
+            items: components["schemas"]["Beside"][];
+            /** Suite */
+            suite: string;
+        };
+        /**
          * Box
          * @description A rectangular obstacle; `angle` is that of its length against the x axis, degrees, anticlockwise.
          */
@@ -3898,6 +4029,26 @@ export interface components {
              * @enum {string}
              */
             name: "centre";
+        };
+        /**
+         * ChartedSeries
+         * @description Numbers over an episode's time.
+         */
+        ChartedSeries: {
+            /**
+             * Chart
+             * @enum {string}
+             */
+            chart: "ahead" | "linear" | "lateral" | "turning" | "steering" | "value" | "reward";
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /**
+             * Values
+             * @description One for each of the policy's times.
+             */
+            values: number[];
         };
         /**
          * Checkpoint
@@ -4907,6 +5058,34 @@ export interface components {
             told_by: "best" | "seeds" | "episodes";
         };
         /**
+         * EpisodeReplay
+         * @description One scenario, driven once more by one policy or several, ready to be played.
+         */
+        EpisodeReplay: {
+            /**
+             * Episode
+             * @description Its place in the suite, from 0.
+             */
+            episode: number;
+            /**
+             * Page
+             * @description Path of the player; append `light/` or `dark/`, and `?download` to take it away.
+             */
+            page: string;
+            /**
+             * Policies
+             * @description In the order that was asked for.
+             */
+            policies: components["schemas"]["ReplayedPolicy"][];
+            /**
+             * Seconds
+             * @description Of simulated time, of the longest.
+             */
+            seconds: number;
+            /** Suite */
+            suite: string;
+        };
+        /**
          * EpisodeResult
          * @description One scenario of an evaluation: one target attempt.
          *
@@ -4948,6 +5127,14 @@ export interface components {
             suite: string;
             /** Suite Hash */
             suite_hash: string;
+        };
+        /**
+         * EpisodeSeries
+         * @description What the charts beside a replay show.
+         */
+        EpisodeSeries: {
+            /** Policies */
+            policies: components["schemas"]["PolicySeries"][];
         };
         /**
          * ErrorBody
@@ -7978,6 +8165,24 @@ export interface components {
             suite_hash: string;
         };
         /**
+         * PolicySeries
+         * @description What is charted of one policy's episode.
+         */
+        PolicySeries: {
+            /**
+             * Of
+             * @description As addresses of replays name it: checkpoint:ID, evaluation:ID or policy:NAME:SUITE.
+             */
+            of: string;
+            /** Series */
+            series: components["schemas"]["ChartedSeries"][];
+            /**
+             * Times
+             * @description Seconds since the start; 600 at most.
+             */
+            times: number[];
+        };
+        /**
          * PolicyUpload
          * @description An ONNX file, or a bundle of this project, which brings its own task.
          */
@@ -9092,6 +9297,59 @@ export interface components {
             steps: number;
             /** Suite */
             suite: string;
+        };
+        /**
+         * ReplayedPolicy
+         * @description What one policy did.
+         */
+        ReplayedPolicy: {
+            /**
+             * Colour
+             * @description Of its robot in the picture, as CSS writes it.
+             */
+            colour: string;
+            /**
+             * Faithful
+             * @description Whether it ended as recorded. Another processor than the one it was recorded on may round otherwise.
+             */
+            faithful: boolean;
+            /**
+             * Of
+             * @description As addresses of replays name it: checkpoint:ID, evaluation:ID or policy:NAME:SUITE.
+             */
+            of: string;
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "arrival" | "collision" | "timeout";
+            /**
+             * Seconds
+             * @description Of simulated time.
+             */
+            seconds: number;
+            /** Steps */
+            steps: number;
+            /** Title */
+            title: string;
+        };
+        /**
+         * ReplayProgress
+         * @description How far the evaluations of a replay are driven.
+         */
+        ReplayProgress: {
+            /** Policies */
+            policies: number;
+            /**
+             * Ready
+             * @description Policies whose episodes are there.
+             */
+            ready: number;
+            /**
+             * Share
+             * @description Of the work, 0 to 1.
+             */
+            share: number;
         };
         /**
          * Reproduction
@@ -16897,6 +17155,335 @@ export interface operations {
             };
             /** @description No valid login */
             401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    replay_api_replays__subjects___episode__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EpisodeReplay"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    replay_messages_api_replays__subjects___episode__mcap_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": unknown;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    replay_series_api_replays__subjects___episode__series_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EpisodeSeries"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_beside_api_replays__subjects__beside_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BesideList"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    replay_progress_api_replays__subjects__progress_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReplayProgress"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

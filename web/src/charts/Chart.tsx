@@ -27,6 +27,10 @@ interface ChartProps {
   /** What x is, and how it is written. */
   xTitle?: string
   xFormat?: (value: number) => string
+  /** Where on x the cursor stands; null leaves it to whoever points. */
+  at?: number | null
+  /** A click's x. */
+  onSeek?: (x: number) => void
 }
 
 /**
@@ -42,6 +46,8 @@ export function Chart({
   height = HEIGHT,
   xTitle = 'Steps',
   xFormat = count,
+  at = null,
+  onSeek,
 }: ChartProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const frame = useRef<HTMLDivElement>(null)
@@ -50,6 +56,8 @@ export function Chart({
   const linked = useLinkedCharts()
   const link = useRef(linked)
   link.current = linked
+  const seek = useRef(onSeek)
+  seek.current = onSeek
   const [zoomed, setZoomed] = useState(false)
   const [hidden, setHidden] = useState<readonly string[]>([])
   const labelled = data.lines.filter((line) => line.label !== undefined)
@@ -108,6 +116,13 @@ export function Chart({
             : {}),
         },
         hooks: {
+          ready: [
+            (chart) =>
+              chart.over.addEventListener('click', () => {
+                const left = chart.cursor.left ?? -1
+                if (left >= 0) seek.current?.(chart.posToVal(left, 'x'))
+              }),
+          ],
           setCursor: [(chart) => readout.current(chart.cursor.idx ?? null)],
           setSelect: [
             (chart) => {
@@ -154,6 +169,12 @@ export function Chart({
     if (from === undefined || to === undefined || (from === shownFrom && to === shownTo)) return
     chart.setScale('x', { min: from, max: to })
   }, [range, structure, dark, logarithmic])
+
+  // biome-ignore lint/correctness/useExhaustiveDependencies: a plot that is made anew, or zoomed, has its cursor elsewhere.
+  useEffect(() => {
+    const chart = plot.current
+    if (chart && at !== null) chart.setCursor({ left: chart.valToPos(at, 'x'), top: 0 })
+  }, [at, columns, structure, dark, range, zoomed])
 
   const zoomOut = useRef(() => {})
   zoomOut.current = () => {

@@ -4,7 +4,7 @@ import type { Checkpoint } from '../api/types'
 import { byInterest } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
-import { ReplayDialog } from './Replay'
+import { ReplayDialog } from './replay/ReplayDialog'
 
 /** Nothing of an evaluation ever changes. */
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -22,8 +22,8 @@ export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
     <>
       <EpisodesQuery query={episodes} onReplay={setEpisode} />
       {episode !== null && (
-        <CheckpointReplay
-          path={path}
+        <ReplayDialog
+          of={`checkpoint:${checkpoint.id}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
           onReplay={setEpisode}
@@ -32,22 +32,4 @@ export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
       )}
     </>
   )
-}
-
-interface CheckpointReplayProps {
-  path: { checkpoint_id: string }
-  episode: number
-  order: readonly number[]
-  onReplay: (episode: number) => void
-  onClose: () => void
-}
-
-function CheckpointReplay({ path, ...dialog }: CheckpointReplayProps) {
-  const replay = $api.useQuery(
-    'get',
-    '/api/checkpoints/{checkpoint_id}/replays/{episode}',
-    { params: { path: { ...path, episode: dialog.episode } } },
-    { ...FOR_GOOD, retry: false },
-  )
-  return <ReplayDialog query={replay} {...dialog} />
 }

@@ -6,7 +6,7 @@ import type { ShippedPolicy } from '../api/types'
 import { byInterest } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
-import { ReplayDialog } from './Replay'
+import { ReplayDialog } from './replay/ReplayDialog'
 import { Panel } from './ui'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -42,8 +42,8 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
     >
       <EpisodesQuery key={suite} query={episodes} onReplay={setEpisode} />
       {episode !== null && (
-        <PolicyReplay
-          path={path}
+        <ReplayDialog
+          of={`policy:${policy.name}:${suite}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
           onReplay={setEpisode}
@@ -52,22 +52,4 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
       )}
     </Panel>
   )
-}
-
-interface PolicyReplayProps {
-  path: { name: string; suite: string }
-  episode: number
-  order: readonly number[]
-  onReplay: (episode: number) => void
-  onClose: () => void
-}
-
-function PolicyReplay({ path, ...dialog }: PolicyReplayProps) {
-  const replay = $api.useQuery(
-    'get',
-    '/api/policies/{name}/suites/{suite}/replays/{episode}',
-    { params: { path: { ...path, episode: dialog.episode } } },
-    { ...FOR_GOOD, retry: false },
-  )
-  return <ReplayDialog query={replay} {...dialog} />
 }

@@ -42,6 +42,8 @@ export function useNumberInAddress(name: string): [number | null, (value: number
 /** In the address, the first episode is 1, as it is called on the pages. Links from before have another name, and count from 0. */
 const REPLAY = 'replay'
 const REPLAY_BEFORE = 'episode'
+/** Who is shown beside, once for each. */
+const TOGETHER = 'with'
 
 /**
  * The episode that is replayed, counted from 0, or null. Opening one is a step of its own, so that Back closes it; going from
@@ -58,8 +60,10 @@ export function useReplayInAddress(): [number | null, (episode: number | null) =
         (before) => {
           const after = new URLSearchParams(before)
           after.delete(REPLAY_BEFORE)
-          if (next === null) after.delete(REPLAY)
-          else after.set(REPLAY, String(next + 1))
+          if (next === null) {
+            after.delete(REPLAY)
+            after.delete(TOGETHER)
+          } else after.set(REPLAY, String(next + 1))
           return after
         },
         { replace: open || next === null, preventScrollReset: true },
@@ -67,6 +71,25 @@ export function useReplayInAddress(): [number | null, (episode: number | null) =
     [open, setSearch],
   )
   return [open ? episode : null, set]
+}
+
+/** The policies that a replay shows beside the one whose episode it is, as addresses of replays name them. */
+export function useTogetherInAddress(): [string[], (others: readonly string[]) => void] {
+  const [search, setSearch] = useSearchParams()
+  const set = useCallback(
+    (others: readonly string[]) =>
+      setSearch(
+        (before) => {
+          const after = new URLSearchParams(before)
+          after.delete(TOGETHER)
+          for (const each of others) after.append(TOGETHER, each)
+          return after
+        },
+        { replace: true, preventScrollReset: true },
+      ),
+    [setSearch],
+  )
+  return [[...new Set(search.getAll(TOGETHER))], set]
 }
 
 function wholeNumber(text: string | null): number | null {

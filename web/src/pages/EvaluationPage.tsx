@@ -8,7 +8,7 @@ import { suiteTitle } from '../components/evaluations/choices'
 import { isOpen, Progress, titleOf } from '../components/evaluations/EvaluationTable'
 import { WaysMap } from '../components/evaluations/WaysMap'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
-import { ReplayDialog } from '../components/Replay'
+import { ReplayDialog } from '../components/replay/ReplayDialog'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import { byInterest } from '../lib/episodes'
 import { percent, significant } from '../lib/format'
@@ -158,8 +158,8 @@ function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
         <EpisodesQuery query={episodes} onReplay={setEpisode} />
       </Panel>
       {episode !== null && (
-        <EvaluationReplay
-          path={path}
+        <ReplayDialog
+          of={`evaluation:${evaluation.id}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
           onReplay={setEpisode}
@@ -168,22 +168,4 @@ function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
       )}
     </Stack>
   )
-}
-
-interface EvaluationReplayProps {
-  path: { evaluation_id: string }
-  episode: number
-  order: readonly number[]
-  onReplay: (episode: number) => void
-  onClose: () => void
-}
-
-function EvaluationReplay({ path, ...dialog }: EvaluationReplayProps) {
-  const replay = $api.useQuery(
-    'get',
-    '/api/evaluations/{evaluation_id}/replays/{episode}',
-    { params: { path: { ...path, episode: dialog.episode } } },
-    { ...FOR_GOOD, retry: false },
-  )
-  return <ReplayDialog query={replay} {...dialog} />
 }

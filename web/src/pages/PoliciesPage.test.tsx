@@ -118,10 +118,10 @@ test('its figures stand beside the baselines, suite by suite', async () => {
 
 const onClutter = {
   ...routes,
-  'GET /api/policies/crowd/suites/clutter-500/replays/1': {
+  'GET /api/replays/policy%3Acrowd%3Aclutter-500/1': {
     ...replay,
     suite: 'clutter-500',
-    page: '/replays/policies/crowd/clutter-500/1/',
+    page: '/replays/policy:crowd:clutter-500/1/',
   },
 }
 
@@ -133,7 +133,7 @@ test('every episode of every suite can be replayed', async () => {
   await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
   expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
     'src',
-    '/replays/policies/crowd/clutter-500/1/light/',
+    '/replays/policy:crowd:clutter-500/1/light/',
   )
   expect(router.state.location.search).toBe('?suite=clutter-500&replay=2')
 })
@@ -143,7 +143,7 @@ test('a link to a replay brings its suite along', async () => {
   open('/policies/crowd?suite=clutter-500&replay=2')
   expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
     'src',
-    '/replays/policies/crowd/clutter-500/1/light/',
+    '/replays/policy:crowd:clutter-500/1/light/',
   )
   // The page behind the dialog.
   expect(screen.getByText('Episodes on clutter-500')).toBeInTheDocument()

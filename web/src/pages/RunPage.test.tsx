@@ -2,6 +2,7 @@ import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import {
   checkpoints,
+  episodeSeries,
   episodes,
   experiment,
   live,
@@ -209,20 +210,24 @@ test('the episodes behind its best policy, failures first, by outcome', async ()
 })
 
 test('an episode is replayed; its address can be passed on', async () => {
-  startServer({ ...routes, 'GET /api/checkpoints/cp2/replays/1': replay })
+  startServer({
+    ...routes,
+    'GET /api/replays/checkpoint%3Acp2/1': replay,
+    'GET /api/replays/checkpoint%3Acp2/1/series': episodeSeries,
+  })
   const { user, router } = open('/runs/run1')
   await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
   expect(await screen.findByTitle('The episode in 3D')).toHaveAttribute(
     'src',
-    '/replays/checkpoints/cp2/1/light/',
+    '/replays/checkpoint:cp2/1/light/',
   )
   expect(router.state.location.search).toBe('?replay=2')
   const dialog = screen.getByRole('dialog', { name: 'Episode 2' })
-  expect(dialog).toHaveTextContent('12 steps, 2.4 s, on simple-200')
+  expect(dialog).toHaveTextContent('Collision at 2.4 s12 steps, on simple-200')
   expect(within(dialog).queryByRole('alert')).not.toBeInTheDocument()
   expect(within(dialog).getByRole('link', { name: 'Download' })).toHaveAttribute(
     'href',
-    '/replays/checkpoints/cp2/1/light/?download',
+    '/replays/checkpoint:cp2/1/light/?download',
   )
   // Two pictures at once would share one machine.
   expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
@@ -232,8 +237,59 @@ test('an episode is replayed; its address can be passed on', async () => {
   expect(router.state.location.search).toBe('')
 })
 
+test('two policies are shown in one place, by a link that shows them again', async () => {
+  const [mine] = replay.policies
+  const other = { ...mine, of: 'policy:simple:simple-200', title: 'A simple arena', colour: '#ff922b' }
+  const [lines] = episodeSeries.policies
+  const server = startServer({
+    ...routes,
+    'GET /api/replays/checkpoint%3Acp2/1': replay,
+    'GET /api/replays/checkpoint%3Acp2/1/series': episodeSeries,
+    'GET /api/replays/checkpoint%3Acp2/beside': {
+      suite: 'simple-200',
+      items: [{ of: other.of, title: other.title, success: 0.97 }],
+    },
+    'GET /api/replays/checkpoint%3Acp2%2Cpolicy%3Asimple%3Asimple-200/1': {
+      ...replay,
+      page: '/replays/checkpoint:cp2,policy:simple:simple-200/1/',
+      policies: [mine, { ...other, outcome: 'arrival', seconds: 4.8 }],
+    },
+    'GET /api/replays/checkpoint%3Acp2%2Cpolicy%3Asimple%3Asimple-200/1/series': {
+      policies: [lines, { ...lines, of: other.of }],
+    },
+  })
+  const { user, router } = open('/runs/run1?replay=2')
+  const charts = await screen.findByTestId('replay-charts')
+  expect(within(charts).getByRole('figure', { name: 'Range ahead, m' })).toBeInTheDocument()
+  expect(within(charts).getByRole('figure', { name: 'Reward of each step' })).toHaveTextContent(
+    /all.*collision/,
+  )
+  await user.click(await screen.findByPlaceholderText('Choose a policy'))
+  await user.click(await screen.findByRole('option', { name: /A simple arena, 97/ }))
+  await waitFor(() =>
+    expect(screen.getByTitle('The episode in 3D')).toHaveAttribute(
+      'src',
+      '/replays/checkpoint:cp2,policy:simple:simple-200/1/light/',
+    ),
+  )
+  expect(new URLSearchParams(router.state.location.search).getAll('with')).toEqual([other.of])
+  expect(screen.getByTestId('replay-ends')).toHaveTextContent(
+    /A.*Collision at 2.4 s.*BA simple arenaArrival at 4.8 s/,
+  )
+  expect(screen.getByRole('link', { name: 'MCAP' })).toHaveAttribute(
+    'href',
+    '/api/replays/checkpoint:cp2,policy:simple:simple-200/1/mcap',
+  )
+  // Of several, the reward is one line each: the sum, or the term that one chooses.
+  expect(await screen.findByRole('combobox', { name: 'Term of the reward' })).toBeInTheDocument()
+  expect(server.asked.filter((path) => path.endsWith('/progress')).length).toBeLessThan(5)
+  await user.keyboard('{Escape}{Escape}')
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(router.state.location.search).toBe('')
+})
+
 test('Back closes a replay that was opened here, and leaves the page where it is', async () => {
-  startServer({ ...routes, 'GET /api/checkpoints/cp2/replays/1': replay })
+  startServer({ ...routes, 'GET /api/replays/checkpoint%3Acp2/1': replay })
   const { user, router } = open('/runs/run1')
   await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
   await screen.findByRole('dialog', { name: 'Episode 2' })
@@ -245,8 +301,8 @@ test('Back closes a replay that was opened here, and leaves the page where it is
 test('one goes on from one failure to the next without closing the replay', async () => {
   startServer({
     ...routes,
-    'GET /api/checkpoints/cp2/replays/1': replay,
-    'GET /api/checkpoints/cp2/replays/4': { ...replay, episode: 4, page: '/replays/checkpoints/cp2/4/' },
+    'GET /api/replays/checkpoint%3Acp2/1': replay,
+    'GET /api/replays/checkpoint%3Acp2/4': { ...replay, episode: 4, page: '/replays/checkpoint:cp2/4/' },
   })
   // A link of before: counted from 0.
   const { user, router } = open('/runs/run1?episode=1')
@@ -256,10 +312,7 @@ test('one goes on from one failure to the next without closing the replay', asyn
   expect(screen.getByRole('button', { name: 'Previous' })).toBeDisabled()
   await user.click(next)
   await waitFor(() =>
-    expect(screen.getByTitle('The episode in 3D')).toHaveAttribute(
-      'src',
-      '/replays/checkpoints/cp2/4/light/',
-    ),
+    expect(screen.getByTitle('The episode in 3D')).toHaveAttribute('src', '/replays/checkpoint:cp2/4/light/'),
   )
   expect(router.state.location.search).toBe('?replay=5')
   expect(screen.getByRole('button', { name: 'Previous' })).toBeEnabled()
@@ -268,11 +321,14 @@ test('one goes on from one failure to the next without closing the replay', asyn
 test('a replay that ended otherwise says so, and one that cannot be made says why', async () => {
   const server = startServer({
     ...routes,
-    'GET /api/checkpoints/cp2/replays/1': { ...replay, faithful: false },
+    'GET /api/replays/checkpoint%3Acp2/1': {
+      ...replay,
+      policies: replay.policies.map((one) => ({ ...one, faithful: false })),
+    },
   })
   const { router } = open('/runs/run1?step=100000&replay=2')
   expect(await screen.findByText(/ended otherwise than recorded/)).toBeInTheDocument()
-  server.routes['GET /api/checkpoints/cp2/replays/2'] = refusal(500, 'The suite has changed.')
+  server.routes['GET /api/replays/checkpoint%3Acp2/2'] = refusal(500, 'The suite has changed.')
   await router.navigate('/runs/run1?replay=3')
   expect(await screen.findByText('The suite has changed.')).toBeInTheDocument()
   expect(screen.getByRole('button', { name: 'Try again' })).toBeInTheDocument()

@@ -5,6 +5,8 @@ import type {
   CheckpointPage,
   Comparison,
   Curves,
+  EpisodeReplay,
+  EpisodeSeries,
   Episodes,
   Estimate,
   Experiment,
@@ -12,7 +14,6 @@ import type {
   ListedExperiment,
   LiveState,
   Profiles,
-  Replay,
   Reproduction,
   Run,
   RunDetail,
@@ -241,14 +242,38 @@ export const episodes: Episodes = {
   })) as Episodes['episodes'],
 }
 
-export const replay: Replay = {
+export const replay: EpisodeReplay = {
   episode: 1,
   suite: 'simple-200',
-  outcome: 'collision',
-  steps: 12,
   seconds: 2.4,
-  faithful: true,
-  page: '/replays/checkpoints/cp2/1/',
+  page: '/replays/checkpoint:cp2/1/',
+  policies: [
+    {
+      of: 'checkpoint:cp2',
+      title: 'Corridor, seed 1, step 100,000',
+      colour: '#339af0',
+      outcome: 'collision',
+      steps: 12,
+      seconds: 2.4,
+      faithful: true,
+    },
+  ],
+}
+
+export const episodeSeries: EpisodeSeries = {
+  policies: [
+    {
+      of: 'checkpoint:cp2',
+      times: [0, 1.2, 2.4],
+      series: [
+        { chart: 'ahead', name: 'range ahead', unit: 'm', values: [2, 1, 0.1] },
+        { chart: 'linear', name: 'asked for', unit: 'm/s', values: [0, 0.2, 0.2] },
+        { chart: 'linear', name: 'driven', unit: 'm/s', values: [0, 0.1, 0.2] },
+        { chart: 'reward', name: 'all', unit: '', values: [0, 1, -100] },
+        { chart: 'reward', name: 'collision', unit: '', values: [0, 0, -100] },
+      ],
+    },
+  ],
 }
 
 const row = (name: string, value: number, episodes = 200) => ({

@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -96,7 +96,7 @@ def _do(text: str, directory: Path, connection: "Connection[Said, JobOrders]") -
         case ReplayJob():
             from workers.replays.record import record
 
-            record(_archive_of(spec, archive), spec.policy, spec.suite).save(result)
+            record(_archive_of(spec, archive), spec.policy, spec.suite, _teller(connection)).save(result)
         case ExportJob():
             from workers.export.bundle import bundle, export_checkpoint
 
@@ -108,6 +108,11 @@ def _do(text: str, directory: Path, connection: "Connection[Said, JobOrders]") -
 def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, JobOrders]") -> Measurement:
     from workers.training.measuring import measure
 
+    return measure(_archive_of(spec, archive), spec, _teller(connection))
+
+
+def _teller(connection: "Connection[Said, JobOrders]") -> Callable[[float], None]:
+    """Tells the place how far it is, now and then."""
     told = time.monotonic()
 
     def progress(share: float) -> None:
@@ -116,7 +121,7 @@ def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, Jo
             told = time.monotonic()
             connection.send(Progressed(share))
 
-    return measure(_archive_of(spec, archive), spec, progress)
+    return progress
 
 
 def _archive_of(spec: EvaluateJob | ReplayJob, archive: Path) -> Path | None:

@@ -1,0 +1,247 @@
+/** An episode over the page: in 3D, beside its charts and beside what others did in the same place; to seek, to take away. */
+import {
+  Button,
+  Group,
+  Modal,
+  MultiSelect,
+  Progress,
+  Text,
+  UnstyledButton,
+  useComputedColorScheme,
+} from '@mantine/core'
+import { useRef } from 'react'
+import { $api } from '../../api/client'
+import type { EpisodeReplay } from '../../api/types'
+import { OUTCOMES } from '../../lib/episodes'
+import { count, percent } from '../../lib/format'
+import { useTogetherInAddress } from '../../lib/hooks'
+import { IconDownload, IconMaximize } from '../icons'
+import { QueryError } from '../ui'
+import classes from './Replay.module.css'
+import { ReplayCharts } from './ReplayCharts'
+import { letter } from './strips'
+import { usePlayer } from './usePlayer'
+
+/** Nothing of an evaluation ever changes. */
+const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY, retry: false }
+const ASK_MS = 700
+/** Policies beside the one whose episodes these are. */
+const MAX_BESIDE = 5
+
+interface ReplayDialogProps {
+  /** Whose episodes they are, as addresses of replays name it. */
+  of: string
+  episode: number
+  /** All episodes, in the order in which one looks through them. */
+  order: readonly number[]
+  onReplay: (episode: number) => void
+  onClose: () => void
+}
+
+export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDialogProps) {
+  const dark = useComputedColorScheme('light') === 'dark'
+  const stage = useRef<HTMLDivElement>(null)
+  const frame = useRef<HTMLIFrameElement>(null)
+  const [others, setOthers] = useTogetherInAddress()
+  const subjects = [of, ...others.filter((each) => each !== of).slice(0, MAX_BESIDE)].join(',')
+  const path = { subjects, episode }
+  const replay = $api.useQuery('get', '/api/replays/{subjects}/{episode}', { params: { path } }, FOR_GOOD)
+  const series = $api.useQuery(
+    'get',
+    '/api/replays/{subjects}/{episode}/series',
+    { params: { path } },
+    { ...FOR_GOOD, enabled: replay.data !== undefined },
+  )
+  const page = replay.data && `${replay.data.page}${dark ? 'dark' : 'light'}/`
+  const { time, seek } = usePlayer(frame, page)
+  const place = order.indexOf(episode)
+  return (
+    <Modal opened onClose={onClose} size={1440} title={`Episode ${count(episode + 1)}`}>
+      <div className={classes.sides}>
+        <div ref={stage} className={classes.stage} data-testid="replay">
+          {page ? (
+            <iframe
+              key={page}
+              ref={frame}
+              title="The episode in 3D"
+              src={page}
+              allow="fullscreen"
+              data-testid="replay-frame"
+              data-seconds={time ?? undefined}
+            />
+          ) : replay.error ? (
+            <QueryError error={replay.error} what="replay" retry={() => void replay.refetch()} />
+          ) : (
+            <Waiting subjects={subjects} />
+          )}
+        </div>
+        <section className={classes.charts} aria-label="Charts of the episode">
+          {replay.data && <ReplayCharts query={series} time={time} onSeek={seek} />}
+        </section>
+      </div>
+      {replay.data && <Ends replay={replay.data} onSeek={seek} />}
+      <Group justify="space-between" align="flex-end" mt="sm" gap="sm">
+        <BesideSelect of={of} chosen={others} onChoose={setOthers} />
+        <Group gap="xs" ml="auto">
+          <Step label="Previous" to={order[place - 1]} onReplay={onReplay} />
+          <Step label="Next" to={place < 0 ? undefined : order[place + 1]} onReplay={onReplay} />
+          {page && (
+            <>
+              <Button
+                variant="default"
+                size="xs"
+                leftSection={<IconMaximize size={14} />}
+                onClick={() => void stage.current?.requestFullscreen()}
+              >
+                Full screen
+              </Button>
+              <Button
+                component="a"
+                href={`${page}?download`}
+                download
+                variant="default"
+                size="xs"
+                leftSection={<IconDownload size={14} />}
+                title="One file that plays in any browser, without Mapless"
+              >
+                Download
+              </Button>
+              <Button
+                component="a"
+                href={`/api/replays/${subjects}/${episode}/mcap`}
+                download
+                variant="default"
+                size="xs"
+                leftSection={<IconDownload size={14} />}
+                title="Scans, odometry, commands and transforms as ROS 2 messages, for Foxglove and ROS"
+              >
+                MCAP
+              </Button>
+            </>
+          )}
+        </Group>
+      </Group>
+    </Modal>
+  )
+}
+
+/** How far the evaluations are driven once more. */
+function Waiting({ subjects }: { subjects: string }) {
+  const { data } = $api.useQuery(
+    'get',
+    '/api/replays/{subjects}/progress',
+    { params: { path: { subjects } } },
+    { refetchInterval: ASK_MS, retry: false },
+  )
+  const many = (data?.policies ?? 1) > 1
+  return (
+    <div className={classes.waiting} role="status">
+      <Progress value={100 * (data?.share ?? 0)} w={220} aria-label="Driven again" />
+      {many
+        ? `Driving ${data?.policies} evaluations once more: ${data?.ready} are there.`
+        : 'Driving the evaluation once more. The first replay of a policy takes a few seconds, all others come at once.'}
+    </div>
+  )
+}
+
+/** How it ended for each of them; a press shows the moment. */
+function Ends({ replay, onSeek }: { replay: EpisodeReplay; onSeek: (seconds: number) => void }) {
+  const alone = replay.policies.length === 1
+  return (
+    <Group gap="md" mt="sm" data-testid="replay-ends">
+      {replay.policies.map((policy, place) => {
+        const { label, color } = OUTCOMES[policy.outcome]
+        return (
+          <UnstyledButton
+            key={policy.of}
+            className={classes.end}
+            title="Show this moment"
+            onClick={() => onSeek(policy.seconds)}
+          >
+            {!alone && (
+              <>
+                <i style={{ background: policy.colour }} />
+                <b>{letter(place)}</b>
+                <span className={classes.who}>{policy.title}</span>
+              </>
+            )}
+            <i style={{ background: color }} />
+            {label} at {policy.seconds.toFixed(1)} s
+            <span className={classes.quiet}>
+              {count(policy.steps)} steps{alone && `, on ${replay.suite}`}
+            </span>
+          </UnstyledButton>
+        )
+      })}
+      {replay.policies.some(({ faithful }) => !faithful) && (
+        <Text size="sm" c="yellow" role="alert">
+          Driven again here, it ended otherwise than recorded.
+        </Text>
+      )}
+    </Group>
+  )
+}
+
+interface BesideSelectProps {
+  of: string
+  chosen: readonly string[]
+  onChoose: (others: string[]) => void
+}
+
+/** Who else is shown in the same place. */
+function BesideSelect({ of, chosen, onChoose }: BesideSelectProps) {
+  const { data } = $api.useQuery(
+    'get',
+    '/api/replays/{subjects}/beside',
+    { params: { path: { subjects: of } } },
+    { retry: false },
+  )
+  const items = data?.items ?? []
+  const unknown = chosen.filter((each) => !items.some((item) => item.of === each))
+  return (
+    <MultiSelect
+      size="xs"
+      w={{ base: '100%', sm: 420 }}
+      label="Beside, in the same place"
+      placeholder={
+        chosen.length > 0
+          ? undefined
+          : data && items.length === 0
+            ? 'Nobody else was measured here'
+            : 'Choose a policy'
+      }
+      searchable
+      clearable
+      hidePickedOptions
+      maxValues={MAX_BESIDE}
+      maxDropdownHeight={260}
+      nothingFoundMessage="Nobody else was measured on this suite"
+      value={[...chosen]}
+      onChange={onChoose}
+      data={[
+        ...items.map((item) => ({ value: item.of, label: `${item.title}, ${percent(item.success)}` })),
+        ...unknown.map((each) => ({ value: each, label: each })),
+      ]}
+    />
+  )
+}
+
+interface StepProps {
+  label: string
+  to: number | undefined
+  onReplay: (episode: number) => void
+}
+
+/** On to a neighbour in the list. */
+function Step({ label, to, onReplay }: StepProps) {
+  return (
+    <Button
+      variant="default"
+      size="xs"
+      disabled={to === undefined}
+      onClick={() => to !== undefined && onReplay(to)}
+    >
+      {label}
+    </Button>
+  )
+}
