@@ -11,6 +11,7 @@ import { lineColor } from './palette'
 import { type ChartData, type Line, lastValue, valueAt } from './series'
 
 const HEIGHT = 220
+const STRIP = 150
 const AXIS_FONT = '11px system-ui, sans-serif'
 const THIN_ALPHA = 0.38
 const BAND_ALPHA = 0.14
@@ -84,7 +85,13 @@ export function Chart({
     if (!element) return
     const made = new uPlot(
       {
-        ...appearance(dark, format, xTitle, xFormat === count ? compact : xFormat),
+        // A strip among others says below what x is, where it reads its values.
+        ...appearance(
+          dark,
+          format,
+          height < STRIP ? undefined : xTitle,
+          xFormat === count ? compact : xFormat,
+        ),
         ...seriesOf(lines.current, dark),
         width: element.clientWidth,
         height,
@@ -297,7 +304,7 @@ function withAlpha(hex: string, alpha: number): string {
 function appearance(
   dark: boolean,
   format: (value: number) => string,
-  xTitle: string,
+  xTitle: string | undefined,
   xFormat: (value: number) => string,
 ): Pick<uPlot.Options, 'axes' | 'padding'> {
   const ink = dark ? '#97a1a9' : '#5d6870'
@@ -310,7 +317,7 @@ function appearance(
         ...axis,
         size: 26,
         gap: 6,
-        label: xTitle,
+        ...(xTitle === undefined ? {} : { label: xTitle }),
         labelFont: AXIS_FONT,
         labelSize: 16,
         labelGap: 0,

@@ -1,14 +1,5 @@
 /** An episode over the page: in 3D, beside its charts and beside what others did in the same place; to seek, to take away. */
-import {
-  Button,
-  Group,
-  Modal,
-  MultiSelect,
-  Progress,
-  Text,
-  UnstyledButton,
-  useComputedColorScheme,
-} from '@mantine/core'
+import { Button, Group, Modal, MultiSelect, Progress, Text, useComputedColorScheme } from '@mantine/core'
 import { useRef } from 'react'
 import { $api } from '../../api/client'
 import type { EpisodeReplay } from '../../api/types'
@@ -152,9 +143,11 @@ function Ends({ replay, onSeek }: { replay: EpisodeReplay; onSeek: (seconds: num
       {replay.policies.map((policy, place) => {
         const { label, color } = OUTCOMES[policy.outcome]
         return (
-          <UnstyledButton
+          <Button
             key={policy.of}
-            className={classes.end}
+            variant="default"
+            size="compact-sm"
+            classNames={{ label: classes.end ?? '' }}
             title="Show this moment"
             onClick={() => onSeek(policy.seconds)}
           >
@@ -170,7 +163,7 @@ function Ends({ replay, onSeek }: { replay: EpisodeReplay; onSeek: (seconds: num
             <span className={classes.quiet}>
               {count(policy.steps)} steps{alone && `, on ${replay.suite}`}
             </span>
-          </UnstyledButton>
+          </Button>
         )
       })}
       {replay.policies.some(({ faithful }) => !faithful) && (
