@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query
 from fastapi.responses import StreamingResponse
 
-from server.checkpoints.schemas import CheckpointPage, Episodes
+from server.checkpoints.schemas import CheckpointPage, CheckpointSteps, Episodes
 from server.checkpoints.service import CheckpointService, Rest
 from server.paging import WindowDep
 from server.problems import NOT_FOUND, Responses
@@ -34,6 +34,12 @@ def list_checkpoints(
 ) -> CheckpointPage:
     """The run's checkpoints, the newest first."""
     return service.of_run(run_id, window, step)
+
+
+@router.get("/api/runs/{run_id}/checkpoints/steps", responses=NOT_FOUND, dependencies=[view("run_id")])
+def list_checkpoint_steps(run_id: str, service: CheckpointServiceDep) -> CheckpointSteps:
+    """The way of a run by its checkpoints, the oldest first."""
+    return service.steps(run_id)
 
 
 @router.get(

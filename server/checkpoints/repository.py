@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -17,6 +18,16 @@ from server.paging import Window
 from workers.reporting import EpisodeResult, EvaluationResult
 
 _EPISODES = TypeAdapter(tuple[EpisodeResult, ...])
+
+
+@dataclass(frozen=True)
+class Step:
+    """A checkpoint in a line: its id and step, the hash of the suite that it was measured on, and the share that arrived."""
+
+    id: str
+    step: int
+    suite_hash: str | None
+    success: float | None
 
 
 class CheckpointRepository:
@@ -100,6 +111,19 @@ class CheckpointRepository:
             .offset(window.offset)
         )
         return [(checkpoint, evaluation) for checkpoint, evaluation in self._session.execute(query)], total
+
+    def steps(self, run_id: str) -> list[Step]:
+        """The run's whole checkpoints in the order of their steps, without what is heavy."""
+        checkpoint, evaluation = tables.Checkpoint, tables.Evaluation
+        query = (
+            select(checkpoint.id, checkpoint.step, evaluation.suite_hash, evaluation.arrivals, evaluation.episode_count)
+            .outerjoin(evaluation, evaluation.checkpoint_id == checkpoint.id)
+            .where(checkpoint.run_id == run_id, checkpoint.damaged_at.is_(None))
+            .order_by(checkpoint.step, checkpoint.created_at)
+        )
+        return [
+            Step(row[0], row[1], row[2], None if row[4] is None else row[3] / row[4]) for row in self._session.execute(query)
+        ]
 
     def best(self, run_id: str) -> tuple[tables.Checkpoint, tables.Evaluation] | None:
         """The run's whole checkpoint with the highest success rate; of equal ones the quickest, then the newest."""

@@ -38,6 +38,21 @@ class CheckpointPage(Page[Checkpoint]):
     best: Checkpoint | None = Field(description="The best of all of them; null before the first evaluation.")
 
 
+class CheckpointStep(Schema):
+    """A checkpoint on the way of its run."""
+
+    id: str
+    step: int
+    success: float | None = Field(description="Share of its evaluation's episodes that arrived; null where it has none.")
+
+
+class CheckpointSteps(Schema):
+    """The way of a run by its checkpoints, the oldest first."""
+
+    items: list[CheckpointStep] = Field(description="Of many, some evenly apart, the first and the last among them.")
+    total: int
+
+
 class Episodes(Schema):
     """Every episode of a checkpoint's evaluation, in the suite's order."""
 

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from server.audit.repository import AuditRepository
 from server.checkpoints import views
 from server.checkpoints.repository import CheckpointRepository, decode_episodes
-from server.checkpoints.schemas import CheckpointPage, Episodes
+from server.checkpoints.schemas import CheckpointPage, CheckpointStep, CheckpointSteps, Episodes
+from server.checkpoints.spread import spread
 from server.file_names import slug
 from server.paging import Window
 from server.runs.repository import RunRepository
 from server.services import Services
+
+MOST_STEPS = 200
+"""Checkpoints on the way of a run: as many as one can tell apart by hand."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,20 @@ class CheckpointService:
                 total=total,
                 best=views.checkpoint_view(*best, best=True) if best else None,
             )
+
+    def steps(self, run_id: str) -> CheckpointSteps:
+        """The way of a run by its checkpoints, `MOST_STEPS` of them at most.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._services.database.read() as session:
+            RunRepository(session).get(run_id)
+            steps = CheckpointRepository(session).steps(run_id)
+        return CheckpointSteps(
+            items=[CheckpointStep(id=each.id, step=each.step, success=each.success) for each in spread(steps, MOST_STEPS)],
+            total=len(steps),
+        )
 
     def episodes(self, checkpoint_id: str) -> Episodes:
         """Every episode behind the checkpoint's figures.

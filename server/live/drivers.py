@@ -110,6 +110,8 @@ class PolicyDrivers:
         """
         driver = self._drivers.get(subject)
         if driver is None or driver.ended:
+            if self._full(subject) is not None:
+                self._end_one_unwatched()
             if (reason := self._full(subject)) is not None:
                 raise TooManyViewsError(reason)
             driver = self._drivers[subject] = _Driver(subject, driven.player)
@@ -169,6 +171,12 @@ class PolicyDrivers:
         if sum(not other.ended for other in self._drivers.values()) < self._capacity:
             return None
         return f"{self._capacity} finished policies are watched already. Close one of their pages, and this one drives."
+
+    def _end_one_unwatched(self) -> None:
+        """Who has looked away gives way to who looks: one slides along the checkpoints of a run."""
+        lingering = (driver for driver in self._drivers.values() if not driver.watchers and not driver.ended)
+        if (driver := next(lingering, None)) is not None:
+            self._end_if_unwatched(driver)
 
     def _end_if_unwatched(self, driver: _Driver) -> None:
         if not driver.watchers and self._drivers.get(driver.subject) is driver:

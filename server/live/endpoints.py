@@ -15,7 +15,7 @@ from server.live.bridge import PLAY, WATCH, bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
-from server.live.watched import Watched, policy_view, watched
+from server.live.watched import CHECKPOINT_PREFIX, Watched, checkpoint_view, policy_view, watched
 from server.problems import NOT_FOUND
 from server.scene.themes import Theme
 from server.security.permissions import SIGNED_IN, view
@@ -42,8 +42,13 @@ async def _watched_policy(name: str, services: ServicesDep) -> Watched:
     return await run_in_threadpool(watched, services, policy_view(name))
 
 
+async def _watched_checkpoint(checkpoint_id: str, services: ServicesDep) -> Watched:
+    return await run_in_threadpool(watched, services, checkpoint_view(checkpoint_id))
+
+
 WatchedDep = Annotated[Watched, Depends(_watched)]
 WatchedPolicyDep = Annotated[Watched, Depends(_watched_policy)]
+WatchedCheckpointDep = Annotated[Watched, Depends(_watched_checkpoint)]
 
 
 @router.get("/api/runs/{run_id}/live", responses=NOT_FOUND, dependencies=[view("run_id")])
@@ -68,6 +73,19 @@ async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep) -> L
 @router.put("/api/policies/{name}/live", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 async def change_policy_live(subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
     """Change what the live view of a shipped policy shows, for everyone who watches it."""
+    services.live.configure(subject.id, settings)
+    return _state(subject, services)
+
+
+@router.get("/api/checkpoints/{checkpoint_id}/live", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
+async def get_checkpoint_live(subject: WatchedCheckpointDep, services: ServicesDep) -> LiveState:
+    """What the live view of a checkpoint shows."""
+    return _state(subject, services)
+
+
+@router.put("/api/checkpoints/{checkpoint_id}/live", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
+async def change_checkpoint_live(subject: WatchedCheckpointDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
+    """Change what the live view of a checkpoint shows, for everyone who watches it."""
     services.live.configure(subject.id, settings)
     return _state(subject, services)
 
@@ -137,6 +155,8 @@ async def _send_scores(websocket: WebSocket, subject: Watched, theme: Theme, ser
         score = services.live.score(subject.id, theme)
         if subject.driven is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
             score = score.model_copy(update={"refusal": refusal})
+        if subject.id.startswith(CHECKPOINT_PREFIX):
+            score = score.model_copy(update={"checkpoint": True})
         text = score.model_dump_json()
         if text != told:
             await websocket.send_text(text)

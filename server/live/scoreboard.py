@@ -31,6 +31,7 @@ class Score(BaseModel):
         step: environment steps of the training behind it.
         after_training: whether the policy is a finished one.
         playground: whether a person plays with it.
+        checkpoint: whether it is one that somebody chose among those of a run.
         speed: simulated seconds per wall second.
         arrivals, collisions, timeouts: attempts of the robots on screen that ended since the view began.
         robots: the first few, or the one that is followed.
@@ -42,6 +43,7 @@ class Score(BaseModel):
     step: int = 0
     after_training: bool = False
     playground: bool = False
+    checkpoint: bool = False
     speed: float = 1.0
     arrivals: int = 0
     collisions: int = 0

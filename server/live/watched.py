@@ -1,4 +1,4 @@
-"""What a live view may be of: a run, a policy that ships under 'policy-NAME', or a playground under 'play-ID'."""
+"""What a live view may be of: a run, a policy under 'policy-NAME' or 'checkpoint-ID', or a playground under 'play-ID'."""
 
 from dataclasses import dataclass
 
@@ -23,6 +23,15 @@ POLICY_PREFIX = "policy-"
 """Of what is no run: no run's id has a hyphen."""
 
 
+CHECKPOINT_PREFIX = "checkpoint-"
+"""Of one policy of a run."""
+
+
+def checkpoint_view(checkpoint_id: str) -> str:
+    """Under which the live view of a checkpoint goes."""
+    return f"{CHECKPOINT_PREFIX}{checkpoint_id}"
+
+
 def policy_view(name: str) -> str:
     """Under which the live view of a shipped policy goes."""
     return f"{POLICY_PREFIX}{name}"
@@ -30,7 +39,7 @@ def policy_view(name: str) -> str:
 
 @dataclass(frozen=True)
 class Watched:
-    """A run, a policy or a playground to look at.
+    """A run, a policy, a checkpoint or a playground to look at.
 
     Attributes:
         id: of its live view.
@@ -61,10 +70,14 @@ def watched(services: Services, identifier: str) -> Watched:
         driven = Driven(ViewJob(policy=ShippedPolicyName(name=name)), shipped_hash(name), policy.card.title)
         return Watched(identifier, task, driven)
     with services.database.read() as session:
-        run = RunRepository(session).get(identifier)
+        if identifier.startswith(CHECKPOINT_PREFIX):
+            best = CheckpointRepository(session).get(identifier.removeprefix(CHECKPOINT_PREFIX))
+            run = RunRepository(session).get(best.run_id)
+        else:
+            run = RunRepository(session).get(identifier)
+            best = _best(session, identifier) if run.state in FINISHED else None
         training, seed = training_of(run.experiment), run.seed
         title = f"{run.experiment.name}, seed {seed}"
-        best = _best(session, identifier) if run.state in FINISHED else None
     task = with_maps_of(with_geometry(training, services.arenas).task, seed)
     if best is None:
         return Watched(identifier, task, None)

@@ -10,10 +10,10 @@ from starlette.concurrency import run_in_threadpool
 
 from server.live.page import HEADERS
 from server.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
-from server.replays import repository, service
+from server.replays import lapse, repository, service
 from server.replays.recordings import progress_of, recording_of
 from server.replays.references import Reference, references
-from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, Replay, ReplayProgress
+from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, Lapse, Replay, ReplayProgress
 from server.replays.service import Part
 from server.replays.subject import Subject
 from server.replays.subjects import subject_of
@@ -60,6 +60,10 @@ class Replayed:
             for task in tasks:
                 task.cancel()
         return [Part(*each) for each in zip(self.references, subjects, recordings, strict=True)]
+
+    async def all(self) -> list[Part]:
+        """As `parts`, whichever episode it is about."""
+        return await self.parts(0)
 
     async def one(self, episode: int) -> Replay:
         """An episode of the first of them."""
@@ -148,6 +152,44 @@ async def replay_messages(replayed: ReplayedDep, episode: int, services: Service
     parts = await replayed.parts(episode)
     data = await services.lanes.replays.run(service.recorded_as_messages, parts, episode)
     return Response(data, media_type="application/octet-stream", headers=_attached(parts, episode, "mcap"))
+
+
+async def _of_a_run(run_id: str, services: ServicesDep) -> Replayed:
+    return Replayed(await run_in_threadpool(lapse.checkpoints_of, services, run_id), services)
+
+
+LapseDep = Annotated[Replayed, Depends(_of_a_run)]
+
+
+@router.get("/api/runs/{run_id}/lapse", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[view("run_id")])
+async def time_lapse(run_id: str, replayed: LapseDep) -> Lapse:
+    """A run's learning: the same scenarios, driven again by its checkpoints; some seconds for each that was not seen yet."""
+    parts = await replayed.all()
+    return lapse.described(run_id, [part.subject.step for part in parts], parts)
+
+
+@router.get("/api/runs/{run_id}/lapse/progress", responses=NOT_FOUND, dependencies=[view("run_id")])
+async def time_lapse_progress(replayed: LapseDep, services: ServicesDep) -> ReplayProgress:
+    """How far it is, while the time lapse itself is waited for."""
+    return await progress_of(services, await replayed.subjects())
+
+
+@router.get("/replays/lapses/{run_id}/{theme}/", include_in_schema=False, dependencies=[view("run_id")])
+async def play_time_lapse(
+    replayed: LapseDep, request: Request, run_id: str, theme: Theme, services: ServicesDep
+) -> Response:
+    """The player of a run's time lapse; see `play`."""
+    if request.query_params.keys() - {_DOWNLOAD}:
+        return RedirectResponse(request.url.path)
+    parts = await replayed.all()
+    steps = [part.subject.step for part in parts]
+    title = parts[-1].subject.title
+    headers = dict(HEADERS)
+    if _DOWNLOAD in request.query_params:
+        name = parts[-1].subject.file_name.removesuffix(".zip")
+        headers["Content-Disposition"] = f'attachment; filename="{name}-time-lapse.html"'
+    page = await services.lanes.replays.run(lapse.filmed, title, steps, parts, theme)
+    return HTMLResponse(page, headers=headers)
 
 
 @router.get("/replays/{subjects}/{episode}/{theme}/", include_in_schema=False, dependencies=[VIEW_REPLAYED])

@@ -18,10 +18,10 @@ from workers.frames import Frame
 from workers.replays.recording import Track
 from workers.reporting import EpisodeResult
 
-_FRAMES_PER_SECOND = 20.0
+FRAMES_PER_SECOND = 20.0
 # Of an episode that lasts longer than a minute, fewer pictures a second are kept.
 _MAX_FRAMES = 1_200
-_LAST_PICTURE_SECONDS = 1.5
+LAST_PICTURE_SECONDS = 1.5
 # Between two steps a ray that leaves one thing for another jumps; all others sweep.
 _SAME_THING = 0.4
 
@@ -56,9 +56,9 @@ def film(filmed: Sequence[Filmed], theme: Theme) -> bytes:
     """
     first, longest = filmed[0], max(filmed, key=lambda each: each.seconds)
     place = first.task.model_copy(update={"arena": ImportedArenaConfig.of(first.track.arena)})
-    times = np.linspace(0.0, longest.seconds, min(_MAX_FRAMES, round(longest.seconds * _FRAMES_PER_SECOND)) + 1)
-    movers = _movers(longest, times)
-    reels = [_frames(each, times, movers) for each in filmed]
+    times = np.linspace(0.0, longest.seconds, min(_MAX_FRAMES, round(longest.seconds * FRAMES_PER_SECOND)) + 1)
+    movers = movers_at(longest, times)
+    reels = [frames_at(each, times, movers) for each in filmed]
     server = start_viser()
     try:
         scene = Scene(server, place, theme)
@@ -80,8 +80,8 @@ def film(filmed: Sequence[Filmed], theme: Theme) -> bytes:
             for number, each in enumerate(filmed):
                 if number not in ended and each.seconds <= now + 1e-9:
                     ended.add(number)
-                    _mark_end(server.scene, each, number)
-        serializer.insert_sleep(_LAST_PICTURE_SECONDS)
+                    mark_end(server.scene, each, f"{number}")
+        serializer.insert_sleep(LAST_PICTURE_SECONDS)
         return serializer.serialize()
     finally:
         stop_viser(server)
@@ -94,14 +94,14 @@ def _between(filmed: Filmed, times: NDArray[np.float64]) -> tuple[NDArray[np.int
     return before, np.minimum(before + 1, last), moments - before
 
 
-def _movers(filmed: Filmed, times: NDArray[np.float64]) -> NDArray[np.float32]:
+def movers_at(filmed: Filmed, times: NDArray[np.float64]) -> NDArray[np.float32]:
     """(T, movers, 3) what moves at each of these times, seconds."""
     before, after, share = _between(filmed, times)
     movers = filmed.track.movers
     return (movers[before] + share[:, None, None] * (movers[after] - movers[before])).astype(np.float32)
 
 
-def _frames(filmed: Filmed, times: NDArray[np.float64], movers: NDArray[np.float32]) -> list[Frame]:
+def frames_at(filmed: Filmed, times: NDArray[np.float64], movers: NDArray[np.float32]) -> list[Frame]:
     """What to draw at each of these times, seconds: between two recorded moments; a robot that has ended stands."""
     track = filmed.track
     before, after, share = _between(filmed, times)
@@ -143,12 +143,12 @@ def _draw_path(scene: viser.SceneApi, poses: NDArray[np.float32], number: int, t
     )
 
 
-def _mark_end(scene: viser.SceneApi, filmed: Filmed, number: int) -> None:
+def mark_end(scene: viser.SceneApi, filmed: Filmed, name: str) -> viser.MeshHandle:
     """A ring around the robot in the outcome's colour."""
     pose = filmed.track.poses[-1]
     mesh = ring(0.75 * _END_RADIUS, _END_RADIUS, corners=48)
-    scene.add_mesh_simple(
-        f"/world/ends/{number}",
+    return scene.add_mesh_simple(
+        f"/world/ends/{name}",
         mesh.vertices,
         mesh.faces,
         color=OUTCOMES[_OUTCOME_NUMBERS[filmed.result.outcome]],

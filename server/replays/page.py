@@ -2,6 +2,7 @@
 
 import base64
 import html
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +16,13 @@ _OUTCOMES = {"arrival": "Arrived", "collision": "Collided", "timeout": "Timed ou
 _UNFAITHFUL = "Driven again, it ended otherwise than recorded: this processor rounds otherwise."
 
 
-def replay_page(theme: Theme, recording: bytes, caption: "Caption") -> str:
+def replay_page(theme: Theme, recording: bytes, caption: str) -> str:
     """The page.
 
     Args:
         theme: light or dark, as the recording is.
         recording: a `.viser` file.
-        caption: what it shows.
+        caption: what it shows, as HTML.
     """
     data = base64.b64encode(recording).decode("ascii")
     dark = str(theme == "dark").lower()
@@ -30,7 +31,7 @@ def replay_page(theme: Theme, recording: bytes, caption: "Caption") -> str:
         # By these names viser's client finds a recording that comes along with its page.
         f'<script>window.__VISER_EMBED_DATA__="{data}";window.__VISER_EMBED_CONFIG__={{darkMode:{dark}}};</script>'
     )
-    return viser_page(theme, head, caption.html())
+    return viser_page(theme, head, caption)
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,34 @@ class Caption:
                 f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {steps:,} steps, {driver.seconds:.1f} s</div>',
                 "" if driver.faithful else f'<div class="note">{_UNFAITHFUL}</div>',
             ]
+        return f'<div id="display">{"".join(lines)}</div>'
+
+
+@dataclass(frozen=True)
+class LapseCaption:
+    """What a time lapse shows.
+
+    Attributes:
+        title: of the run.
+        suite: its name.
+        scenarios: robots in the picture.
+        chapters: when each begins, seconds, and what it shows.
+    """
+
+    title: str
+    suite: str
+    scenarios: int
+    chapters: Sequence[tuple[float, str]]
+
+    def html(self) -> str:
+        """The caption over the picture; its last line follows the time."""
+        chapters = html.escape(json.dumps(self.chapters))
+        lines = (
+            '<div class="title"><span class="mode">Time lapse</span>',
+            f"<span>{self.scenarios} scenarios of {html.escape(self.suite)}</span></div>",
+            f'<div class="step">{html.escape(self.title)}</div>',
+            f'<div class="chapter" data-chapters="{chapters}">{html.escape(self.chapters[0][1])}</div>',
+        )
         return f'<div id="display">{"".join(lines)}</div>'
 
 

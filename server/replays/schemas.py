@@ -81,6 +81,23 @@ class ReplayProgress(Schema):
     share: float = Field(description="Of the work, 0 to 1.")
 
 
+class LapseChapter(Schema):
+    """What one checkpoint of a time lapse does."""
+
+    step: int
+    success: float = Field(description="Share of all the suite's episodes that arrived.")
+    begins: float = Field(description="Seconds after the time lapse's start.")
+
+
+class Lapse(Schema):
+    """The same scenarios by one checkpoint of a run after another."""
+
+    suite: str
+    scenarios: int = Field(description="Robots in the picture.")
+    page: str = Field(description=_PAGE)
+    chapters: list[LapseChapter] = Field(description="Eight at most, the oldest first.")
+
+
 class Beside(Schema):
     """Somebody else who drove the same scenarios."""
 

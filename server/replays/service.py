@@ -106,7 +106,7 @@ def filmed(parts: Sequence[Part], episode: int, theme: Theme) -> str:
     reels = [
         Filmed(part.recording.track(episode), result, part.subject.task) for part, result in zip(parts, results, strict=True)
     ]
-    return replay_page(theme, film(reels, theme), Caption(parts[0].subject.recorded.suite, episode, drivers))
+    return replay_page(theme, film(reels, theme), Caption(parts[0].subject.recorded.suite, episode, drivers).html())
 
 
 def recorded_as_messages(parts: Sequence[Part], episode: int) -> bytes:

@@ -20,6 +20,7 @@ class Subject:
         suite: which one, as a worker finds it.
         recorded: how its episodes ended when they counted.
         policy: where a worker gets it from.
+        step: of its training; 0 where that is not a checkpoint's.
     """
 
     title: str
@@ -29,6 +30,7 @@ class Subject:
     suite: SuiteChoice
     recorded: EvaluationResult
     policy: AnyPolicy
+    step: int = 0
 
     @property
     def identity(self) -> str:

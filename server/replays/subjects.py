@@ -43,7 +43,14 @@ def checkpoint_subject(services: Services, checkpoint_id: str) -> Subject:
         training = training_of(run.experiment)
     archive = CheckpointService(services).described(checkpoint_id)
     return Subject(
-        title, archive.file_name, training.task, archive.sha256, OWN_SUITE, recorded, CheckpointPolicy(id=checkpoint_id)
+        title=title,
+        file_name=archive.file_name,
+        task=training.task,
+        sha256=archive.sha256,
+        suite=OWN_SUITE,
+        recorded=recorded,
+        policy=CheckpointPolicy(id=checkpoint_id),
+        step=checkpoint.step,
     )
 
 

@@ -15,7 +15,7 @@ from starlette.requests import HTTPConnection
 
 from server.database.tables import Role
 from server.errors import ForbiddenError, NotFoundError, ServiceError, UnauthorizedError
-from server.live.watched import POLICY_PREFIX
+from server.live.watched import CHECKPOINT_PREFIX, POLICY_PREFIX
 from server.playground.registry import PLAY_PREFIX
 from server.projects.repository import ProjectRepository
 from server.replays.references import references
@@ -180,6 +180,11 @@ class InProject(Permission):
         given = connection.path_params.get(self._parameter)
         if given is not None and given.startswith(PLAY_PREFIX):
             services.playgrounds.of(given, principal)
+            return
+        if given is not None and given.startswith(CHECKPOINT_PREFIX):
+            if principal.everywhere != "admin":
+                one = [given.removeprefix(CHECKPOINT_PREFIX)]
+                await run_in_threadpool(_CHECKED["checkpoint"].look, principal, one, services)
             return
         # Nothing to look up for who may do everything, which is everybody on a laptop.
         if principal.everywhere == "admin":

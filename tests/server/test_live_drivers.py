@@ -90,6 +90,34 @@ def test_the_best_policy_of_a_finished_run_drives(
     wait_until(lambda: views(client) == ["cancelled"])
 
 
+def test_any_checkpoint_of_a_run_drives_while_others_train(
+    client: TestClient, services: Services, reports: Reports, view_worker: None
+) -> None:
+    run = finished_run(reports, services, {4096: RECORDED, 8192: None})
+    reports.state(run, "running")
+    way = client.get(f"/api/runs/{run['id']}/checkpoints/steps").json()
+    arrived = sum(episode.outcome == "arrival" for episode in RECORDED.episodes) / len(RECORDED.episodes)
+    assert [(each["step"], each["success"]) for each in way["items"]] == [(4096, arrived), (8192, None)]
+    first = way["items"][0]["id"]
+    wanted = client.get(f"/api/checkpoints/{first}/live").json() | {"robots": 2}
+    del wanted["status"]
+    assert client.put(f"/api/checkpoints/{first}/live", json=wanted).json()["robots"] == 2
+    score = live_score(client, f"checkpoint-{first}")
+    assert (score["checkpoint"], len(score["robots"])) == (True, 2)
+    # What others watch of the run is as it was.
+    assert client.get(f"/api/runs/{run['id']}/live").json()["robots"] == 8
+    assert client.get("/live/checkpoint-nothing/light/").status_code == 404
+
+
+def test_who_slides_along_the_checkpoints_takes_no_place_twice(
+    client: TestClient, services: Services, reports: Reports, view_worker: None
+) -> None:
+    services.drivers = PolicyDrivers(services.live, capacity=1, linger=60.0)
+    run = finished_run(reports, services, {4096: RECORDED, 8192: None})
+    for each in client.get(f"/api/runs/{run['id']}/checkpoints/steps").json()["items"]:
+        assert live_score(client, f"checkpoint-{each['id']}")["checkpoint"]
+
+
 def test_a_policy_that_ships_drives(client: TestClient, services: Services, view_worker: None) -> None:
     wanted = client.get("/api/policies/simple/live").json() | {"robots": 3}
     del wanted["status"]

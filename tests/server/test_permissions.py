@@ -104,6 +104,12 @@ TABLE = {
         GET /api/runs/{run_id}/metrics
         GET /api/runs/{run_id}/diagnoses
         GET /api/runs/{run_id}/checkpoints
+        GET /api/runs/{run_id}/checkpoints/steps
+        GET /api/runs/{run_id}/lapse
+        GET /api/runs/{run_id}/lapse/progress
+        GET /replays/lapses/{run_id}/{theme}/
+        GET /api/checkpoints/{checkpoint_id}/live
+        PUT /api/checkpoints/{checkpoint_id}/live
         GET /api/runs/{run_id}/lineage
         GET /api/experiments/{experiment_id}/lineage
         GET /api/runs/{run_id}/live

@@ -327,3 +327,44 @@ def test_recordings_that_nobody_looked_at_go_first(client: TestClient, checkpoin
     # The bound is a byte: only the newest stays, whatever its size.
     assert not (kept / "old.npz").exists()
     assert len(list(kept.iterdir())) == 1
+
+
+def test_a_time_lapse_shows_the_same_scenarios_at_every_checkpoint(
+    client: TestClient, services: Services, kept: Path
+) -> None:
+    services.results = ResultStore(kept, max_bytes=2**30)
+    first = store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
+    with services.database.write() as session:
+        run_id = CheckpointRepository(session).get(first).run_id
+        for number in range(1, 12):
+
+            async def blocks() -> AsyncIterator[bytes]:
+                yield POLICY.archive.read_bytes()
+
+            file = asyncio.run(services.files.write(os.urandom(8).hex(), blocks()))
+            CheckpointRepository(session).add(run_id, 81_920 + 1_000 * number, file, RECORDED)
+    lapse = client.get(f"/api/runs/{run_id}/lapse").json()
+    steps = [chapter["step"] for chapter in lapse["chapters"]]
+    assert (len(steps), steps[0], steps[-1], lapse["scenarios"]) == (8, 81_920, 92_920, 8)
+    assert client.get(f"/api/runs/{run_id}/lapse/progress").json() == {"ready": 8, "policies": 8, "share": 1.0}
+    page = client.get(f"{lapse['page']}light/")
+    assert page.status_code == 200
+    assert "Step 92,920" in page.text
+    content = recording_in(page.text)
+    last = lapse["chapters"][-1]["begins"]
+    assert last < content["durationSeconds"] <= last + 8.0  # type: ignore[operator]
+    messages = content["messages"]
+    marked = {message["name"]: at for at, message in messages if message.get("name", "").startswith("/world/ends/7-")}  # type: ignore[attr-defined]
+    assert len(marked) == 8
+    assert min(marked.values()) >= last
+    removed = [at for at, message in messages if message["type"] == "RemoveSceneNodeMessage"]  # type: ignore[attr-defined]
+    assert len(removed) == 7 * 8
+
+
+def test_a_run_without_a_measured_checkpoint_has_no_time_lapse(client: TestClient, services: Services) -> None:
+    checkpoint = store_checkpoint(client, services, b"archive", None)
+    with services.database.read() as session:
+        run_id = CheckpointRepository(session).get(checkpoint).run_id
+    response = client.get(f"/api/runs/{run_id}/lapse")
+    assert response.status_code == 404
+    assert "nothing to look back at" in response.json()["detail"]

@@ -18,7 +18,7 @@ addEventListener("DOMContentLoaded", () => {
   };
 
   const name = (score) =>
-    score.playground ? "Playground" : score.after_training ? "Best policy" : score.mode === "policy" ? "Policy" : "Training";
+    score.checkpoint ? "Checkpoint" : score.playground ? "Playground" : score.after_training ? "Best policy" : score.mode === "policy" ? "Policy" : "Training";
 
   const draw = (score) => {
     const parts = [];
@@ -51,7 +51,7 @@ addEventListener("DOMContentLoaded", () => {
         parts.push(line);
       }
     } else {
-      const starting = score.playground ? "Starting the policy …" : score.after_training ? "Starting the best policy …" : waiting[score.state];
+      const starting = score.playground || score.checkpoint ? "Starting the policy …" : score.after_training ? "Starting the best policy …" : waiting[score.state];
       parts.push(element("div", "waiting", score.refusal ?? starting));
     }
     display.dataset.state = score.state;

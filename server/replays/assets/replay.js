@@ -11,7 +11,21 @@ addEventListener("DOMContentLoaded", () => {
     seconds?.setAttribute("aria-label", "Seconds");
     speed?.setAttribute("aria-label", "Speed");
     observer.disconnect();
-    if (parent !== window) share(slider.querySelector("[role=slider]"), seconds);
+    const time = slider.querySelector("[role=slider]");
+    const chapter = document.querySelector("[data-chapters]");
+    if (chapter) follow(time, chapter);
+    if (parent !== window) share(time, seconds);
+  };
+  // A time lapse says which checkpoint drives.
+  const follow = (time, chapter) => {
+    const chapters = JSON.parse(chapter.dataset.chapters);
+    const write = () => {
+      const shown = Number(time.getAttribute("aria-valuenow"));
+      const text = chapters.findLast(([begins]) => begins <= shown + 1e-6)?.[1] ?? "";
+      if (chapter.textContent !== text) chapter.textContent = text;
+      requestAnimationFrame(write);
+    };
+    requestAnimationFrame(write);
   };
   // Inside Mapless' own page: it hears which moment is shown, and asks for others. The player itself can do neither.
   const share = (time, field) => {

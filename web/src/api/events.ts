@@ -59,6 +59,7 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   // Diagnoses read whole curves: while a run goes on, they are asked for at their own pace.
   if (path === '/api/runs/{run_id}/diagnoses') return ofRun && change.kind !== 'metrics'
   if (path === '/api/runs/{run_id}/checkpoints') return ofRun && change.kind !== 'metrics'
+  if (path === '/api/runs/{run_id}/checkpoints/steps') return ofRun && change.kind === 'checkpoint'
   return false
 }
 

@@ -464,6 +464,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/checkpoints/{checkpoint_id}/live": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Checkpoint Live
+         * @description What the live view of a checkpoint shows.
+         */
+        get: operations["get_checkpoint_live_api_checkpoints__checkpoint_id__live_get"];
+        /**
+         * Change Checkpoint Live
+         * @description Change what the live view of a checkpoint shows, for everyone who watches it.
+         */
+        put: operations["change_checkpoint_live_api_checkpoints__checkpoint_id__live_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/checkpoints/{checkpoint_id}/replays/{episode}": {
         parameters: {
             query?: never;
@@ -1917,6 +1941,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run_id}/checkpoints/steps": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Checkpoint Steps
+         * @description The way of a run by its checkpoints, the oldest first.
+         */
+        get: operations["list_checkpoint_steps_api_runs__run_id__checkpoints_steps_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run_id}/diagnoses": {
         parameters: {
             query?: never;
@@ -1991,6 +2035,46 @@ export interface paths {
          * @description Let a run that waits have the next turn.
          */
         post: operations["move_to_front_api_runs__run_id__front_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/lapse": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Time Lapse
+         * @description A run's learning: the same scenarios, driven again by its checkpoints; some seconds for each that was not seen yet.
+         */
+        get: operations["time_lapse_api_runs__run_id__lapse_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run_id}/lapse/progress": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Time Lapse Progress
+         * @description How far it is, while the time lapse itself is waited for.
+         */
+        get: operations["time_lapse_progress_api_runs__run_id__lapse_progress_get"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -4125,6 +4209,34 @@ export interface components {
              * @enum {string}
              */
             source: "checkpoint";
+        };
+        /**
+         * CheckpointStep
+         * @description A checkpoint on the way of its run.
+         */
+        CheckpointStep: {
+            /** Id */
+            id: string;
+            /** Step */
+            step: number;
+            /**
+             * Success
+             * @description Share of its evaluation's episodes that arrived; null where it has none.
+             */
+            success: number | null;
+        };
+        /**
+         * CheckpointSteps
+         * @description The way of a run by its checkpoints, the oldest first.
+         */
+        CheckpointSteps: {
+            /**
+             * Items
+             * @description Of many, some evenly apart, the first and the last among them.
+             */
+            items: components["schemas"]["CheckpointStep"][];
+            /** Total */
+            total: number;
         };
         /**
          * Child
@@ -6492,6 +6604,47 @@ export interface components {
         KnownKeys: {
             /** Items */
             items: components["schemas"]["KnownKey"][];
+        };
+        /**
+         * Lapse
+         * @description The same scenarios by one checkpoint of a run after another.
+         */
+        Lapse: {
+            /**
+             * Chapters
+             * @description Eight at most, the oldest first.
+             */
+            chapters: components["schemas"]["LapseChapter"][];
+            /**
+             * Page
+             * @description Path of the player; append `light/` or `dark/`, and `?download` to take it away.
+             */
+            page: string;
+            /**
+             * Scenarios
+             * @description Robots in the picture.
+             */
+            scenarios: number;
+            /** Suite */
+            suite: string;
+        };
+        /**
+         * LapseChapter
+         * @description What one checkpoint of a time lapse does.
+         */
+        LapseChapter: {
+            /**
+             * Begins
+             * @description Seconds after the time lapse's start.
+             */
+            begins: number;
+            /** Step */
+            step: number;
+            /**
+             * Success
+             * @description Share of all the suite's episodes that arrived.
+             */
+            success: number;
         };
         /**
          * Leaderboard
@@ -13472,6 +13625,108 @@ export interface operations {
             };
         };
     };
+    get_checkpoint_live_api_checkpoints__checkpoint_id__live_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                checkpoint_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveState"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_checkpoint_live_api_checkpoints__checkpoint_id__live_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                checkpoint_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LiveSettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveState"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     replay_checkpoint_api_checkpoints__checkpoint_id__replays__episode__get: {
         parameters: {
             query?: never;
@@ -17883,6 +18138,55 @@ export interface operations {
             };
         };
     };
+    list_checkpoint_steps_api_runs__run_id__checkpoints_steps_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CheckpointSteps"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     get_diagnoses_api_runs__run_id__diagnoses_get: {
         parameters: {
             query?: never;
@@ -18083,6 +18387,122 @@ export interface operations {
             };
             /** @description Not in this state */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    time_lapse_api_runs__run_id__lapse_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Lapse"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    time_lapse_progress_api_runs__run_id__lapse_progress_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReplayProgress"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

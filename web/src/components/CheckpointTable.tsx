@@ -15,9 +15,10 @@ interface CheckpointTableProps {
   /** Whose episodes are shown. */
   chosen: Checkpoint | undefined
   onChoose: (checkpoint: Checkpoint) => void
+  onWatch: (checkpoint: Checkpoint) => void
 }
 
-export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTableProps) {
+export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: CheckpointTableProps) {
   if (checkpoints.length === 0) {
     return (
       <Message title="No checkpoint yet">
@@ -117,6 +118,14 @@ export function CheckpointTable({ checkpoints, chosen, onChoose }: CheckpointTab
                   className={classes.buttons}
                   display={checkpoint.damaged ? 'none' : undefined}
                 >
+                  <Button
+                    size="compact-sm"
+                    variant="default"
+                    aria-label={`Watch step ${checkpoint.step}`}
+                    onClick={() => onWatch(checkpoint)}
+                  >
+                    Watch
+                  </Button>
                   {checkpoint.evaluation && (
                     <Button
                       size="compact-sm"

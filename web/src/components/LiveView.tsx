@@ -15,6 +15,7 @@ import { type ReactNode, type RefObject, useEffect, useRef, useState } from 'rea
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
+import { count } from '../lib/format'
 import { IconMaximize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
 
@@ -37,9 +38,19 @@ interface RunLiveViewProps {
   kept: boolean | undefined
   /** Whether something else in 3D lies over the page: two pictures at once would share one machine. */
   covered: boolean
+  /** The checkpoint that drives in its place; null for the run itself. */
+  checkpoint: { id: string; step: number } | null
 }
 
-export function RunLiveView({ runId, state, kept, covered }: RunLiveViewProps) {
+export function RunLiveView({ checkpoint, ...run }: RunLiveViewProps) {
+  return checkpoint ? (
+    <CheckpointLiveView key={checkpoint.id} checkpoint={checkpoint} covered={run.covered} />
+  ) : (
+    <OwnLiveView {...run} />
+  )
+}
+
+function OwnLiveView({ runId, state, kept, covered }: Omit<RunLiveViewProps, 'checkpoint'>) {
   const watching = useWatching() && !covered
   const training = state === 'running' || state === 'stopping'
   const driven = !training && state !== 'queued' && kept === true
@@ -74,6 +85,28 @@ export function RunLiveView({ runId, state, kept, covered }: RunLiveViewProps) {
   )
 }
 
+/** A policy that a run once had. */
+function CheckpointLiveView({
+  checkpoint,
+  covered,
+}: {
+  checkpoint: { id: string; step: number }
+  covered: boolean
+}) {
+  const watching = useWatching() && !covered
+  const { live, change } = useCheckpointLive(checkpoint.id, watching)
+  return (
+    <LiveView
+      page={watching ? `/live/checkpoint-${checkpoint.id}/` : null}
+      overlay={live ? null : 'Connecting …'}
+      live={live}
+      change={change}
+      driven
+      said={`The policy of step ${count(checkpoint.step)}.`}
+    />
+  )
+}
+
 export function PolicyLiveView({ name, covered }: { name: string; covered: boolean }) {
   const watching = useWatching() && !covered
   const { live, change } = usePolicyLive(name, watching)
@@ -95,12 +128,12 @@ interface LiveViewProps extends LiveControlsProps {
   overlay: ReactNode
 }
 
-function LiveView({ page, overlay, live, change, driven }: LiveViewProps) {
+function LiveView({ page, overlay, ...controls }: LiveViewProps) {
   const whole = useRef<HTMLDivElement>(null)
   return (
     <div ref={whole} className={classes.whole}>
-      <LiveFrame page={page} overlay={overlay} receiving={live?.status.receiving ?? false} whole={whole} />
-      <LiveControls live={live} change={change} driven={driven} />
+      <LiveFrame page={page} overlay={overlay} receiving={controls.live?.status.receiving ?? false} whole={whole} />
+      <LiveControls {...controls} />
     </div>
   )
 }
@@ -182,6 +215,21 @@ function useRunLive(runId: string, enabled: boolean) {
   }
 }
 
+/** The same of one of its checkpoints. */
+function useCheckpointLive(id: string, enabled: boolean) {
+  const client = useQueryClient()
+  const init = { params: { path: { checkpoint_id: id } } }
+  const options = $api.queryOptions('get', '/api/checkpoints/{checkpoint_id}/live', init)
+  const { data } = useQuery({ ...options, enabled, refetchInterval })
+  const put = $api.useMutation('put', '/api/checkpoints/{checkpoint_id}/live', {
+    onSettled: () => client.invalidateQueries({ queryKey: options.queryKey }),
+  })
+  return {
+    live: data,
+    change: changing(client, options.queryKey, data, (body) => put.mutate({ ...init, body })),
+  }
+}
+
 /** The same of a policy that ships. */
 function usePolicyLive(name: string, enabled: boolean) {
   const client = useQueryClient()
@@ -239,9 +287,11 @@ interface LiveControlsProps {
   change: Change
   /** Whether a finished policy drives, and no training is there to be shown. */
   driven: boolean
+  /** What is seen, where it is something else than usual. */
+  said?: string
 }
 
-function LiveControls({ live, change, driven }: LiveControlsProps) {
+function LiveControls({ live, change, driven, said }: LiveControlsProps) {
   const off = !live
   const mode = driven ? 'policy' : (live?.mode ?? 'policy')
   const robots = live?.robots ?? 8
@@ -320,7 +370,7 @@ function LiveControls({ live, change, driven }: LiveControlsProps) {
         />
       </Group>
       <Text size="xs" c="dimmed" mt={6}>
-        {driven ? 'The best policy, after training, in real time or faster.' : DESCRIPTIONS[mode]}
+        {said ?? (driven ? 'The best policy, after training, in real time or faster.' : DESCRIPTIONS[mode])}
       </Text>
     </fieldset>
   )

@@ -52,6 +52,78 @@ const routes = {
   'GET /api/experiments/exp1': experiment,
 }
 
+const way = {
+  items: [
+    { id: 'cp1', step: 50_000, success: null },
+    { id: 'cp2', step: 100_000, success: 0.885 },
+  ],
+  total: 2,
+}
+
+test('any checkpoint is watched: from its row, by the slider, by a link', async () => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/checkpoints/steps': way,
+    'GET /api/checkpoints/cp1/live': live,
+    'GET /api/checkpoints/cp2/live': live,
+  })
+  const { user, router } = open('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Watch step 50000' }))
+  expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/checkpoint-cp1/')
+  expect(router.state.location.search).toBe('?watch=50000')
+  expect(await screen.findByText(/The policy of step 50\s000/)).toBeInTheDocument()
+  const slider = screen.getByRole('slider', { name: 'Watch it at a checkpoint' })
+  slider.focus()
+  await user.keyboard('{ArrowRight}')
+  expect(screen.getByTestId('learning')).toHaveTextContent(/Step 100\s000, 88\.5\s% arrive/)
+  await waitFor(() =>
+    expect(screen.getByTitle('The robots in 3D')).toHaveAttribute('src', '/live/checkpoint-cp2/'),
+  )
+  slider.focus()
+  await user.keyboard('{ArrowRight}')
+  await waitFor(() => expect(screen.getByTitle('The robots in 3D')).toHaveAttribute('src', '/live/run1/'))
+  expect(router.state.location.search).toBe('')
+})
+
+test('a time lapse says which checkpoint drives, and how far it is while it is made', async () => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/checkpoints/steps': way,
+    'GET /api/runs/run1/lapse': () => new Promise<object>(() => {}),
+    'GET /api/runs/run1/lapse/progress': { ready: 1, policies: 2, share: 0.6 },
+  })
+  const { user } = open('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Time lapse' }))
+  const dialog = await screen.findByRole('dialog', { name: 'Time lapse' })
+  expect(await within(dialog).findByText('Driving 2 evaluations once more: 1 are there.')).toBeInTheDocument()
+  await user.keyboard('{Escape}')
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+})
+
+test('a link to a time lapse opens it', async () => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/checkpoints/steps': way,
+    'GET /api/runs/run1/lapse': {
+      suite: 'simple-200',
+      scenarios: 8,
+      page: '/replays/lapses/run1/',
+      chapters: [
+        { step: 50_000, success: 0.1, begins: 0 },
+        { step: 100_000, success: 0.885, begins: 7.5 },
+      ],
+    },
+  })
+  open('/runs/run1?lapse=1')
+  expect(await screen.findByTitle("The run's learning in 3D")).toHaveAttribute(
+    'src',
+    '/replays/lapses/run1/light/',
+  )
+  expect(screen.getByRole('button', { name: /50\s000: 10\.0\s%/ })).toBeInTheDocument()
+  // Two pictures at once would share one machine.
+  expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
+})
+
 test("the run's own data are exported on its page", async () => {
   startServer(routes)
   const { user } = open('/runs/run1')

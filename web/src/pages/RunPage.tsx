@@ -18,11 +18,13 @@ import { Diagnoses } from '../components/Diagnoses'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { WaitsForExtensions } from '../components/Extensions'
 import { IconCopy, IconDownload, IconPlayerPlay, IconPlayerStop } from '../components/icons'
+import { LearningSlider } from '../components/LearningSlider'
 import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
 import { RunLog } from '../components/RunLog'
-import { canResume, canStop } from '../components/states'
+import { LapseDialog } from '../components/replay/LapseDialog'
+import { canResume, canStop, isActive } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { useArenaTitle } from '../components/useArenaTitle'
@@ -78,12 +80,25 @@ function LoadedRun({ run }: { run: RunDetail }) {
     { placeholderData: keepPreviousData },
   )
   const [step, setStep] = useNumberInAddress('step')
+  const [watched, setWatched] = useNumberInAddress('watch')
+  const [lapse, setLapse] = useNumberInAddress('lapse')
+  const steps = $api.useQuery('get', '/api/runs/{run_id}/checkpoints/steps', init, {
+    placeholderData: keepPreviousData,
+  })
+  const way = steps.data?.items ?? []
+  // Of very many, the slider has some only; a row of the table may be any.
+  const shown = [...way, ...(checkpoints.data?.items ?? [])].find((each) => each.step === watched) ?? null
   const [episode] = useReplayInAddress()
   const episodes = useRef<HTMLDivElement>(null)
+  const view = useRef<HTMLDivElement>(null)
   const chosen = useChosen(run.id, checkpoints.data, step)
   const choose = (checkpoint: Checkpoint) => {
     setStep(checkpoint.step)
     episodes.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
+  }
+  const watch = (checkpoint: Checkpoint) => {
+    setWatched(checkpoint.step)
+    view.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
   }
   const series = metrics.data?.series ?? []
   const waiting =
@@ -123,13 +138,24 @@ function LoadedRun({ run }: { run: RunDetail }) {
         <UnreadableSettings names={run.unreadable} lacking={run.lacking} />
         <div className={classes.stage}>
           <Panel flush>
+            <div ref={view} className={classes.episodes} />
             <RunLiveView
               key={run.id}
               runId={run.id}
               state={run.state}
               kept={checkpoints.data && checkpoints.data.total > 0}
-              covered={episode !== null && chosen?.evaluation != null}
+              covered={lapse !== null || (episode !== null && chosen?.evaluation != null)}
+              checkpoint={shown}
             />
+            {way.length > 0 && (
+              <LearningSlider
+                steps={way}
+                chosen={shown}
+                onChoose={setWatched}
+                own={!isActive(run.state) ? 'The best policy of the run' : 'What the run does now'}
+                onLapse={way.some(({ success }) => success !== null) ? () => setLapse(1) : undefined}
+              />
+            )}
           </Panel>
           <Panel data-testid="main-curves">
             <Stack gap="md">
@@ -163,7 +189,12 @@ function LoadedRun({ run }: { run: RunDetail }) {
         <Panel title="Checkpoints" flush>
           {checkpoints.data ? (
             <>
-              <CheckpointTable checkpoints={bestFirst(checkpoints.data)} chosen={chosen} onChoose={choose} />
+              <CheckpointTable
+                checkpoints={bestFirst(checkpoints.data)}
+                chosen={chosen}
+                onChoose={choose}
+                onWatch={watch}
+              />
               <Pager
                 page={page}
                 size={CHECKPOINTS_A_PAGE}
@@ -188,6 +219,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
         )}
         <RunLog runId={run.id} state={run.state} />
       </Stack>
+      {lapse !== null && <LapseDialog runId={run.id} onClose={() => setLapse(null)} />}
     </Page>
   )
 }

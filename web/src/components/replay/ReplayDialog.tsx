@@ -1,5 +1,5 @@
 /** An episode over the page: in 3D, beside its charts and beside what others did in the same place; to seek, to take away. */
-import { Button, Group, Modal, MultiSelect, Progress, Text, useComputedColorScheme } from '@mantine/core'
+import { Button, Group, Modal, MultiSelect, Text, useComputedColorScheme } from '@mantine/core'
 import { useRef } from 'react'
 import { $api } from '../../api/client'
 import type { EpisodeReplay } from '../../api/types'
@@ -12,6 +12,7 @@ import classes from './Replay.module.css'
 import { ReplayCharts } from './ReplayCharts'
 import { letter } from './strips'
 import { usePlayer } from './usePlayer'
+import { Waiting } from './Waiting'
 
 /** Nothing of an evaluation ever changes. */
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY, retry: false }
@@ -43,6 +44,12 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
     { params: { path } },
     { ...FOR_GOOD, enabled: replay.data !== undefined },
   )
+  const progress = $api.useQuery(
+    'get',
+    '/api/replays/{subjects}/progress',
+    { params: { path: { subjects } } },
+    { enabled: replay.isFetching, refetchInterval: ASK_MS, retry: false },
+  )
   const page = replay.data && `${replay.data.page}${dark ? 'dark' : 'light'}/`
   const { time, seek } = usePlayer(frame, page)
   const place = order.indexOf(episode)
@@ -63,7 +70,7 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
           ) : replay.error ? (
             <QueryError error={replay.error} what="replay" retry={() => void replay.refetch()} />
           ) : (
-            <Waiting subjects={subjects} />
+            <Waiting progress={progress.data} />
           )}
         </div>
         <section className={classes.charts} aria-label="Charts of the episode">
@@ -113,25 +120,6 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
         </Group>
       </Group>
     </Modal>
-  )
-}
-
-/** How far the evaluations are driven once more. */
-function Waiting({ subjects }: { subjects: string }) {
-  const { data } = $api.useQuery(
-    'get',
-    '/api/replays/{subjects}/progress',
-    { params: { path: { subjects } } },
-    { refetchInterval: ASK_MS, retry: false },
-  )
-  const many = (data?.policies ?? 1) > 1
-  return (
-    <div className={classes.waiting} role="status">
-      <Progress value={100 * (data?.share ?? 0)} w={220} aria-label="Driven again" />
-      {many
-        ? `Driving ${data?.policies} evaluations once more: ${data?.ready} are there.`
-        : 'Driving the evaluation once more. The first replay of a policy takes a few seconds, all others come at once.'}
-    </div>
   )
 }
 
