@@ -10,6 +10,7 @@ worker                                            server
   | POST  /jobs/{id}/frames      frames          ---> |  of a view, each after its length; answered as a report
   | POST  /jobs/{id}/seen        PlaySeen        ---> |  of a playground; answered as a report
   | PUT   /jobs/{id}/result      the file's bytes ---> |
+  | PUT   /jobs/{id}/recording   the file's bytes ---> |  of an evaluation: so that nobody waits for its replays
   | POST  /jobs/{id}/end         JobEnd          ---> |
 """
 

@@ -107,6 +107,11 @@ class PolicyEvaluationRepository:
             evaluation.ways = packed(measurement)
             evaluation.error = None
 
+    def measured_by(self, job_id: str) -> str | None:
+        """Id of an evaluation whose figures came out of a job; None where it is gone."""
+        row = tables.PolicyEvaluation
+        return self._session.scalars(select(row.id).where(row.job_id == job_id, row.suite.is_not(None))).first()
+
     def given_up(self, job_id: str, reason: str) -> None:
         """There will be no figures."""
         self._session.execute(

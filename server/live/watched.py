@@ -71,8 +71,8 @@ def watched(services: Services, identifier: str) -> Watched:
         return Watched(identifier, task, driven)
     with services.database.read() as session:
         if identifier.startswith(CHECKPOINT_PREFIX):
-            best = CheckpointRepository(session).get(identifier.removeprefix(CHECKPOINT_PREFIX))
-            run = RunRepository(session).get(best.run_id)
+            chosen = CheckpointRepository(session).get(identifier.removeprefix(CHECKPOINT_PREFIX))
+            run, best = RunRepository(session).get(chosen.run_id), chosen
         else:
             run = RunRepository(session).get(identifier)
             best = _best(session, identifier) if run.state in FINISHED else None

@@ -5,6 +5,9 @@ import contextlib
 import hashlib
 import sys
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
@@ -14,6 +17,7 @@ from pydantic import ValidationError
 from server.errors import CorruptUploadError, NotFoundError, TooLargeError
 from server.jobs.names import result_name
 from server.jobs.service import JobService
+from server.replays.ahead import key_of_evaluation
 from server.security.permissions import WORK
 from server.services import Services, ServicesDep
 from server.worker_api.errors import MalformedUploadError
@@ -33,6 +37,7 @@ def _service(services: ServicesDep) -> JobService:
 
 JobServiceDep = Annotated[JobService, Depends(_service)]
 AttemptQuery = Annotated[int, Query(ge=1, le=MAX_INTEGER)]
+Sha256Query = Annotated[str, Query(pattern="^[0-9a-f]{64}$")]
 RevisionQuery = Annotated[int, Query(ge=-1, le=MAX_INTEGER)]
 """Of a playground's orders: the newest that the worker has."""
 
@@ -131,16 +136,41 @@ def _orders(services: Services, job_id: str, revision: int, frames: bytes | None
 # The store has a cap of its own.
 @router.put("/{job_id}/result", status_code=204, max_body_size=sys.maxsize, dependencies=[WORK])
 async def put_result(
-    job_id: str,
-    attempt: AttemptQuery,
-    sha256: Annotated[str, Query(pattern="^[0-9a-f]{64}$")],
-    request: Request,
-    service: JobServiceDep,
-    services: ServicesDep,
+    job_id: str, attempt: AttemptQuery, sha256: Sha256Query, request: Request, service: JobServiceDep, services: ServicesDep
 ) -> None:
     """What came out of a job; refused where it is not what its checksum says."""
     lane = services.lanes.jobs
     job = await lane.run(service.current, job_id, attempt)
+    async with _arrived(services, request, sha256) as torn:
+        if job.kind == "evaluate":
+            await lane.run(_keep_evaluation, services, job_id, attempt, torn.read_bytes())
+        else:
+            await lane.run(service.current, job_id, attempt)
+            await lane.run(services.results.keep, torn, result_name(job.kind, job.key))
+
+
+@router.put("/{job_id}/recording", status_code=204, max_body_size=sys.maxsize, dependencies=[WORK])
+async def put_recording(
+    job_id: str, attempt: AttemptQuery, sha256: Sha256Query, request: Request, service: JobServiceDep, services: ServicesDep
+) -> None:
+    """What the robots of an evaluation did, once its result is known; refused where it is not what its checksum says."""
+    lane = services.lanes.jobs
+    await lane.run(service.current, job_id, attempt)
+    async with _arrived(services, request, sha256) as torn:
+        await lane.run(service.current, job_id, attempt)
+        if (key := await lane.run(key_of_evaluation, services, job_id)) is not None:
+            await lane.run(services.results.keep, torn, result_name("replay", key))
+
+
+@asynccontextmanager
+async def _arrived(services: Services, request: Request, sha256: str) -> AsyncIterator[Path]:
+    """The file that a request brings, as long as the block lasts.
+
+    Raises:
+        TooLargeError: it is larger than may be.
+        CorruptUploadError: it is not what its checksum says.
+    """
+    lane = services.lanes.jobs
     torn = await lane.run(services.results.begin)
     try:
         digest, size = hashlib.sha256(), 0
@@ -153,11 +183,7 @@ async def put_result(
                 await lane.run(file.write, block)
         if digest.hexdigest() != sha256:
             raise CorruptUploadError("What arrived does not have the SHA-256 that was announced: send it again.")
-        if job.kind == "evaluate":
-            await lane.run(_keep_evaluation, services, job_id, attempt, torn.read_bytes())
-        else:
-            await lane.run(service.current, job_id, attempt)
-            await lane.run(services.results.keep, torn, result_name(job.kind, job.key))
+        yield torn
     finally:
         torn.unlink(missing_ok=True)
 

@@ -232,6 +232,7 @@ TABLE = {
         POST /api/worker/jobs/{job_id}/frames
         POST /api/worker/jobs/{job_id}/seen
         PUT /api/worker/jobs/{job_id}/result
+        PUT /api/worker/jobs/{job_id}/recording
         POST /api/worker/jobs/{job_id}/end
     """,
     "scrape": """

@@ -352,7 +352,7 @@ def test_a_time_lapse_shows_the_same_scenarios_at_every_checkpoint(
     assert "Step 92,920" in page.text
     content = recording_in(page.text)
     last = lapse["chapters"][-1]["begins"]
-    assert last < content["durationSeconds"] <= last + 8.0  # type: ignore[operator]
+    assert last < content["durationSeconds"] <= last + 8.0
     messages = content["messages"]
     marked = {message["name"]: at for at, message in messages if message.get("name", "").startswith("/world/ends/7-")}  # type: ignore[attr-defined]
     assert len(marked) == 8

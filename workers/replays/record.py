@@ -17,10 +17,10 @@ from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.suites import Observer, Suite
 from sim.world import World
 from workers.errors import EpisodesTooLongError
-from workers.job_protocol import OWN_SUITE, AnyPolicy, SuiteChoice
+from workers.job_protocol import OWN_SUITE, AnyPolicy, EvaluateJob, Measurement, SuiteChoice
 from workers.replays.recording import Recording
 from workers.training.evaluation import to_result
-from workers.training.measuring import Driven, DrivenShare, Progress, drive
+from workers.training.measuring import Driven, DrivenShare, Measuring, Progress, drive
 
 MAX_MOMENT_NUMBERS = 2**27
 """Numbers of all moments together: a quarter of a gigabyte in memory, 200 episodes of 20,000 steps with 30 rays."""
@@ -144,3 +144,39 @@ def record(
 
     driven = drive(archive, policy, choice, observer)
     return kept[0].recording(driven)
+
+
+def measure_and_record(archive: Path | None, job: EvaluateJob, progress: Progress) -> tuple[Measurement, Recording | None]:
+    """An evaluation together with what its robots did, so that nobody waits to look at an episode.
+
+    Args:
+        archive: of the policy; None for a baseline.
+        job: which policy, on which suite.
+        progress: told the share of the scenarios that have ended, 0 to 1.
+
+    Returns:
+        What came of it, and every episode; None where they would not fit into memory.
+
+    Raises:
+        ArchiveError: the archive is not one that this release reads.
+        SuiteError: there is no such suite, or the robot has no room in it.
+    """
+    measuring = Measuring(progress)
+    kept: list[Moments] = []
+
+    def observer(suite: Suite, task: TaskConfig) -> Observer:
+        kept.append(Moments(task))
+        measured = measuring.observer(suite, task)
+
+        def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
+            measured(under_way, world, actions)
+            for moments in kept:
+                try:
+                    moments(under_way, world, actions)
+                except EpisodesTooLongError:
+                    kept.clear()
+
+        return look
+
+    driven = drive(archive, job.policy, job.suite, observer)
+    return measuring.measurement(driven), kept[0].recording(driven) if kept else None

@@ -91,6 +91,43 @@ def drive(
         torch.set_flush_denormal(False)
 
 
+class Measuring:
+    """Sums up what a drive comes to.
+
+    Args:
+        progress: told the share of the scenarios that have ended, 0 to 1.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._ways: _Ways | None = None
+
+    def observer(self, suite: Suite, task: TaskConfig) -> Observer:
+        """Looks on; see `drive`."""
+        ways = self._ways = _Ways(suite, task)
+        told = DrivenShare(suite, task, self._progress)
+
+        def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
+            ways.look(under_way, world)
+            told(under_way, world, actions)
+
+        return look
+
+    def measurement(self, driven: Driven) -> Measurement:
+        """What came of the drive that was looked on at."""
+        assert self._ways is not None
+        suite = driven.suite
+        return Measurement(
+            result=to_result(driven.table, suite),
+            task=driven.task,
+            arenas=tuple(to_document(arena) for arena in suite.arenas),
+            arena_indices=tuple(suite.arena_indices.tolist()),
+            targets=tuple((round(float(x), 3), round(float(y), 3)) for x, y in suite.targets),
+            ways=tuple(self._ways.ways()),
+            jerks=tuple(round(float(jerk), 4) for jerk in self._ways.jerks()),
+        )
+
+
 def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> Measurement:
     """Drives every scenario of a suite once, and says what came of it.
 
@@ -103,29 +140,8 @@ def measure(archive: Path | None, job: EvaluateJob, progress: Progress) -> Measu
         ArchiveError: the archive is not one that this release reads.
         SuiteError: there is no such suite, or the robot has no room in it.
     """
-    ways: list[_Ways] = []
-
-    def observer(suite: Suite, task: TaskConfig) -> Observer:
-        ways.append(_Ways(suite, task))
-        told = DrivenShare(suite, task, progress)
-
-        def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
-            ways[0].look(under_way, world)
-            told(under_way, world, actions)
-
-        return look
-
-    driven = drive(archive, job.policy, job.suite, observer)
-    suite = driven.suite
-    return Measurement(
-        result=to_result(driven.table, suite),
-        task=driven.task,
-        arenas=tuple(to_document(arena) for arena in suite.arenas),
-        arena_indices=tuple(suite.arena_indices.tolist()),
-        targets=tuple((round(float(x), 3), round(float(y), 3)) for x, y in suite.targets),
-        ways=tuple(ways[0].ways()),
-        jerks=tuple(round(float(jerk), 4) for jerk in ways[0].jerks()),
-    )
+    measuring = Measuring(progress)
+    return measuring.measurement(drive(archive, job.policy, job.suite, measuring.observer))
 
 
 def choose_suite(choice: SuiteChoice, task: TaskConfig) -> Suite:

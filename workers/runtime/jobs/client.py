@@ -63,9 +63,16 @@ class JobClient(ServerClient):
 
     def bring_result(self, job_id: str, attempt: int, path: Path) -> None:
         """What came out of the job."""
+        self._bring(job_id, "result", attempt, path)
+
+    def bring_recording(self, job_id: str, attempt: int, path: Path) -> None:
+        """What the robots of an evaluation did, after its result."""
+        self._bring(job_id, "recording", attempt, path)
+
+    def _bring(self, job_id: str, what: str, attempt: int, path: Path) -> None:
         with path.open("rb") as file:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-        self._job("PUT", job_id, "result", attempt, _blocks(path), sha256=sha256)
+        self._job("PUT", job_id, what, attempt, _blocks(path), sha256=sha256)
 
     def end_job(self, job_id: str, attempt: int, end: JobEnd) -> None:
         """The last word."""

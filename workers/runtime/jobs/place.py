@@ -26,7 +26,7 @@ from workers.job_protocol import (
 from workers.play_protocol import PlaySeen
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.jobs.client import JobClient
-from workers.runtime.jobs.process import ARCHIVE, RESULT, Done, Failed, Progressed, Said, main
+from workers.runtime.jobs.process import ARCHIVE, RECORDING, RESULT, Done, Failed, Progressed, Said, main
 from workers.runtime.jobs.pulse import REPORT_SECONDS, pulse
 
 logger = logging.getLogger(__name__)
@@ -156,6 +156,11 @@ class Place:
             result = directory / RESULT
             with pulse(self._client, claim, 1.0):
                 self._patiently(lambda: self._client.bring_result(claim.id, claim.attempt, result), claim.lease_seconds)
+            recording = directory / RECORDING
+            if recording.exists():
+                self._patiently(
+                    lambda: self._client.bring_recording(claim.id, claim.attempt, recording), claim.lease_seconds
+                )
         return end
 
     def _patiently(self, request: Callable[[], None], seconds: float) -> None:

@@ -23,7 +23,6 @@ from workers.job_protocol import (
     EvaluateJob,
     ExportJob,
     JobOrders,
-    Measurement,
     PlayJob,
     ReplayJob,
     ViewJob,
@@ -36,6 +35,9 @@ ARCHIVE = "checkpoint.zip"
 """In the job's folder: the policy's archive, where it has one."""
 RESULT = "result"
 """In the job's folder: what comes out of it."""
+
+RECORDING = "recording"
+"""Of an evaluation: what its robots did, where that is not too much."""
 
 _PROGRESS_SECONDS = 0.5
 
@@ -102,13 +104,12 @@ def _do(text: str, directory: Path, connection: "Connection[Said, JobOrders]") -
 
             result.write_bytes(bundle(export_checkpoint(archive)))
         case EvaluateJob():
-            result.write_text(_evaluate(spec, archive, connection).model_dump_json(), encoding="utf-8")
+            from workers.replays.record import measure_and_record
 
-
-def _evaluate(spec: EvaluateJob, archive: Path, connection: "Connection[Said, JobOrders]") -> Measurement:
-    from workers.training.measuring import measure
-
-    return measure(_archive_of(spec, archive), spec, _teller(connection))
+            measurement, recording = measure_and_record(_archive_of(spec, archive), spec, _teller(connection))
+            result.write_text(measurement.model_dump_json(), encoding="utf-8")
+            if recording is not None:
+                recording.save(directory / RECORDING)
 
 
 def _teller(connection: "Connection[Said, JobOrders]") -> Callable[[float], None]:
