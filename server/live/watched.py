@@ -72,7 +72,8 @@ def watched(services: Services, identifier: str) -> Watched:
     with services.database.read() as session:
         if identifier.startswith(CHECKPOINT_PREFIX):
             chosen = CheckpointRepository(session).get(identifier.removeprefix(CHECKPOINT_PREFIX))
-            run, best = RunRepository(session).get(chosen.run_id), chosen
+            run = RunRepository(session).get(chosen.run_id)
+            best: tables.Checkpoint | None = chosen
         else:
             run = RunRepository(session).get(identifier)
             best = _best(session, identifier) if run.state in FINISHED else None

@@ -43,7 +43,7 @@ def film_lapse(chapters: Sequence[Chapter], theme: Theme) -> bytes:
     try:
         scene = Scene(server, place, theme)
         CameraRig(server, scene.half_size)
-        scene.show_rays(visible=False)
+        scene.show_rays(visible=False, robot=None)
         reels = [_reel(chapter) for chapter in chapters]
         scene.update(reels[0][0], 0.0)
         serializer = server.get_scene_serializer()

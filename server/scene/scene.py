@@ -54,7 +54,7 @@ class Scene:
         """
         parent = f"{_WORLD}/beside{number}"
         robots = RobotNodes(self._server, parent, task, self._colours, frame, first=number)
-        robots.show_rays(visible=False)
+        robots.show_rays(visible=False, robot=None)
         return robots
 
     @property

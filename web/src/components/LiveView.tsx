@@ -132,7 +132,12 @@ function LiveView({ page, overlay, ...controls }: LiveViewProps) {
   const whole = useRef<HTMLDivElement>(null)
   return (
     <div ref={whole} className={classes.whole}>
-      <LiveFrame page={page} overlay={overlay} receiving={controls.live?.status.receiving ?? false} whole={whole} />
+      <LiveFrame
+        page={page}
+        overlay={overlay}
+        receiving={controls.live?.status.receiving ?? false}
+        whole={whole}
+      />
       <LiveControls {...controls} />
     </div>
   )
