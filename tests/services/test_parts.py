@@ -150,7 +150,8 @@ def test_what_tells_that_a_part_is_missing_is_what_that_part_brings() -> None:
 
     def modules(part: str) -> set[str]:
         names = (requirement.split("[")[0].split(">")[0].split("=")[0] for requirement in extras[part])
-        return {{"argon2-cffi": "argon2"}.get(name, name).replace("-", "_") for name in names}
+        imported = {"argon2-cffi": "argon2", "mcap-ros2-support": "mcap_ros2"}
+        return {imported.get(name, name).replace("-", "_") for name in names}
 
     server, worker = modules("server"), modules("worker")
     assert dict.fromkeys(server, "server") | dict.fromkeys(worker - server, "worker") == parts._MODULES
