@@ -55,8 +55,11 @@ export function ApiPage() {
       below={
         <Text size="sm" c="dimmed" mt={4} maw="80ch">
           Everything on these pages goes over HTTP, and so it does from a program. Send a token as{' '}
-          <Code>Authorization: Bearer …</Code>; <Link to="/account">your account</Link> makes one. The Python
-          client and the commands do that for you. Programs read the same from{' '}
+          <Code>Authorization: Bearer …</Code>;{' '}
+          <Anchor component={Link} to="/account" inherit>
+            your account
+          </Anchor>{' '}
+          makes one. The Python client and the commands do that for you. Programs read the same from{' '}
           <Anchor href={DESCRIPTION} inherit>
             openapi.json
           </Anchor>

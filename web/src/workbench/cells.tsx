@@ -30,7 +30,7 @@ const ALWAYS = new Set([
 export const askedFor = (columns: readonly string[]): string[] => columns.filter((key) => !ALWAYS.has(key))
 
 const WIDTHS: Record<string, number> = {
-  state: 170,
+  state: 196,
   success: 296,
   seeds: 64,
   arena: 110,
