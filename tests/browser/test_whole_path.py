@@ -90,11 +90,11 @@ def test_a_training_is_launched_watched_stopped_resumed_and_deleted(context: Bro
     # Stopped, the robots go on without the worker, by the best policy; resumed, the training goes on where it was.
     page.get_by_role("button", name="Stop").click()
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "stopped", timeout=SOON)
-    stopped_at = page.get_by_test_id("checkpoint").first.inner_text().split()[0]
+    kept = page.get_by_test_id("checkpoint").count()
     expect(frame.locator("#display")).to_contain_text("Best policy", timeout=SOON)
     page.get_by_role("button", name="Resume").click()
     expect(page.get_by_test_id("state").first).to_have_attribute("data-state", "running", timeout=SOON)
-    expect(page.get_by_test_id("checkpoint").first).not_to_contain_text(stopped_at, timeout=SOON)
+    expect(page.get_by_test_id("checkpoint").nth(kept)).to_be_visible(timeout=SOON)
     expect(page.get_by_test_id("events")).to_contain_text(re.compile("resum", re.IGNORECASE))
 
     page.get_by_role("link", name="Duplicate").click()
@@ -157,7 +157,7 @@ def test_two_trainings_run_to_their_end_and_are_compared(context: BrowserContext
     expect(page.get_by_test_id("chart").first).to_be_visible()
 
 
-def test_wrong_values_are_refused_next_to_their_field_by_the_server(context: BrowserContext) -> None:
+def test_wrong_values_are_refused_next_to_their_field(context: BrowserContext) -> None:
     page = open_form(context, "")
     set_steps(page, 3)
     page.get_by_role("button", name="Launch").click()
