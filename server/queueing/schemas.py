@@ -12,7 +12,7 @@ MAX_PRIORITY = 1_000_000
 EDITORS_PRIORITY = 100
 """An editor may give a run this much; more takes an administrator of the installation, whose queue it is."""
 
-WaitsFor = Literal["turn", "worker", "gpu", "extension", "other worker"] | Limit
+WaitsFor = Literal["turn", "worker", "gpu", "extension", "other worker", Limit]
 
 
 class WaitingRun(Schema):

@@ -12116,8 +12116,9 @@ export interface components {
             /**
              * Waits For
              * @description `turn`: a worker that could train it is there. Otherwise none is: no worker at all, none with a GPU, none with its extensions, none but those that have lost it again and again. `person limit`, `experiment limit`: as many runs of whoever launched it, or of its experiment, are under way as may be.
+             * @enum {string}
              */
-            waits_for: ("turn" | "worker" | "gpu" | "extension" | "other worker") | ("person limit" | "experiment limit");
+            waits_for: "turn" | "worker" | "gpu" | "extension" | "other worker" | "person limit" | "experiment limit";
         };
         /**
          * Walker
