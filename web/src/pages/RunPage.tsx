@@ -1,5 +1,5 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
-import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text } from '@mantine/core'
+import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text, VisuallyHidden } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo, useRef, useState } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
@@ -158,6 +158,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
             )}
           </Panel>
           <Panel data-testid="main-curves">
+            <VisuallyHidden component="h2">Main curves</VisuallyHidden>
             <Stack gap="md">
               {MAIN_CHARTS.map((spec) => (
                 <SpecChart key={spec.title} spec={spec} series={series} height={214} empty={waiting} />
