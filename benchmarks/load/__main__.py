@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar
@@ -62,7 +62,9 @@ def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -
             started.callback(postgres.close)
             postgres.start()
             for process in postgres.members():
-                process.cpu_affinity(others)
+                # Some end as soon as the database is up.
+                with suppress(psutil.NoSuchProcess):
+                    process.cpu_affinity(others)
             environment["MAPLESS_DATABASE_URL"] = postgres.url
         log = started.enter_context((directory / "server.log").open("ab"))
         server = subprocess.Popen(
