@@ -15,23 +15,11 @@ from sim.config import Frozen
 from sim.suites import EpisodeTable, Suite, run_controller
 from sim.suites.people import run_among_people
 from sim.suites.scores import barn_score
-from workers.shipped.field import FieldRow, Part
+from workers.shipped.field import FieldKey, FieldRow
 from workers.shipped.figures import worst_tenth
 from workers.training.evaluation import to_result
 
 _ARRIVAL, _COLLISION = 1, 2
-
-
-class Key(Frozen):
-    """Which candidate drove which suite, with what it saw."""
-
-    part: Part
-    suite: str
-    driver: str
-    policy: str | None
-    seed: int | None
-    rays: int
-    field_of_view: float
 
 
 class PieceResult(Frozen):
@@ -50,7 +38,7 @@ class PieceResult(Frozen):
         cpu: seconds of processor that it took.
     """
 
-    key: Key
+    key: FieldKey
     first: int
     hash: str
     outcomes: tuple[int, ...]
@@ -82,7 +70,7 @@ class Kept:
     def __iter__(self) -> Iterator[PieceResult]:
         return iter(self._results.values())
 
-    def get(self, key: Key, piece: Piece) -> PieceResult | None:
+    def get(self, key: FieldKey, piece: Piece) -> PieceResult | None:
         """What was kept of a piece of as many scenarios."""
         result = self._results.get((key, piece.first))
         return result if result and len(result.outcomes) == piece.count else None
@@ -94,10 +82,10 @@ class Kept:
             file.write(result.model_dump_json(exclude_defaults=True) + "\n")
 
 
-def key_of(candidate: Candidate, piece: Piece) -> Key:
+def key_of(candidate: Candidate, piece: Piece) -> FieldKey:
     """Who drives what."""
     lidar = candidate.task_under(rules_of(piece)).lidar
-    return Key(
+    return FieldKey(
         part=piece.part,
         suite=piece.suite,
         driver=candidate.name,
@@ -141,13 +129,13 @@ def drive(candidate: Candidate, piece: Piece) -> PieceResult:
 
 def rows(results: Iterator[PieceResult]) -> tuple[FieldRow, ...]:
     """The results of each candidate on each suite in one row."""
-    together: dict[Key, list[PieceResult]] = {}
+    together: dict[FieldKey, list[PieceResult]] = {}
     for result in results:
         together.setdefault(result.key, []).append(result)
     return tuple(_row(key, found) for key, found in together.items())
 
 
-def _row(key: Key, found: list[PieceResult]) -> FieldRow:
+def _row(key: FieldKey, found: list[PieceResult]) -> FieldRow:
     def joined(name: str) -> NDArray[np.floating[Any]]:
         return np.array([value for result in found for value in getattr(result, name)], dtype=np.float64)
 

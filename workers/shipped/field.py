@@ -14,8 +14,8 @@ FIELD = Path(__file__).parent / "field.json"
 Part = Literal["families", "barn", "people"]
 
 
-class FieldRow(Frozen):
-    """How one driver did on one suite; rates are shares of the episodes, 0 to 1.
+class FieldKey(Frozen):
+    """Which driver drove which suite, with what it saw.
 
     Attributes:
         part: of the matrix.
@@ -25,6 +25,21 @@ class FieldRow(Frozen):
         seed: of its training; None for a baseline.
         rays: of its scan.
         field_of_view: degrees of its scan.
+    """
+
+    part: Part
+    suite: str
+    driver: str
+    policy: str | None
+    seed: int | None
+    rays: int
+    field_of_view: float
+
+
+class FieldRow(FieldKey):
+    """How one driver did on one suite; rates are shares of the episodes, 0 to 1.
+
+    Attributes:
         episodes: how many stand behind the rest.
         arrivals: of these.
         collisions: of these.
@@ -38,13 +53,6 @@ class FieldRow(Frozen):
         detour: mean metres more that they walk for a metre of their routes; None where nobody walks.
     """
 
-    part: Part
-    suite: str
-    driver: str
-    policy: str | None
-    seed: int | None
-    rays: int
-    field_of_view: float
     episodes: int
     arrivals: int
     collisions: int
