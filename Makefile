@@ -46,7 +46,7 @@ endef
 .venv/.dev: requirements-dev.txt .venv/.run
 	$(call install,requirements-dev.txt)
 
-.venv/.kernels: $(wildcard sim/*.py sim/kernels/*.py workers/kernels/*.py workers/networks/*.py) .venv/.run
+.venv/.kernels: $(wildcard sim/*.py sim/engine/*.py sim/kernels/*.py workers/kernels/*.py workers/networks/*.py) .venv/.run
 	@echo "Compiling the simulator and the networks' passes ..."
 	@rm -rf sim/kernels/__pycache__ workers/kernels/__pycache__
 	@$(BIN)/python -m workers.precompile
@@ -87,7 +87,7 @@ format: .venv/.dev
 	$(BIN)/python web/build.py run format
 
 types: .venv/.dev
-	$(BIN)/python -m server.openapi web/openapi.json
+	$(BIN)/python -m server.written.openapi web/openapi.json
 	$(BIN)/python web/build.py run generate
 
 # The header that uv writes names the command, and nothing in these files names a host.
@@ -98,6 +98,7 @@ lock: .venv/bin/uv
 	$(LOCK) pyproject.toml -o requirements-base.txt -c requirements.txt
 	$(LOCK) pyproject.toml --extra server -o requirements-server.txt -c requirements.txt
 	$(LOCK) pyproject.toml --extra worker -o requirements-worker.txt -c requirements.txt
+	$(LOCK) pyproject.toml --extra server --extra s3 -o requirements-s3.txt -c requirements.txt
 	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["build"], sep="\n")' \
 	  | $(LOCK) - -o requirements-build.txt -c requirements.txt
 	$(LOCK) server/client/pyproject.toml --extra mcp -o server/client/requirements.txt -c requirements.txt

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
 from sim.config import LidarConfig, ObservationConfig, TaskConfig
+from sim.engine.shapes import pack_shapes
+from sim.engine.world import World
 from sim.kernels.sensing import clearance_at
-from sim.shapes import pack_shapes
 from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller
 from sim.suites.scenarios import scenario_world
-from sim.world import World
 
 Floats = NDArray[np.float32]
 
@@ -57,7 +57,7 @@ def search(
         pose: (3,) x, y, heading.
         target: (2,).
         index: of the arena.
-        bounds: of all arenas, `sim.shapes.pack_shapes`.
+        bounds: of all arenas, `sim.engine.shapes.pack_shapes`.
         circles: likewise.
         boxes: likewise.
         forecast: (steps, K, 3) x, y, radius of the movers after each step; a radius below zero is none.

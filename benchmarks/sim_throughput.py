@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from benchmarks.report import finish, parser
 from sim.arenas import Arena, Mover
 from sim.config import FormulaTerm, PathProgressTerm, ProximityTerm, RewardConfig, TaskConfig, TimeTerm, preset_terms
+from sim.engine.plain import PlainWorld
+from sim.engine.world import World
 from sim.kernels.commands import write_commands
 from sim.kernels.step import step_usual_robots
-from sim.plain import PlainWorld
-from sim.world import World
 
 TASK = TaskConfig()
 SIX_TERMS = RewardConfig(
@@ -103,7 +103,7 @@ def kernel_only(robots: int) -> Callable[[], None]:
 
 
 def plain() -> Callable[[], None]:
-    """One robot, one Space, public queries: `sim.plain`, with a reset when an attempt ends."""
+    """One robot, one Space, public queries: `sim.engine.plain`, with a reset when an attempt ends."""
     _, start = ours(1)
     rng = np.random.default_rng(0)
     world: PlainWorld | None = None

@@ -3,13 +3,12 @@
 import functools
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from typing import Any
 
 from fastapi import APIRouter, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import BaseRoute
 
-from server import pages
-from server.abandoned import AbandonedRequestsMiddleware
 from server.alerts import endpoints as alerts
 from server.alerts.sending import keep_alerting
 from server.arenas import endpoints as gallery
@@ -25,10 +24,15 @@ from server.diagnoses import endpoints as diagnoses
 from server.evaluations import endpoints as evaluations
 from server.events import endpoints as events
 from server.events.position import PositionMiddleware
+from server.examples import with_examples
 from server.experiments import endpoints as experiments
 from server.exports import endpoints as exports
 from server.field import endpoints as field
 from server.files import FileStore
+from server.http import pages
+from server.http.abandoned import AbandonedRequestsMiddleware
+from server.http.problems import UNAUTHORIZED, install_error_handlers
+from server.http.slow_clients import SlowClientMiddleware
 from server.jobs import endpoints as jobs
 from server.jobs.results import ResultStore
 from server.leaderboards import endpoints as leaderboards
@@ -44,7 +48,6 @@ from server.people.oidc import endpoints as oidc
 from server.playground import endpoints as playground
 from server.policies import endpoints as policies
 from server.printing import endpoints as printing
-from server.problems import UNAUTHORIZED, install_error_handlers
 from server.project_archives import endpoints as project_archives
 from server.projects import endpoints as projects
 from server.queueing import endpoints as queueing
@@ -60,11 +63,11 @@ from server.security.proxies import ClientAddressMiddleware
 from server.security.secrets import load_secrets
 from server.services import Services
 from server.settings import Settings
-from server.slow_clients import SlowClientMiddleware
 from server.storage import endpoints as storage
 from server.storage.sweep import keep_thinned
 from server.studies import endpoints as studies
 from server.studies.advance import keep_studying
+from server.suites import endpoints as suites
 from server.sweeper import dispatch
 from server.system import endpoints as system
 from server.system.readiness import ReadinessProbe
@@ -113,6 +116,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     evaluations.router,
     leaderboards.router,
     field.router,
+    suites.router,
     uploads.router,
     storage.router,
     monitoring.router,
@@ -198,6 +202,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     return app
 
 
+class _Application(FastAPI):
+    """Says of itself more than FastAPI finds out."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The description, with examples."""
+        return with_examples(super().openapi())
+
+
 def describe(
     lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]] | None = None, *, max_body_size: int | None = None
 ) -> FastAPI:
@@ -205,7 +217,7 @@ def describe(
 
     A route that takes more than `max_body_size` bytes, an upload, says so with a `max_body_size` of its own.
     """
-    app = FastAPI(
+    app = _Application(
         title="Mapless",
         version=version(),
         lifespan=lifespan,

@@ -83,7 +83,7 @@ def serve(host: Host = None, port: Port = None, data_dir: DataDir = None) -> Non
     # First of all, so that a wrong setting is answered before the server's imports are waited for.
     settings = _settings(host=host, port=port, data_dir=data_dir)
     from server.errors import ServiceError
-    from server.serve import serve as serve_until_interrupted
+    from server.processes.serve import serve as serve_until_interrupted
 
     try:
         serve_until_interrupted(settings, on_ready=lambda url: typer.echo(f"Mapless is at {url}"))
@@ -104,7 +104,7 @@ def up(
     """Start the server and its workers, and keep them running."""
     settings = _settings(host=host, port=port, data_dir=data_dir, workers=0 if no_workers else workers)
     from server.errors import ServiceError
-    from server.supervisor import Supervisor
+    from server.processes.supervisor import Supervisor
     from sim.parts import require
 
     if settings.workers != 0:

@@ -130,9 +130,7 @@ class FileStore:
         Raises:
             OSError: it is not there.
         """
-        self._filesystem.invalidate_cache()
-        if not self._filesystem.exists(self._root):
-            raise FileNotFoundError(f"There is no store at {self._root}.")
+        self._list()
 
     def probe(self) -> None:
         """Write, read and remove a small file.
@@ -164,7 +162,13 @@ class FileStore:
 
     def _list(self) -> list[str]:
         self._filesystem.invalidate_cache()
-        return cast("list[str]", self._filesystem.ls(self._root, detail=False))
+        try:
+            return cast("list[str]", self._filesystem.ls(self._root, detail=False))
+        except FileNotFoundError as error:
+            # Object stores have no empty folders: where the bucket is, nothing is in it yet.
+            if self._local or not self._filesystem.exists(self._root.lstrip("/").partition("/")[0]):
+                raise FileNotFoundError(f"There is no store at {self._root}.") from error
+            return []
 
     def _remove(self, path: str) -> None:
         if self._filesystem.exists(path):

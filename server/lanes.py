@@ -92,6 +92,8 @@ class Lanes:
     passwords: Lane = field(default_factory=lambda: Lane("sign-ins", threads=2, queue=16))
     sweeper: Lane = field(default_factory=lambda: Lane("sweeps", threads=1))
     imports: Lane = field(default_factory=lambda: Lane("imports", threads=2))
+    # Of arenas that are being drawn: 10 ms to a second of a core each.
+    reviews: Lane = field(default_factory=lambda: Lane("arenas to look over", threads=1, queue=8))
     # Of alerts: names are looked up and mail is sent there, each of which may take its time.
     alerts: Lane = field(default_factory=lambda: Lane("alerts", threads=4))
 
@@ -107,5 +109,6 @@ class Lanes:
             self.passwords,
             self.sweeper,
             self.imports,
+            self.reviews,
             self.alerts,
         )

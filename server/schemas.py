@@ -22,7 +22,7 @@ class Schema(BaseModel):
 
 
 class Page(Schema, Generic[Item]):
-    """Some of a list's items, in its order; `server.paging` says which."""
+    """Some of a list's items, in its order; `server.http.paging` says which."""
 
     items: list[Item]
     total: int = Field(description="How many there are on all pages.")

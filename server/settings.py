@@ -56,7 +56,8 @@ class Settings(BaseSettings):
         "mapless.", description="Of the queues' names: installations that share a broker need different ones."
     )
     files_url: str | None = Field(
-        None, description="Directory or fsspec URL of the checkpoints; in the data directory if not given."
+        None,
+        description="Directory or fsspec URL of the checkpoints, as s3://bucket/folder; in the data directory if not given.",
     )
 
     host: str = Field("127.0.0.1", description="Address to bind.")

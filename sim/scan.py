@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas import Arena
 from sim.config import AnyRobotConfig, LidarConfig
+from sim.engine.shapes import pack_shapes
 from sim.kernels.footprint import rectangle_clearances
 from sim.kernels.sensing import clearance_points, scan_poses
 from sim.lidar import drawn_ray_angles, padded, ray_origins
-from sim.shapes import pack_shapes
 
 
 def scan(

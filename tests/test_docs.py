@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.settings import Settings
-from server.settings_page import page
+from server.written.settings_page import page
 from workers.runtime.settings import WorkerSettings
 
 ROOT = Path(__file__).parents[1]
@@ -50,6 +50,6 @@ def test_every_claim_names_its_test(doc: str, head: str, least: int) -> None:
 def test_the_page_of_settings_says_what_the_code_says() -> None:
     text = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
 
-    assert text == page(), "python -m server.settings_page docs/settings.md"
+    assert text == page(), "python -m server.written.settings_page docs/settings.md"
     for model in (Settings, WorkerSettings):
         assert all(f"`MAPLESS_{name.upper()}`" in text for name in model.model_fields)

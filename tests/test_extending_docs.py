@@ -16,12 +16,12 @@ from sim.arenas import build_arenas
 from sim.arenas.families import generate_arena
 from sim.baselines.named import controller_of
 from sim.config import AddedArenaPool, AddedObservationPart, ObservationConfig, TaskConfig
+from sim.engine.rewards import constants, evaluate, parameters_of, program_of
+from sim.engine.world import World
 from sim.extending.control import drive, load_suite
 from sim.extending.discovery import complete, discover
 from sim.extending.expression import QUANTITIES
 from sim.observations import observation_layout
-from sim.rewards import constants, evaluate, parameters_of, program_of
-from sim.world import World
 from tests.workers.test_trainer import Recorder
 from workers.algorithms.added import build_added
 from workers.checkpoints import read_policy

@@ -2,21 +2,29 @@
 import react from '@vitejs/plugin-react'
 import { defineConfig } from 'vite'
 import { compressed } from './plugins/compressed'
-import { frameFirst } from './plugins/frame'
+import { mantineStyles } from './plugins/mantineStyles'
+import { pages } from './plugins/pages'
 
 const server = process.env.MAPLESS_SERVER_URL ?? 'http://127.0.0.1:8400'
 
 export default defineConfig({
-  plugins: [react(), frameFirst(), compressed()],
+  plugins: [mantineStyles(), react(), pages(), compressed()],
   build: {
     target: 'es2022',
-    // The vendors change seldom: a browser keeps them across releases.
+    // One sheet: of what it holds more than a page needs, less is lost than by a turn for each of a dozen.
+    cssCodeSplit: false,
     rolldownOptions: {
       output: {
+        assetFileNames: ({ names }) =>
+          `assets/${names[0]?.split('~')[0]?.replace('.css', '')}-[hash][extname]`,
+        // Their names would list every page that shares them.
+        chunkFileNames: ({ name }) => `assets/${name.split('~')[0]}-[hash].js`,
         codeSplitting: {
           groups: [
-            { name: 'react', test: /node_modules\/(react|react-dom|react-router|scheduler)\// },
+            // The vendors change seldom: a browser keeps them across releases.
+            { name: 'react', test: /node_modules\/(react|react-dom|scheduler)\// },
             { name: 'charts', test: /node_modules\/uplot\// },
+            { name: 'frame', tags: ['$initial'] },
           ],
         },
       },

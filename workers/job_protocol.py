@@ -113,9 +113,35 @@ class OwnSuite(Frozen):
     by: Literal["own"] = "own"
 
 
+MAX_SCENARIOS = 100
+"""Of a suite that people put together."""
+
+
+class ScenarioSuite(Frozen):
+    """A suite that people put together: the start and target of each of its arenas.
+
+    Attributes:
+        id: of the suite; all else the server puts in, whatever a request says.
+        name: that it has.
+        arenas: their hashes, as they were when the suite was asked for.
+        documents: these arenas, for the worker alone.
+    """
+
+    by: Literal["scenarios"] = "scenarios"
+    id: Identifier
+    name: str = Field("", max_length=40)
+    arenas: tuple[str, ...] = Field((), max_length=MAX_SCENARIOS)
+    documents: tuple[ArenaFile, ...] = Field((), max_length=MAX_SCENARIOS)
+
+    @property
+    def title(self) -> str:
+        """What its scores stand under; with how many scenarios, since more may come."""
+        return f"{self.name} ({len(self.arenas)})"
+
+
 OWN_SUITE = OwnSuite()
 
-SuiteChoice = Annotated[NamedSuite | ArenaSuite | OwnSuite, Field(discriminator="by")]
+SuiteChoice = Annotated[NamedSuite | ArenaSuite | ScenarioSuite | OwnSuite, Field(discriminator="by")]
 
 
 class ViewJob(Frozen):

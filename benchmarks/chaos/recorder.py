@@ -13,6 +13,7 @@ from typing import Any
 
 _INTERVAL_SECONDS = 0.02
 _SPOOL = "spool.jsonl"
+_KEPT = ".kept"
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Recorder:
 
     def keep(self, spool: Path) -> None:
         """Copy a spool as it is now, before it is damaged."""
-        target = spool.parents[2] / "recorded" / f"{spool.parent.name}.kept"
+        target = spool.parents[2] / "recorded" / f"{spool.parent.name}{_KEPT}"
         with target.open("ab") as kept:
             kept.write(spool.read_bytes())
 
@@ -62,16 +63,21 @@ class Recorder:
             RuntimeError: a spool was not recorded whole, so nothing can be proved.
         """
         found: dict[tuple[str, int], dict[int, dict[str, Any]]] = defaultdict(dict)
+        damaged: set[tuple[str, int]] = set()
         for directory in self._directories:
             for path in (directory / "recorded").iterdir():
                 _, run_id, attempt = path.stem.split("-")
                 found[run_id, int(attempt)].update((item["seq"], item) for item in _items(path))
+                if path.suffix == _KEPT:
+                    damaged.add((run_id, int(attempt)))
         runs: dict[str, list[Attempt]] = defaultdict(list)
         for (run_id, number), items in sorted(found.items()):
             numbers = sorted(items)
-            if numbers and numbers != list(range(numbers[0], numbers[-1] + 1)):
+            whole = [seq for place, seq in enumerate(numbers) if seq == numbers[0] + place]
+            # What is written onto a torn line is lost with it, and nothing beyond is ever read: the attempt ends there.
+            if whole != numbers and (run_id, number) not in damaged:
                 raise RuntimeError(f"the spool of attempt {number} of run {run_id} was not recorded whole")
-            runs[run_id].append(Attempt(number, tuple(items[seq] for seq in numbers)))
+            runs[run_id].append(Attempt(number, tuple(items[seq] for seq in whole)))
         return runs
 
     def _watch(self) -> None:

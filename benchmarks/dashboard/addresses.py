@@ -1,5 +1,7 @@
 """Every page of a made lab, and what is on it once it is whole."""
 
+from urllib.parse import quote
+
 from benchmarks.dashboard.data import Lab
 
 SMALL = {"experiments": 9, "points": 60, "long_experiments": 1, "long_points": 400, "checkpoints": 12, "live": 0}
@@ -22,6 +24,7 @@ def addresses(lab: Lab) -> dict[str, tuple[str, str]]:
         "policies": ("/policies", "[data-testid=policy]"),
         "policy": ("/policies/complex", "[data-testid=episode]"),
         "arenas": ("/arenas", "[data-testid=arena]"),
+        "arena-editor": ("/arenas/draw?from=" + quote('{"name":"complex"}'), "[data-testid=review][data-current=true]"),
         "playground": ("/playground", "h1"),
         "paper": ("/reproduction", "[data-testid=claim]"),
         "queue": ("/queue", "h1"),

@@ -15,8 +15,8 @@ from server.alerts.schemas import (
     NewAlertRule,
 )
 from server.alerts.service import AlertService
-from server.paging import WindowDep
-from server.problems import CONFLICT, FORBIDDEN, NOT_FOUND
+from server.http.paging import WindowDep
+from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
 from server.security.permissions import OWN_ALERTS
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep

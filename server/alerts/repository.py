@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from server.alerts.happenings import Happening
 from server.database import tables
 from server.errors import NotFoundError
-from server.paging import Window
+from server.http.paging import Window
 
 _AT_ONCE = 500
 

@@ -21,8 +21,8 @@ from server.alerts.schemas import (
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError, ForbiddenError, RefusedFieldError
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from server.people.repository import PeopleRepository
 from server.projects.repository import ProjectRepository
 from server.security.principal import Principal

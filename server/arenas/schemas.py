@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from server.schemas import Schema
+from sim.arenas.document import IMPORT_CLEARANCE
 from sim.config import AnyArenaConfig, ArenaFile
 
 MAX_FILES = 18
@@ -12,6 +13,9 @@ MAX_FILES = 18
 
 MAX_UPLOAD_BYTES = 24 * 2**20
 """Of an upload's JSON: the largest image in base64, and its YAML."""
+
+MAX_REVIEW_BYTES = 2**20
+"""Of an arena that is being drawn: 2,000 obstacles take 200 kB."""
 
 
 class ArenaUploadFile(Schema):
@@ -49,3 +53,32 @@ class ArenaView(Schema):
     free_share: float = Field(description="The same over the floor's area, 0 to 1.")
     known: bool = Field(description="Built in, generated, or imported already; false for an upload that was only looked at.")
     trainings: int = Field(description="Experiments that use this imported arena; only one that none uses may be deleted.")
+
+
+class ArenaReviewRequest(Schema):
+    """An arena that is being drawn."""
+
+    arena: ArenaFile
+    clearance: float = Field(
+        IMPORT_CLEARANCE,
+        ge=0.05,
+        le=2.0,
+        description="Metres that the robot needs around its centre; what the Burger needs.",
+    )
+
+
+class ArenaRemark(Schema):
+    """One thing to mend in an arena."""
+
+    refused: bool = Field(description="Whether the arena can't be kept as it is.")
+    text: str
+    x: float = Field(description="Where, metres.")
+    y: float
+
+
+class ArenaReview(Schema):
+    """What was found in an arena; nothing where it is as it should be."""
+
+    free_area: float = Field(description="Square metres in one piece for the robot's centre.")
+    free_share: float = Field(description="The same over the floor's area, 0 to 1.")
+    remarks: list[ArenaRemark] = Field(description="What is refused first; the first twenty.")

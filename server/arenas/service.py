@@ -4,14 +4,16 @@ import base64
 
 from sqlalchemy import func, select
 
-from server.arenas.schemas import ArenaSummary, ArenaUpload, ArenaView
+from server.arenas.schemas import ArenaRemark, ArenaReview, ArenaReviewRequest, ArenaSummary, ArenaUpload, ArenaView
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError, NotFoundError, UnusableArenaError
 from server.services import Services
+from server.suites.repository import SuiteRepository
 from sim.arenas import build_arenas
 from sim.arenas.document import free_area, to_arena, to_document
 from sim.arenas.files import read_arena
+from sim.arenas.review import review
 from sim.config import (
     ADDED_FAMILIES,
     AddedArenaPool,
@@ -97,6 +99,15 @@ class ArenaService:
         document = self._store.get(sha256).document
         return self._view(document.name, ImportedArenaConfig(sha256=sha256), document, trainings=self._trainings(sha256))
 
+    def uses(self, sha256: str) -> int:
+        """How many trainings use an imported arena.
+
+        Raises:
+            NotFoundError: there is none of this hash.
+        """
+        self._store.get(sha256)
+        return self._trainings(sha256)
+
     def upload(self, upload: ArenaUpload) -> ArenaView:
         """Read an arena's files, and keep it if that is asked for.
 
@@ -119,18 +130,33 @@ class ArenaService:
         config = ImportedArenaConfig(sha256=document.sha256)
         return self._view(document.name, config, document, known=False)
 
+    @staticmethod
+    def review(request: ArenaReviewRequest) -> ArenaReview:
+        """Look an arena over that is being drawn."""
+        arena = request.arena
+        found = review(arena, request.clearance)
+        return ArenaReview(
+            free_area=round(found.free_area, 2),
+            free_share=round(found.free_area / (arena.width * arena.height), 4),
+            remarks=[ArenaRemark(refused=one.refused, text=one.text, x=one.x, y=one.y) for one in found.remarks],
+        )
+
     def delete(self, sha256: str) -> None:
         """Remove an imported arena.
 
         Raises:
             NotFoundError: there is none of this hash.
-            ConflictError: an experiment trains on it.
+            ConflictError: an experiment trains on it, or a suite has it.
         """
         name = self._store.get(sha256).document.name
         if count := self._trainings(sha256):
             raise ConflictError(
                 f"{count} training{'s' if count > 1 else ''} use{'' if count > 1 else 's'} this arena: delete those first."
             )
+        with self._services.database.read() as session:
+            suites = SuiteRepository(session).using(sha256)
+        if suites:
+            raise ConflictError(f"It is a scenario of the suite {suites[0]!r}: take it out there first.")
         self._store.delete(sha256)
         self._note("arena.deleted", sha256, name)
 

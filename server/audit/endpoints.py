@@ -8,8 +8,8 @@ from fastapi.responses import StreamingResponse
 from server.audit.repository import AuditFilter
 from server.audit.schemas import AuditEntry
 from server.audit.service import AuditService
-from server.paging import WindowDep
-from server.problems import Responses
+from server.http.paging import WindowDep
+from server.http.problems import Responses
 from server.schemas import Page
 from server.security.permissions import ADMINISTRATE
 from server.services import ServicesDep

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.audit.actor import current_actor
 from server.database import tables
-from server.paging import Window
+from server.http.paging import Window
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from server.audit.repository import AuditFilter, AuditRepository
 from server.audit.schemas import AuditEntry
 from server.database import tables
-from server.paging import Window
+from server.http.paging import Window
 from server.schemas import Page
 from server.services import Services
 from server.spreadsheets import csv_rows

@@ -8,8 +8,9 @@ from fastapi.responses import StreamingResponse
 
 from server.checkpoints.schemas import CheckpointPage, CheckpointSteps, Episodes
 from server.checkpoints.service import CheckpointService, Rest
-from server.paging import WindowDep
-from server.problems import NOT_FOUND, Responses
+from server.http.conditional import NOT_MODIFIED, KeptDep
+from server.http.paging import WindowDep
+from server.http.problems import NOT_FOUND, Responses
 from server.security.permissions import view
 from server.services import ServicesDep
 
@@ -45,13 +46,14 @@ def list_checkpoint_steps(run_id: str, service: CheckpointServiceDep) -> Checkpo
 @router.get(
     "/api/checkpoints/{checkpoint_id}/download",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | _ZIP,
+    responses=NOT_FOUND | NOT_MODIFIED | _ZIP,
     dependencies=[view("checkpoint_id")],
 )
 async def download_checkpoint(
     checkpoint_id: str,
     service: CheckpointServiceDep,
     services: ServicesDep,
+    kept: KeptDep,
     wanted: Annotated[str | None, Header(alias="Range", max_length=100)] = None,
     only_if: Annotated[str | None, Header(alias="If-Range", max_length=100)] = None,
 ) -> StreamingResponse:
@@ -60,12 +62,13 @@ async def download_checkpoint(
     `ETag` is its SHA-256. With that as `If-Range` and `Range: bytes=N-` a download that broke off goes on.
     """
     lane = services.lanes.downloads
+    validators = kept.unless_file((await lane.run(service.described, checkpoint_id)).sha256)
     download = await lane.run(service.take_home, checkpoint_id, _rest(wanted, only_if))
     archive, start = download.archive, download.start
     headers = {
         "Content-Disposition": f'attachment; filename="{archive.file_name}"',
         "Content-Length": str(archive.size - start),
-        "ETag": f'"{archive.sha256}"',
+        **validators,
         "Accept-Ranges": "bytes",
     }
     if start:
@@ -80,7 +83,12 @@ def _rest(wanted: str | None, only_if: str | None) -> Rest | None:
     return Rest(int(match[1]), only_if.strip('"')) if match and only_if else None
 
 
-@router.get("/api/checkpoints/{checkpoint_id}/episodes", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
-def list_episodes(checkpoint_id: str, service: CheckpointServiceDep) -> Episodes:
+@router.get(
+    "/api/checkpoints/{checkpoint_id}/episodes",
+    responses=NOT_FOUND | NOT_MODIFIED,
+    dependencies=[view("checkpoint_id")],
+)
+def list_episodes(checkpoint_id: str, service: CheckpointServiceDep, kept: KeptDep) -> Episodes:
     """Every episode behind the checkpoint's figures."""
+    kept.unless(checkpoint_id, service.evaluated_at(checkpoint_id))
     return service.episodes(checkpoint_id)

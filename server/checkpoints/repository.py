@@ -13,8 +13,8 @@ from server.checkpoints.sums import add_to_sums
 from server.database import tables
 from server.errors import NotFoundError
 from server.files import StoredFile
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from workers.reporting import EpisodeResult, EvaluationResult
 
 _EPISODES = TypeAdapter(tuple[EpisodeResult, ...])
@@ -156,6 +156,19 @@ class CheckpointRepository:
         if evaluation is None:
             raise NotFoundError(f"Checkpoint {checkpoint_id} has not been evaluated.")
         return evaluation
+
+    def evaluated_at(self, checkpoint_id: str) -> float:
+        """When the checkpoint was evaluated, in seconds since the epoch.
+
+        Raises:
+            NotFoundError: it was not.
+        """
+        evaluated_at = self._session.scalars(
+            select(tables.Evaluation.created_at).where(tables.Evaluation.checkpoint_id == checkpoint_id)
+        ).first()
+        if evaluated_at is None:
+            raise NotFoundError(f"Checkpoint {checkpoint_id} has not been evaluated.")
+        return evaluated_at
 
     def final_evaluations(self, run_ids: Collection[str], *, with_episodes: bool = False) -> dict[str, tables.Evaluation]:
         """The evaluation of each run's last evaluated checkpoint, by run.

@@ -9,7 +9,7 @@ from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.checkpoints.schemas import CheckpointPage, CheckpointStep, CheckpointSteps, Episodes
 from server.checkpoints.spread import spread
 from server.file_names import slug
-from server.paging import Window
+from server.http.paging import Window
 from server.runs.repository import RunRepository
 from server.services import Services
 
@@ -80,6 +80,17 @@ class CheckpointService:
             items=[CheckpointStep(id=each.id, step=each.step, success=each.success) for each in spread(steps, MOST_STEPS)],
             total=len(steps),
         )
+
+    def evaluated_at(self, checkpoint_id: str) -> float:
+        """When the checkpoint was evaluated, which it is once; in seconds since the epoch.
+
+        Raises:
+            NotFoundError: there is no such checkpoint, or it was not evaluated.
+        """
+        with self._services.database.read() as session:
+            repository = CheckpointRepository(session)
+            repository.get(checkpoint_id)
+            return repository.evaluated_at(checkpoint_id)
 
     def episodes(self, checkpoint_id: str) -> Episodes:
         """Every episode behind the checkpoint's figures.

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from server.comparison.schemas import Comparison, Curves, Profiles
 from server.comparison.service import ComparisonService
-from server.problems import INVALID, NOT_FOUND
+from server.http.problems import INVALID, NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 

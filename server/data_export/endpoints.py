@@ -9,7 +9,8 @@ from fastapi.responses import StreamingResponse
 from server.comparison.endpoints import ExperimentIds, GridSteps, Margin, Metric
 from server.data_export.files import OutgoingFile
 from server.data_export.service import DataExportService, DataFormat, TableFormat
-from server.problems import NOT_FOUND, Responses
+from server.http.conditional import NOT_MODIFIED, KeptDep
+from server.http.problems import NOT_FOUND, Responses
 from server.security.permissions import view
 from server.services import Services, ServicesDep
 
@@ -40,23 +41,31 @@ WantedFormat = Annotated[
 @router.get(
     "/api/runs/{run_id}/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
     dependencies=[view("run_id")],
 )
-async def export_run(run_id: str, services: ServicesDep, wanted: WantedFormat = "csv") -> StreamingResponse:
+async def export_run(run_id: str, services: ServicesDep, kept: KeptDep, wanted: WantedFormat = "csv") -> StreamingResponse:
     """The run's data as a file."""
-    return await _send(services, lambda: DataExportService(services).run(run_id, wanted))
+    service, headers = DataExportService(services), dict[str, str]()
+    if wanted != "json":
+        headers = kept.unless(wanted, await services.lanes.downloads.run(service.points_of_run, run_id))
+    return await _send(services, lambda: service.run(run_id, wanted), headers)
 
 
 @router.get(
     "/api/experiments/{experiment_id}/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
     dependencies=[view("experiment_id")],
 )
-async def export_experiment(experiment_id: str, services: ServicesDep, wanted: WantedFormat = "csv") -> StreamingResponse:
+async def export_experiment(
+    experiment_id: str, services: ServicesDep, kept: KeptDep, wanted: WantedFormat = "csv"
+) -> StreamingResponse:
     """The data of all runs of the experiment as a file."""
-    return await _send(services, lambda: DataExportService(services).experiment(experiment_id, wanted))
+    service, headers = DataExportService(services), dict[str, str]()
+    if wanted != "json":
+        headers = kept.unless(wanted, await services.lanes.downloads.run(service.points_of_experiment, experiment_id))
+    return await _send(services, lambda: service.experiment(experiment_id, wanted), headers)
 
 
 @router.get(
@@ -78,11 +87,11 @@ async def export_comparison(
 ) -> StreamingResponse:
     """The figures of a comparison and the curves of one metric as a file."""
     ids = list(dict.fromkeys(experiment_ids))
-    return await _send(services, lambda: DataExportService(services).comparison(ids, margin, name, points, wanted))
+    return await _send(services, lambda: DataExportService(services).comparison(ids, margin, name, points, wanted), {})
 
 
-async def _send(services: Services, find: Callable[[], OutgoingFile]) -> StreamingResponse:
+async def _send(services: Services, find: Callable[[], OutgoingFile], headers: dict[str, str]) -> StreamingResponse:
     lane = services.lanes.downloads
     file = await lane.run(find)
-    headers = {"Content-Disposition": f'attachment; filename="{file.name}"'}
+    headers = {**headers, "Content-Disposition": f'attachment; filename="{file.name}"'}
     return StreamingResponse(lane.each(file.blocks), media_type=file.media_type, headers=headers)

@@ -18,6 +18,7 @@ from server.data_export.zips import zipped
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
 from server.file_names import slug
+from server.metrics.service import points_state
 from server.runs.repository import RunRepository
 from server.services import Services
 
@@ -31,6 +32,26 @@ class DataExportService:
     def __init__(self, services: Services) -> None:
         self._services = services
         self._database = services.database
+
+    def points_of_run(self, run_id: str) -> tuple[object, ...]:
+        """What a run's file of points depends on, its name too.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._database.read() as session:
+            run = RunRepository(session).get(run_id)
+            return (run.experiment.name, *points_state(run))
+
+    def points_of_experiment(self, experiment_id: str) -> tuple[object, ...]:
+        """What an experiment's file of points depends on, its name too.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+        """
+        with self._database.read() as session:
+            experiment = ExperimentRepository(session).get(experiment_id)
+            return (experiment.name, *(points_state(run) for run in experiment.runs))
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
         """The data of one run.

@@ -582,6 +582,17 @@ class UploadedPolicy(Base):
     graph: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
 
 
+class OwnSuite(Base):
+    """Scenarios that people put together: `sha256` and `name` of arenas that bring a start and a target."""
+
+    __tablename__ = "own_suites"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    name: Mapped[str] = mapped_column(String(80), unique=True)
+    scenarios: Mapped[list[dict[str, str]]] = mapped_column(JSON)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time)
+
+
 class PolicyEvaluation(Base):
     """A policy or a baseline on a suite that somebody asked for; without figures until its job is done."""
 

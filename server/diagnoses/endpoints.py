@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from server.diagnoses.schemas import Diagnoses
 from server.diagnoses.service import DiagnosisService
-from server.problems import NOT_FOUND
+from server.http.problems import NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 

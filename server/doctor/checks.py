@@ -17,7 +17,7 @@ from server.database.engine import Database
 from server.database.migrate import head, revision
 from server.doctor.findings import AilingError, Finding, look
 from server.files import FileStore
-from server.listening import local_url
+from server.processes.listening import local_url
 from server.settings import Settings
 from server.version import commit, version
 from sim.extending.discovery import installed

@@ -13,8 +13,9 @@ from server.evaluations.schemas import (
     EvaluationRequest,
     EvaluationWays,
 )
-from server.paging import WindowDep
-from server.problems import BUSY, CONFLICT, NOT_FOUND
+from server.http.conditional import NOT_MODIFIED, KeptDep
+from server.http.paging import WindowDep
+from server.http.problems import BUSY, CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -46,9 +47,10 @@ def get_evaluation(evaluation_id: str, services: ServicesDep) -> AskedEvaluation
     return service.one(services, evaluation_id)
 
 
-@router.get("/{evaluation_id}/episodes", responses=NOT_FOUND, dependencies=[view("evaluation_id")])
-def list_evaluation_episodes(evaluation_id: str, services: ServicesDep) -> AskedEpisodes:
+@router.get("/{evaluation_id}/episodes", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("evaluation_id")])
+def list_evaluation_episodes(evaluation_id: str, services: ServicesDep, kept: KeptDep) -> AskedEpisodes:
     """Every episode behind its figures, in the suite's order."""
+    kept.unless(evaluation_id, service.measured_on(services, evaluation_id))
     return service.episodes(services, evaluation_id)
 
 

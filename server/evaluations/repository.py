@@ -13,7 +13,7 @@ from server.database import tables
 from server.errors import NotFoundError
 from server.evaluations.figures import figures_of
 from server.evaluations.ways import packed
-from server.paging import Window
+from server.http.paging import Window
 from workers.job_protocol import Measurement
 from workers.reporting import EpisodeResult
 
@@ -103,7 +103,7 @@ class PolicyEvaluationRepository:
             evaluation.suite, evaluation.suite_hash = result.suite, result.suite_hash
             evaluation.figures = figures_of(measurement, trained=trained).model_dump(mode="json")
             evaluation.task = measurement.task.model_dump(mode="json")
-            evaluation.episodes = zlib.compress(_EPISODES.dump_json(result.episodes))
+            evaluation.episodes = encode_episodes(result.episodes)
             evaluation.ways = packed(measurement)
             evaluation.error = None
 
@@ -128,6 +128,11 @@ def _with_run(query: _Query) -> _Query:
     joined = joined.outerjoin(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
     joined = joined.outerjoin(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
     return joined.outerjoin(tables.UploadedPolicy, tables.UploadedPolicy.id == tables.PolicyEvaluation.upload_id)
+
+
+def encode_episodes(episodes: tuple[EpisodeResult, ...]) -> bytes:
+    """Episodes as the database keeps them."""
+    return zlib.compress(_EPISODES.dump_json(episodes))
 
 
 def episodes_of(evaluation: tables.PolicyEvaluation) -> tuple[EpisodeResult, ...]:

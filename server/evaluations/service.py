@@ -20,19 +20,28 @@ from server.evaluations.schemas import (
 )
 from server.evaluations.subjects import Measured, measured, wanted_policies
 from server.evaluations.ways import ways_in
+from server.http.paging import Window
 from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.service import JobService, queue
 from server.jobs.views import seconds_left
-from server.paging import Window
 from server.replays.simulator import simulator
 from server.replays.subject import Subject
 from server.security.principal import Principal
 from server.services import Services
+from server.suites.repository import SuiteRepository
 from sim.config import ImportedArenaConfig, TaskConfig
 from sim.extending.discovery import UsedExtension
-from workers.job_protocol import AnyPolicy, ArenaSuite, CheckpointPolicy, EvaluateJob, SuiteChoice, UploadedPolicy
+from workers.job_protocol import (
+    AnyPolicy,
+    ArenaSuite,
+    CheckpointPolicy,
+    EvaluateJob,
+    ScenarioSuite,
+    SuiteChoice,
+    UploadedPolicy,
+)
 from workers.reporting import EvaluationResult
 
 _POLICY: TypeAdapter[AnyPolicy] = TypeAdapter(AnyPolicy)
@@ -43,12 +52,12 @@ def ask(services: Services, request: EvaluationRequest, principal: Principal) ->
     """Put evaluations into the queue, all or none; one that is measured, or under way, already is that one.
 
     Raises:
-        NotFoundError: there is no such policy, or it may not be seen.
+        NotFoundError: there is no such policy, or it may not be seen; or no such suite.
         UnusableArenaError: the imported arena is not here.
-        InvalidRequestError: these are too many at once.
+        InvalidRequestError: these are too many at once, or a suite has no scenario.
         BusyError: as many jobs wait as may.
     """
-    choices = [_with_stored_arena(services, suite) for suite in request.suites]
+    choices = [_with_scenarios(services, _with_stored_arena(services, suite)) for suite in request.suites]
     asked: list[tuple[tables.PolicyEvaluation, tables.Job | None, str | None]] = []
     with services.database.write() as session:
         policies = wanted_policies(session, request.policies, principal)
@@ -109,6 +118,16 @@ def one(services: Services, evaluation_id: str) -> AskedEvaluation:
         job, run_id = session.get(tables.Job, evaluation.job_id), repository.run_of(evaluation)
     lacking = JobService(services).lacking_each([job] if job is not None else [])
     return _view(services, evaluation, job, run_id, lacking)
+
+
+def measured_on(services: Services, evaluation_id: str) -> str | None:
+    """The hash of the suite that it was measured on, which it is once; None before.
+
+    Raises:
+        NotFoundError: there is no such evaluation.
+    """
+    with services.database.read() as session:
+        return PolicyEvaluationRepository(session).get(evaluation_id).suite_hash
 
 
 def episodes(services: Services, evaluation_id: str) -> AskedEpisodes:
@@ -232,6 +251,17 @@ def _with_stored_arena(services: Services, choice: SuiteChoice) -> SuiteChoice:
             "This imported arena is not here: choose one in the gallery, or import its file there first."
         ) from error
     return choice
+
+
+def _with_scenarios(services: Services, choice: SuiteChoice) -> SuiteChoice:
+    """The choice as the database keeps it: a suite of one's own with the scenarios that it has now, by their hashes."""
+    if not isinstance(choice, ScenarioSuite):
+        return choice
+    with services.database.read() as session:
+        suite = SuiteRepository(session).get(choice.id)
+        if not suite.scenarios:
+            raise InvalidRequestError(f"The suite {suite.name!r} has no scenario yet: add one first.")
+        return ScenarioSuite(id=suite.id, name=suite.name, arenas=tuple(one["sha256"] for one in suite.scenarios))
 
 
 def _digest(spec: EvaluateJob, sha256: str | None) -> str:

@@ -9,7 +9,7 @@ from starlette.types import Receive, Scope, Send
 
 from server.events.bus import Subscription
 from server.events.changes import Shown
-from server.problems import TOO_MANY_STREAMS, Responses
+from server.http.problems import TOO_MANY_STREAMS, Responses
 from server.security.permissions import SIGNED_IN
 from server.security.principal import Principal, PrincipalDep
 from server.services import Services, ServicesDep

@@ -14,7 +14,8 @@ from server.experiments.schemas import (
     TrainingPace,
 )
 from server.experiments.service import ExperimentService
-from server.problems import CONFLICT, NOT_FOUND
+from server.http.conditional import NOT_MODIFIED, KeptDep
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -30,9 +31,10 @@ def _service(services: ServicesDep) -> ExperimentService:
 ExperimentServiceDep = Annotated[ExperimentService, Depends(_service)]
 
 
-@router.get("/api/training/form", dependencies=[SIGNED_IN])
-def get_training_form() -> TrainingForm:
+@router.get("/api/training/form", responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
+def get_training_form(kept: KeptDep) -> TrainingForm:
     """What the launch form is made of: schema, defaults and presets."""
+    kept.unless()
     return TrainingForm(schema=form_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
 
 

@@ -3,11 +3,11 @@
 from fastapi import APIRouter
 
 from server.database import tables
+from server.http.paging import WindowDep
+from server.http.problems import NOT_FOUND
 from server.jobs.schemas import Job, JobPage
 from server.jobs.service import JobService
 from server.jobs.views import job_view
-from server.paging import WindowDep
-from server.problems import NOT_FOUND
 from server.security.permissions import ADMINISTRATE
 from server.services import Services, ServicesDep
 

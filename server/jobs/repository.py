@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.errors import NotFoundError
-from server.paging import Window
+from server.http.paging import Window
 from workers.job_protocol import JobKind
 
 OPEN: frozenset[tables.JobState] = frozenset({"queued", "running"})

@@ -12,13 +12,13 @@ from server.arenas.store import ArenaStore
 from server.database import tables
 from server.errors import BusyError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository
+from server.http.paging import Window
 from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.needed import needed_by, needed_by_each
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.schemas import JobPage
 from server.jobs.views import job_view
-from server.paging import Window
 from server.policies.service import find
 from server.services import Services
 from server.uploads.repository import UploadRepository
@@ -40,6 +40,7 @@ from workers.job_protocol import (
     JobSpec,
     Measurement,
     ReplayJob,
+    ScenarioSuite,
     UploadedPolicy,
 )
 
@@ -347,7 +348,12 @@ def _with_geometry(spec: JobSpec, arenas: ArenaStore) -> JobSpec:
     Raises:
         NotFoundError: the arena's file is gone.
     """
-    if not isinstance(spec, EvaluateJob | ReplayJob) or not isinstance(spec.suite, ArenaSuite):
+    if not isinstance(spec, EvaluateJob | ReplayJob):
+        return spec
+    if isinstance(spec.suite, ScenarioSuite):
+        documents = tuple(arenas.get(sha256).document for sha256 in spec.suite.arenas)
+        return spec.model_copy(update={"suite": spec.suite.model_copy(update={"documents": documents})})
+    if not isinstance(spec.suite, ArenaSuite):
         return spec
     arena = spec.suite.arena
     if not isinstance(arena, ImportedArenaConfig) or arena.arena is not None:

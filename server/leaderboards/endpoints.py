@@ -2,9 +2,10 @@
 
 from fastapi import APIRouter
 
+from server.http.paging import PartDep
+from server.http.problems import NOT_FOUND
 from server.leaderboards import service
 from server.leaderboards.schemas import Leaderboard, Leaderboards
-from server.problems import NOT_FOUND
 from server.security.permissions import SIGNED_IN
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -13,12 +14,13 @@ router = APIRouter(prefix="/api/leaderboards", tags=["leaderboards"])
 
 
 @router.get("", dependencies=[SIGNED_IN])
-def list_leaderboards(services: ServicesDep, principal: PrincipalDep) -> Leaderboards:
+def list_leaderboards(services: ServicesDep, principal: PrincipalDep, part: PartDep) -> Leaderboards:
     """Every suite on which something was measured."""
-    return service.boards(services, principal.visible)
+    return Leaderboards(suites=part.of(service.boards(services, principal.visible).suites))
 
 
 @router.get("/{suite_hash}", responses=NOT_FOUND, dependencies=[SIGNED_IN])
-def get_leaderboard(suite_hash: str, services: ServicesDep, principal: PrincipalDep) -> Leaderboard:
+def get_leaderboard(suite_hash: str, services: ServicesDep, principal: PrincipalDep, part: PartDep) -> Leaderboard:
     """Everything that was measured on a suite, the best first, and what can't be told from the best."""
-    return service.board(services, suite_hash, principal.visible)
+    board = service.board(services, suite_hash, principal.visible)
+    return board.model_copy(update={"entries": part.of(board.entries)})

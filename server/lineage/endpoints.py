@@ -4,9 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
+from server.http.paging import PartDep
+from server.http.problems import NOT_FOUND
 from server.lineage.schemas import Lineage, StartPolicy
 from server.lineage.service import LineageService
-from server.problems import NOT_FOUND
 from server.security.permissions import SIGNED_IN, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -25,10 +26,11 @@ LineageServiceDep = Annotated[LineageService, Depends(_service)]
 def list_start_policies(
     service: LineageServiceDep,
     principal: PrincipalDep,
+    part: PartDep,
     search: Annotated[str, Query(max_length=120, description="Part of a training's name, or of a policy's title.")] = "",
 ) -> list[StartPolicy]:
     """Policies that a training may begin with: of one's newest runs the best and the last, and those that ship."""
-    return service.policies(search, principal.visible)
+    return part.of(service.policies(search, principal.visible))
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/start", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])

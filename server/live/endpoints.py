@@ -10,13 +10,13 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
 from server.errors import NotFoundError
+from server.http.problems import NOT_FOUND
 from server.jobs.service import JobService
 from server.live.bridge import PLAY, WATCH, bridge, until_one_ends
 from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
 from server.live.watched import CHECKPOINT_PREFIX, Watched, checkpoint_view, policy_view, watched
-from server.problems import NOT_FOUND
 from server.scene.themes import Theme
 from server.security.permissions import SIGNED_IN, view
 from server.security.principal import principal_of

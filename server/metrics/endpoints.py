@@ -4,19 +4,23 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from server.http.conditional import NOT_MODIFIED, KeptDep
+from server.http.problems import NOT_FOUND
 from server.metrics.schemas import Metrics
 from server.metrics.service import Known, MetricService
-from server.problems import NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 
 router = APIRouter(tags=["metrics"])
 
 
-@router.get("/api/runs/{run_id}/metrics", response_model=Metrics, responses=NOT_FOUND, dependencies=[view("run_id")])
+@router.get(
+    "/api/runs/{run_id}/metrics", response_model=Metrics, responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("run_id")]
+)
 def get_metrics(
     run_id: str,
     services: ServicesDep,
+    kept: KeptDep,
     names: Annotated[str, Query(max_length=4_000, description="Comma-separated; all if empty.")] = "",
     points: Annotated[int, Query(ge=2, le=100_000, description="Points of a series at most.")] = 1_000,
     since: Annotated[
@@ -34,5 +38,7 @@ def get_metrics(
     """
     wanted = {name.strip() for name in names.split(",") if name.strip()}
     known = None if since is None or attempt is None else Known(since, attempt)
-    curves = MetricService(services).of_run(run_id, wanted or None, points, known)
-    return Response(curves, media_type="application/json")
+    metrics = MetricService(services)
+    headers = kept.unless(metrics.state(run_id), sorted(wanted), points, known)
+    curves = metrics.of_run(run_id, wanted or None, points, known)
+    return Response(curves, media_type="application/json", headers=headers)

@@ -10,8 +10,8 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from server.abandoned import stop_if_abandoned
 from server.database import tables
+from server.http.abandoned import stop_if_abandoned
 from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points

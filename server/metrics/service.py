@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from server.database import tables
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
@@ -31,6 +32,15 @@ class MetricService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
+    def state(self, run_id: str) -> tuple[str, int, int, int]:
+        """What a run's curves depend on: as long as it is the same, so are they.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._services.database.read() as session:
+            return points_state(RunRepository(session).get(run_id))
+
     def of_run(self, run_id: str, names: Collection[str] | None, points: int, known: Known | None = None) -> bytes:
         """`Metrics` as JSON: the run's series, all or those named, each of at most `points` points, beyond what is known.
 
@@ -55,9 +65,13 @@ class MetricService:
                 )
                 return metrics.model_dump_json().encode()
 
-            # Reports move the last item's number; what cuts a run back moves its step, and its next attempt's number.
-            state = (run_id, run.attempt, run.last_seq, run.step)
-            return self._services.curves.get((*state, frozenset(names or ()), points, known), read)
+            return self._services.curves.get((*points_state(run), frozenset(names or ()), points, known), read)
+
+
+def points_state(run: tables.Run) -> tuple[str, int, int, int]:
+    """What a run's points depend on: as long as it is the same, so are they."""
+    # Reports move the last item's number; what cuts a run back moves its step, and its next attempt's number.
+    return (run.id, run.attempt, run.last_seq, run.step)
 
 
 def _view(name: str, buckets: Buckets) -> Series:

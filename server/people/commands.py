@@ -8,8 +8,8 @@ from server.database.engine import Database
 from server.database.migrate import upgrade
 from server.database.tables import Role
 from server.errors import ConflictError, NotFoundError
+from server.http.paging import MAX_PAGE, Window
 from server.ids import new_id
-from server.paging import MAX_PAGE, Window
 from server.people.invitations import add_invitation, add_reset
 from server.people.passwords import hash_password
 from server.people.repository import PeopleRepository

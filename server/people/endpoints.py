@@ -5,7 +5,8 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from server.errors import NotFoundError, UnauthorizedError
-from server.paging import WindowDep
+from server.http.paging import PartDep, WindowDep
+from server.http.problems import CONFLICT, FORBIDDEN, INVALID, NOT_FOUND, TOO_MANY, UNAUTHORIZED
 from server.people.accounts import AccountService
 from server.people.invitations import InvitationService
 from server.people.oidc.refusals import Refusal, in_words
@@ -34,7 +35,6 @@ from server.people.schemas import (
 )
 from server.people.service import PeopleService
 from server.people.sign_in import SignInService
-from server.problems import CONFLICT, FORBIDDEN, INVALID, NOT_FOUND, TOO_MANY, UNAUTHORIZED
 from server.schemas import Page
 from server.security.cookies import clear_cookies, set_session
 from server.security.permissions import ADMINISTRATE, INVITE, OPEN, OWN_ACCOUNT, SIGNED_IN, manage
@@ -125,9 +125,9 @@ async def change_password(
 
 
 @router.get("/api/account/sessions", dependencies=[OWN_ACCOUNT])
-def list_sessions(service: AccountsDep, principal: PrincipalDep) -> list[Session]:
+def list_sessions(service: AccountsDep, principal: PrincipalDep, part: PartDep) -> list[Session]:
     """The browsers that are signed in, the newest first."""
-    return service.sessions(principal)
+    return part.of(service.sessions(principal))
 
 
 @router.delete(
@@ -139,9 +139,9 @@ def end_session(session_id: str, service: AccountsDep, principal: PrincipalDep) 
 
 
 @router.get("/api/account/tokens", dependencies=[OWN_ACCOUNT])
-def list_tokens(service: AccountsDep, principal: PrincipalDep) -> list[ApiToken]:
+def list_tokens(service: AccountsDep, principal: PrincipalDep, part: PartDep) -> list[ApiToken]:
     """One's tokens for programs, the newest first."""
-    return service.tokens(principal)
+    return part.of(service.tokens(principal))
 
 
 @router.post(
@@ -208,9 +208,9 @@ def remove_member(project_id: str, user_id: str, service: PeopleDep) -> None:
 
 
 @router.get("/api/invitations", dependencies=[INVITE])
-def list_invitations(service: InvitationsDep, principal: PrincipalDep) -> list[Invitation]:
+def list_invitations(service: InvitationsDep, principal: PrincipalDep, part: PartDep) -> list[Invitation]:
     """Invitations that still hold, to the projects that one administrates."""
-    return service.open(principal)
+    return part.of(service.open(principal))
 
 
 @router.post(
@@ -268,9 +268,9 @@ async def accept_invitation(
 
 
 @router.get("/api/worker-tokens", dependencies=[ADMINISTRATE])
-def list_worker_tokens(service: PeopleDep) -> list[WorkerToken]:
+def list_worker_tokens(service: PeopleDep, part: PartDep) -> list[WorkerToken]:
     """Tokens of workers' machines, by name."""
-    return service.worker_tokens()
+    return part.of(service.worker_tokens())
 
 
 @router.post("/api/worker-tokens", status_code=status.HTTP_201_CREATED, responses=CONFLICT, dependencies=[ADMINISTRATE])

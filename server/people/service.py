@@ -9,8 +9,8 @@ from server.audit.repository import AuditRepository
 from server.database import tables
 from server.database.tables import Role
 from server.errors import ConflictError, NotFoundError
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from server.people.repository import CredentialRepository, PeopleRepository
 from server.people.schemas import (
     Member,

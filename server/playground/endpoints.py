@@ -4,10 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body
 
+from server.http.problems import BUSY, NOT_FOUND
 from server.live.settings import LiveSettings
 from server.playground import service
 from server.playground.schemas import AnyChange, KeptArena, KeptArenaName, Playground, PlaygroundRequest, PlaygroundSettings
-from server.problems import BUSY, NOT_FOUND
 from server.security.permissions import LAUNCH, OWN_PLAYGROUND, SIGNED_IN
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep

@@ -6,9 +6,9 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, PlainTextResponse
 
 from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Margin
+from server.http.problems import INVALID, NOT_FOUND
 from server.printing.service import SUFFIXES, PrintingService, TextFormat, Wanted
 from server.printing.tables import TableName
-from server.problems import INVALID, NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 

@@ -22,17 +22,22 @@ from server.experiments.repository import ExperimentRepository
 from server.files import StoredFile
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository, PackedSeries
+from server.project_archives.others import take_arena, take_evaluation, take_policy
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import (
+    ArchivedAskedEvaluation,
     ArchivedCheckpoint,
     ArchivedEvaluation,
     ArchivedExperiment,
     ArchivedLog,
     ArchivedPoints,
+    ArchivedPolicy,
     ArchivedRun,
     ArchivedStudy,
     ArchiveManifest,
     ImportedRun,
+    ImportedThing,
+    Kind,
     ProjectImport,
 )
 from server.project_archives.studies import take_study
@@ -42,12 +47,18 @@ from server.run_log.repository import HEAD_BYTES, TAIL_BYTES, LogRepository
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.services import Services
+from server.uploads.schemas import MAX_FILE_BYTES
+from sim.config import ArenaFile
 from workers.checkpoints import check_archive
 from workers.errors import ArchiveError
 
 MAX_RUNS = 10_000
 """Of one archive."""
 
+MAX_OTHERS = 10_000
+"""Of arenas, policies and evaluations of one archive."""
+
+_OTHERS: dict[str, Kind] = {"arenas": "arena", "policies": "policy", "evaluations": "evaluation"}
 _MAX_DOCUMENT = 64 * 2**20
 # Of a run, in memory before it is written.
 _MAX_POINTS = 10_000_000
@@ -85,6 +96,7 @@ class ProjectArrival:
         self._project_id = project_id
         self._outcomes: list[ImportedRun] = []
         self._checkpoints = 0
+        self._others: list[ImportedThing] = []
 
     async def take(self, stream: AsyncIterator[bytes]) -> ProjectImport:
         """All runs of an archive as it arrives; those before a fault in it stay.
@@ -102,6 +114,8 @@ class ProjectArrival:
                 parts = name.split("/")
                 if len(parts) == 2 and parts[1] == "experiment.json":
                     experiment = _read(ArchivedExperiment, await incoming.whole(_MAX_DOCUMENT))
+                elif len(parts) == 2 and parts[0] in _OTHERS:
+                    await self._other(_OTHERS[parts[0]], parts[1], incoming)
                 elif len(parts) == 2 and parts[0] == "studies":
                     await self._lane.run(self._study, _read(ArchivedStudy, await incoming.whole(_MAX_DOCUMENT)))
                 elif experiment is not None and parts[0] == experiment.id and len(parts) == 3 and parts[2] == "run.json":
@@ -109,9 +123,48 @@ class ProjectArrival:
                 else:
                     raise InvalidRequestError(f"This is no project's archive: {name} has no place in it.")
         finally:
-            if self._outcomes:
+            if self._outcomes or self._others:
                 await self._lane.run(self._note)
-        return ProjectImport(project_id=self._project_id, runs=self._outcomes, checkpoints=self._checkpoints)
+        return ProjectImport(
+            project_id=self._project_id, runs=self._outcomes, checkpoints=self._checkpoints, others=self._others
+        )
+
+    async def _other(self, kind: Kind, name: str, incoming: IncomingTar) -> None:
+        if len(self._others) >= MAX_OTHERS:
+            raise InvalidRequestError(
+                f"An archive may hold {MAX_OTHERS} things beside its runs: import the rest as another one."
+            )
+        identifier, _, form = name.partition(".")
+        if form != "json":
+            raise InvalidRequestError(f"This is no project's archive: {name} has no place in it.")
+        content = await incoming.whole(_MAX_DOCUMENT)
+        graph = b""
+        if kind == "policy":
+            if await incoming.next() != f"policies/{identifier}.onnx":
+                raise InvalidRequestError(f"This is no project's archive: the file of the policy {identifier} is missing.")
+            graph = await incoming.whole(MAX_FILE_BYTES)
+        try:
+            new = await self._lane.run(self._take, kind, identifier, content, graph)
+            outcome = ImportedThing(kind=kind, id=identifier, outcome="imported" if new else "there", why=None)
+        except (ConflictError, CorruptUploadError) as error:
+            outcome = ImportedThing(kind=kind, id=identifier, outcome="refused", why=error.message)
+        self._others.append(outcome)
+
+    def _take(self, kind: Kind, identifier: str, content: bytes, graph: bytes) -> bool:
+        """Take something beside the runs; False where it was here.
+
+        Raises:
+            InvalidRequestError: it is no such thing.
+            ConflictError: it cannot be taken.
+            CorruptUploadError: it is damaged.
+        """
+        if kind == "arena":
+            return take_arena(self._services.arenas, identifier, _read(ArenaFile, content))
+        with self._services.database.write() as session:
+            ProjectRepository(session).get(self._project_id)
+            if kind == "policy":
+                return take_policy(session, self._project_id, _read(ArchivedPolicy, content), graph)
+            return take_evaluation(session, self._project_id, _read(ArchivedAskedEvaluation, content))
 
     async def _run(self, experiment: ArchivedExperiment, archived: ArchivedRun, incoming: IncomingTar) -> None:
         if len(self._outcomes) >= MAX_RUNS:
@@ -263,11 +316,13 @@ class ProjectArrival:
 
     def _note(self) -> None:
         counts = {kind: sum(each.outcome == kind for each in self._outcomes) for kind in ("imported", "there", "refused")}
-        details = ", ".join(f"{number} {kind}" for kind, number in counts.items() if number)
+        details = "runs: " + ", ".join(f"{number} {kind}" for kind, number in counts.items() if number)
+        if self._others:
+            details += f"; beside them: {len(self._others)}"
         with self._services.database.write() as session:
             project = ProjectRepository(session).get(self._project_id)
             AuditRepository(session).add(
-                "project.imported", target=project.id, name=project.name, project_id=project.id, details=f"runs: {details}"
+                "project.imported", target=project.id, name=project.name, project_id=project.id, details=details
             )
 
 

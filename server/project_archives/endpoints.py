@@ -5,7 +5,7 @@ import sys
 from fastapi import APIRouter, Request
 from fastapi.responses import StreamingResponse
 
-from server.problems import BUSY, INVALID, NOT_FOUND, Responses
+from server.http.problems import BUSY, INVALID, NOT_FOUND, Responses
 from server.project_archives.arriving import ProjectArrival
 from server.project_archives.leaving import leaving
 from server.project_archives.schemas import ProjectImport

@@ -12,6 +12,7 @@ from server.database import tables
 from server.errors import NotFoundError
 from server.file_names import slug
 from server.project_archives import tar
+from server.project_archives.others import archived_evaluation, archived_policy, arenas_of
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import (
     ArchivedCheckpoint,
@@ -35,7 +36,8 @@ from server.workbench.marks import MarkRepository
 def leaving(services: Services, project_id: str) -> OutgoingFile:
     """The project as one file: studies, experiments with tags and notes, runs with all that hangs on them.
 
-    That is events, printed lines, points, checkpoints and their evaluations.
+    That is events, printed lines, points, checkpoints and their evaluations. Beside them uploaded policies, evaluations that
+    were asked for, and the imported arenas that any of these use.
 
     What lies in the trash stays, and so do a damaged checkpoint and one whose archive is gone. A run that goes on leaves
     as it is when its turn comes. Only one run's documents are held at a time.
@@ -49,14 +51,22 @@ def leaving(services: Services, project_id: str) -> OutgoingFile:
         experiment_ids = ProjectArchiveRepository(session).experiments(project_id)
         study_ids = ProjectArchiveRepository(session).studies(project_id)
     manifest = ArchiveManifest(version=version(), project=project.name)
-    blocks = _whole(services, manifest, study_ids, experiment_ids)
+    blocks = _whole(services, project_id, manifest, study_ids, experiment_ids)
     return OutgoingFile(f"mapless-{slug(project.name)}.tar", "application/x-tar", blocks)
 
 
 def _whole(
-    services: Services, manifest: ArchiveManifest, study_ids: Sequence[str], experiment_ids: Sequence[str]
+    services: Services, project_id: str, manifest: ArchiveManifest, study_ids: Sequence[str], experiment_ids: Sequence[str]
 ) -> Iterator[bytes]:
     yield from _document("manifest.json", manifest)
+    with services.database.read() as session:
+        # One after another: a thousand of them, each of some kilobytes.
+        arenas = list(arenas_of(session, services.arenas, project_id))
+        policy_ids = ProjectArchiveRepository(session).policies(project_id)
+    for arena in arenas:
+        yield from _document(f"arenas/{arena.sha256}.json", arena)
+    for policy_id in policy_ids:
+        yield from _policy(services, policy_id)
     for study_id in study_ids:
         with services.database.read() as session:
             study = archived_study(session, study_id)
@@ -72,7 +82,24 @@ def _whole(
         yield from _document(f"{experiment_id}/experiment.json", archived)
         for run_id in run_ids:
             yield from _run(services, f"{experiment_id}/{run_id}", run_id)
+    with services.database.read() as session:
+        evaluation_ids = ProjectArchiveRepository(session).evaluations(project_id)
+    for evaluation_id in evaluation_ids:
+        with services.database.read() as session:
+            evaluation = archived_evaluation(session, evaluation_id)
+        if evaluation is not None:
+            yield from _document(f"evaluations/{evaluation_id}.json", evaluation)
     yield tar.end()
+
+
+def _policy(services: Services, policy_id: str) -> Iterator[bytes]:
+    with services.database.read() as session:
+        row = session.get(tables.UploadedPolicy, policy_id)
+        if row is None:
+            return
+        archived, graph = archived_policy(row), row.graph
+    yield from _document(f"policies/{policy_id}.json", archived)
+    yield from tar.member(f"policies/{policy_id}.onnx", len(graph), [graph])
 
 
 def _run(services: Services, folder: str, run_id: str) -> Iterator[bytes]:

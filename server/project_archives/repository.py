@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -47,6 +47,43 @@ class ProjectArchiveRepository:
         """The ids of a run's checkpoints that were evaluated."""
         query = select(tables.Evaluation.checkpoint_id).join(tables.Checkpoint)
         return set(self._session.scalars(query.where(tables.Checkpoint.run_id == run_id)))
+
+    def arenas(self, project_id: str) -> set[str]:
+        """The hashes of the imported arenas that the project's experiments train on."""
+        row = tables.Experiment
+        used = row.training["task"]["arena"]["sha256"].as_string()
+        query = select(used).where(row.project_id == project_id, row.deleted_at.is_(None), used.is_not(None))
+        return {sha256 for sha256 in self._session.scalars(query.distinct()) if sha256}
+
+    def policies(self, project_id: str) -> Sequence[str]:
+        """The ids of the policies that were uploaded into a project, the oldest first."""
+        row = tables.UploadedPolicy
+        return self._session.scalars(
+            select(row.id).where(row.project_id == project_id).order_by(row.created_at, row.id)
+        ).all()
+
+    def evaluations(self, project_id: str) -> Sequence[str]:
+        """The ids of the evaluations that were asked for of a project's whole checkpoints and uploads, the oldest first."""
+        row, experiment = tables.PolicyEvaluation, tables.Experiment
+        trained = (
+            select(tables.Checkpoint.id)
+            .join(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
+            .join(experiment, experiment.id == tables.Run.experiment_id)
+            .where(experiment.project_id == project_id, experiment.deleted_at.is_(None))
+            .where(tables.Checkpoint.damaged_at.is_(None))
+        )
+        uploaded = select(tables.UploadedPolicy.id).where(tables.UploadedPolicy.project_id == project_id)
+        query = select(row.id).where(or_(row.checkpoint_id.in_(trained), row.upload_id.in_(uploaded)))
+        return self._session.scalars(query.order_by(row.created_at, row.id)).all()
+
+    def has_policy(self, project_id: str, policy_id: str, *, of_checkpoint: bool) -> bool:
+        """Whether the checkpoint, or the uploaded policy, of that id is the project's."""
+        if not of_checkpoint:
+            uploaded = self._session.get(tables.UploadedPolicy, policy_id)
+            return uploaded is not None and uploaded.project_id == project_id
+        checkpoint = self._session.get(tables.Checkpoint, policy_id)
+        run = self._session.get(tables.Run, checkpoint.run_id) if checkpoint is not None else None
+        return run is not None and run.experiment.project_id == project_id
 
     def taken(self, archive_ids: Sequence[str]) -> set[str]:
         """Those of the ids under which the store has, or is about to have, an archive."""

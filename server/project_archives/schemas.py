@@ -1,6 +1,9 @@
 """What stands in a project's archive, and what came of one that was brought in.
 
 manifest.json                     ArchiveManifest
+arenas/SHA256.json                an imported arena that its trainings or evaluations use (ArenaFile)
+policies/POLICY.json              ArchivedPolicy
+policies/POLICY.onnx              the file of a policy that was uploaded
 studies/STUDY.json                ArchivedStudy
 EXPERIMENT/experiment.json        ArchivedExperiment
 EXPERIMENT/RUN/run.json           ArchivedRun
@@ -9,6 +12,7 @@ EXPERIMENT/RUN/CHECKPOINT.json    its evaluation, where it has one
 EXPERIMENT/RUN/NUMBER.points      a line of JSON (ArchivedPoints), then the points as the database keeps them
 EXPERIMENT/RUN/NUMBER.log         lines that its trainer printed (ArchivedLog)
 EXPERIMENT/RUN/end                behind all of a run
+evaluations/EVALUATION.json       ArchivedAskedEvaluation
 """
 
 from typing import Annotated, Any, Literal
@@ -16,20 +20,26 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StringConstraints
 
 from server.database.tables import RunState, StudyState, TrialState
+from server.evaluations.schemas import EvaluationFigures
+from server.evaluations.ways import KeptWays
 from server.schemas import Schema
+from server.uploads.schemas import MAX_FILE_BYTES
+from sim.config import TaskConfig
+from workers.job_protocol import CheckpointPolicy, SuiteChoice, UploadedPolicy
 from workers.reporting import EvaluationResult, EventLevel
 
 Id = Annotated[str, StringConstraints(pattern=r"^[0-9a-z]{1,16}$")]
 Text = Annotated[str, StringConstraints(pattern=r"^[^\x00]*$", max_length=100_000)]
 ShortLine = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=120)]
 Time = Annotated[float, Field(ge=0.0, le=1e11)]
+Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 Step = Annotated[int, Field(ge=0, lt=2**62)]
 
 
 class ArchiveManifest(Schema):
-    """What an archive is. Those of the first format have neither studies nor logs."""
+    """What an archive is. Those of the first format have neither studies nor logs, of the second nothing of `Kind`."""
 
-    format: Literal[1, 2] = 2
+    format: Literal[1, 2, 3] = 3
     version: ShortLine
     project: ShortLine
 
@@ -109,7 +119,7 @@ class ArchivedCheckpoint(Schema):
     step: Step
     created_at: Time
     size: int = Field(ge=1)
-    sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+    sha256: Sha256
 
 
 class ArchivedRun(Schema):
@@ -143,6 +153,32 @@ class ArchivedPoints(Schema):
     count: int = Field(ge=1, le=2**18)
 
 
+class ArchivedPolicy(Schema):
+    """An uploaded policy without its file."""
+
+    id: Id
+    name: ShortLine
+    task: TaskConfig
+    sha256: Sha256
+    size: int = Field(ge=1, le=MAX_FILE_BYTES)
+    created_at: Time
+
+
+class ArchivedAskedEvaluation(Schema):
+    """An evaluation that was asked for of the project's checkpoints and policies, and measured, or given up for a reason."""
+
+    id: Id
+    title: Annotated[ShortLine, StringConstraints(max_length=200)]
+    policy: CheckpointPolicy | UploadedPolicy = Field(discriminator="source")
+    choice: SuiteChoice
+    created_at: Time
+    error: Text | None
+    figures: EvaluationFigures | None
+    task: TaskConfig | None
+    result: EvaluationResult | None
+    ways: KeptWays | None
+
+
 class ImportedRun(Schema):
     """What came of a run."""
 
@@ -154,9 +190,22 @@ class ImportedRun(Schema):
     why: str | None = Field(description="Why it was refused.")
 
 
+Kind = Literal["arena", "policy", "evaluation"]
+
+
+class ImportedThing(Schema):
+    """What came of something beside the runs."""
+
+    kind: Kind
+    id: str = Field(description="Its id; of an arena its hash.")
+    outcome: Literal["imported", "there", "refused"]
+    why: str | None = Field(description="Why it was refused.")
+
+
 class ProjectImport(Schema):
     """What came of an archive."""
 
     project_id: str
     runs: list[ImportedRun] = Field(max_length=10_000)
     checkpoints: int = Field(description="That came with the imported runs.")
+    others: list[ImportedThing] = Field([], description="Arenas, uploaded policies, and evaluations that were asked for.")

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.errors import NotFoundError
-from server.paging import Window
+from server.http.paging import Window
 
 
 class ProjectRepository:

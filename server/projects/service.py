@@ -5,8 +5,8 @@ from threading import Lock
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from server.projects.repository import ProjectRepository
 from server.projects.schemas import Project, ProjectEdit
 from server.schemas import Page

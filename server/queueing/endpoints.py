@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, status
 
-from server.paging import WindowDep
-from server.problems import CONFLICT, FORBIDDEN, NOT_FOUND
+from server.http.paging import PartDep, WindowDep
+from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
 from server.queueing.schemas import Priority, QueuePage, WorkerName, Workers
 from server.queueing.service import QueueService
 from server.security.permissions import ADMINISTRATE, SIGNED_IN, edit
@@ -51,9 +51,9 @@ def move_to_front(run_id: str, service: QueueServiceDep, principal: PrincipalDep
 
 
 @router.get("/api/workers", dependencies=[SIGNED_IN])
-def list_workers(service: QueueServiceDep, principal: PrincipalDep) -> Workers:
+def list_workers(service: QueueServiceDep, principal: PrincipalDep, part: PartDep) -> Workers:
     """Every worker with its machine, what it trains, how busy it was, and what was last heard of it."""
-    return service.workers(principal.visible)
+    return Workers(items=part.of(service.workers(principal.visible).items))
 
 
 @router.post(

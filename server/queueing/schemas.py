@@ -36,6 +36,9 @@ class WaitingRun(Schema):
         "none with its extensions, none but those that have lost it again and again. `person limit`, `experiment limit`: "
         "as many runs of whoever launched it, or of its experiment, are under way as may be."
     )
+    parallel_runs: int | None = Field(
+        description="Of its experiment's runs that may be under way at a time; null: as the installation says."
+    )
     extensions: list[str] = Field(description="That it needs.")
     starts_in: float | None = Field(description="Seconds, by the rates of what runs; null where that is not known.")
 

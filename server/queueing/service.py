@@ -12,8 +12,8 @@ from server.database import tables
 from server.errors import ConflictError, ForbiddenError, NotFoundError
 from server.events.changes import Change
 from server.experiments.stored import StoredTraining, read_training
+from server.http.paging import Window
 from server.jobs.repository import JobRepository
-from server.paging import Window
 from server.queueing.activity import strip
 from server.queueing.forecast import Place, Turn, forecast
 from server.queueing.repository import QueueRepository
@@ -252,6 +252,7 @@ def _waiting(
         queued_at=run.queued_at,
         position=position,
         waits_for=waits_for,
+        parallel_runs=run.experiment.parallel_runs,
         extensions=[extension.name for extension in stored.training.extensions],
         starts_in=starts_in,
     )

@@ -8,8 +8,9 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
+from server.http.paging import PartDep
+from server.http.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
 from server.live.page import HEADERS
-from server.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
 from server.replays import lapse, repository, service
 from server.replays.recordings import progress_of, recording_of
 from server.replays.references import Reference, references
@@ -112,14 +113,14 @@ async def replay_progress(replayed: ReplayedDep, services: ServicesDep) -> Repla
 
 
 @router.get("/api/replays/{subjects}/beside", responses=NOT_FOUND, dependencies=[VIEW_REPLAYED])
-async def list_beside(replayed: ReplayedDep, services: ServicesDep, principal: PrincipalDep) -> BesideList:
+async def list_beside(replayed: ReplayedDep, services: ServicesDep, principal: PrincipalDep, part: PartDep) -> BesideList:
     """Who else drove the same scenarios, to be shown beside."""
     recorded = (await replayed.subjects())[0].recorded
 
     def read() -> BesideList:
         with services.database.read() as session:
             items = repository.beside(session, recorded.suite_hash, principal.visible, replayed.references)
-        return BesideList(suite=recorded.suite, items=items)
+        return BesideList(suite=recorded.suite, items=part.of(items))
 
     return await run_in_threadpool(read)
 

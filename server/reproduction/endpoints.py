@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, status
 
 from server.database.tables import DEFAULT_PROJECT
-from server.problems import CONFLICT, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.reproduction.schemas import CampaignCreate, Reproduction
 from server.reproduction.service import ReproductionService
 from server.security.permissions import LAUNCH, edit, view

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from fastapi.responses import StreamingResponse
 
-from server.problems import NOT_FOUND, Responses
+from server.http.problems import NOT_FOUND, Responses
 from server.run_log.schemas import RunLog
 from server.run_log.service import LogService
 from server.security.permissions import view

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends
 
-from server.problems import CONFLICT, NOT_FOUND
+from server.http.paging import PartDep
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.runs.schemas import RunDetail, RunEvent
 from server.runs.service import RunService
 from server.security.permissions import edit, view
@@ -39,6 +40,8 @@ def resume_run(run_id: str, service: RunServiceDep) -> RunDetail:
 
 
 @router.get("/{run_id}/events", responses=NOT_FOUND, dependencies=[view("run_id")])
-def list_events(run_id: str, service: RunServiceDep) -> list[RunEvent]:
+def list_events(run_id: str, service: RunServiceDep, part: PartDep) -> list[RunEvent]:
     """The run's event log, oldest first."""
-    return service.events(run_id)
+    events, total = service.events(run_id, part)
+    part.counted(total)
+    return events

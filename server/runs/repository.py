@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session, contains_eager, joinedload
 
 from server.database import tables
 from server.errors import NotFoundError
+from server.http.paging import Window
 from server.runs.shares import Shares
 from server.runs.states import ACTIVE
 from workers.reporting import EventLevel
@@ -65,10 +66,15 @@ class RunRepository:
             latest[metric.run_id][metric.name] = metric.value
         return latest
 
-    def events(self, run_id: str) -> Sequence[tables.RunEvent]:
-        """The run's event log, oldest first."""
+    def events(self, run_id: str, window: Window | None = None) -> Sequence[tables.RunEvent]:
+        """The run's event log, or a part of it, oldest first."""
         query = select(tables.RunEvent).where(tables.RunEvent.run_id == run_id).order_by(tables.RunEvent.id)
-        return self._session.scalars(query).all()
+        return self._session.scalars(query if window is None else query.limit(window.limit).offset(window.offset)).all()
+
+    def count_events(self, run_id: str) -> int:
+        """How long the run's event log is."""
+        query = select(func.count()).select_from(tables.RunEvent).where(tables.RunEvent.run_id == run_id)
+        return self._session.scalars(query).one()
 
     def add_event(self, run_id: str, level: EventLevel, message: str, step: int = 0) -> None:
         """Append a line to the run's event log."""

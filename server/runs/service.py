@@ -9,6 +9,7 @@ from server.audit.repository import AuditRepository
 from server.database import tables
 from server.events.changes import Change
 from server.experiments.stored import training_of
+from server.http.paging import Window
 from server.runs import states, views
 from server.runs.repository import RunRepository
 from server.runs.schemas import RunDetail, RunEvent
@@ -36,8 +37,8 @@ class RunService:
             latest = repository.latest_metrics([run_id], views.SHOWN).get(run_id, {})
             return views.run_detail(run, latest, lambda training: takers(session, run, training))
 
-    def events(self, run_id: str) -> list[RunEvent]:
-        """The run's event log, oldest first.
+    def events(self, run_id: str, window: Window) -> tuple[list[RunEvent], int]:
+        """A part of the run's event log, oldest first, and how long all of it is.
 
         Raises:
             NotFoundError: there is no such run.
@@ -45,10 +46,11 @@ class RunService:
         with self._services.database.read() as session:
             repository = RunRepository(session)
             repository.get(run_id)
-            return [
+            events = [
                 RunEvent(id=event.id, at=event.at, step=event.step, level=event.level, message=event.message)
-                for event in repository.events(run_id)
+                for event in repository.events(run_id, window)
             ]
+            return events, repository.count_events(run_id)
 
     def stop(self, run_id: str) -> RunDetail:
         """Ask the run to end: at once if it waits, after a checkpoint if a worker has it.

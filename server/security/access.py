@@ -21,9 +21,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.audit.actor import Actor, acting
 from server.errors import ForbiddenError, InvalidRequestError, ServiceError, UnauthorizedError
+from server.http.problems import error_response
 from server.people.gate import Gate
 from server.people.secret import API_PREFIX, WORKER_PREFIX
-from server.problems import error_response
 from server.security.cookies import cookie_name, session_cookie, session_cookie_name, set_login_cookie
 from server.security.limits import GuessLimiter
 from server.security.principal import ANONYMOUS, OWNER, SCRAPER, WORKER, Principal, set_principal

@@ -5,7 +5,7 @@ import hmac
 from fastapi import APIRouter, Request, Response, status
 
 from server.errors import UnauthorizedError
-from server.problems import TOO_MANY, UNAUTHORIZED
+from server.http.problems import TOO_MANY, UNAUTHORIZED
 from server.security.cookies import set_login_cookie
 from server.security.permissions import OPEN
 from server.security.schemas import Login

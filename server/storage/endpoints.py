@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from server.paging import WindowDep
-from server.problems import NOT_FOUND
+from server.http.paging import WindowDep
+from server.http.problems import NOT_FOUND
 from server.security.permissions import SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep

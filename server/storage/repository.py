@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.checkpoints.sums import add_to_sums
 from server.database import tables
-from server.paging import Window
+from server.http.paging import Window
 
 _STARTED = "a training began with it"
 _EVALUATED = "somebody had it evaluated"

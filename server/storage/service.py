@@ -18,7 +18,7 @@ from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
-from server.paging import Window
+from server.http.paging import Window
 from server.security.principal import Principal
 from server.services import Services
 from server.storage.repository import StorageRepository

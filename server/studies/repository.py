@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, selectinload
 from server.database import tables
 from server.database.tables import StudyState, TrialState
 from server.errors import NotFoundError
-from server.paging import Window
+from server.http.paging import Window
 
 _Study = tables.Study
 _Trial = tables.StudyTrial

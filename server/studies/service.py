@@ -10,8 +10,8 @@ from server.database import tables
 from server.errors import ConflictError, RefusedFieldError
 from server.experiments.repository import ExperimentRepository
 from server.experiments.service import ExperimentService, launchable
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from server.projects.repository import ProjectRepository
 from server.runs import states
 from server.runs.service import RunService, resume_run, stop_run

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response, status
 
-from server.problems import NOT_FOUND
+from server.http.problems import NOT_FOUND
 from server.security.permissions import ADMINISTRATE, OPEN, SIGNED_IN
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep

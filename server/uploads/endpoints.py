@@ -2,8 +2,8 @@
 
 from fastapi import APIRouter
 
-from server.paging import WindowDep
-from server.problems import CONFLICT, NOT_FOUND
+from server.http.paging import WindowDep
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError, RefusedFieldError, TooLargeError
+from server.http.paging import Window
 from server.ids import new_id
-from server.paging import Window
 from server.security.principal import Principal
 from server.services import Services
 from server.uploads.repository import UploadRepository

@@ -5,8 +5,8 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query
 
 from server.experiments.schemas import ExperimentState
-from server.paging import WindowDep
-from server.problems import CONFLICT, NOT_FOUND
+from server.http.paging import MAX_PAGE, Offset, PartDep, Window, WindowDep
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -98,10 +98,12 @@ def list_groups(
     project: OfProject = None,
     place: Place = "live",
     column: Columns = [],  # noqa: B006
+    limit: Annotated[int, Query(ge=1, le=MAX_PAGE, description="Groups at most.")] = MAX_PAGE,
+    offset: Offset = 0,
 ) -> Groups:
     """The experiments that a query finds by the values of one key, with intervals over all runs of each group."""
     wanted = Wanted(query=query, project_id=project, place=place, visible=principal.visible)
-    return service.groups(wanted, by=by, columns=column)
+    return service.groups(wanted, by=by, columns=column, window=Window(limit, offset))
 
 
 @router.get("/api/workbench/ids", dependencies=[SIGNED_IN])
@@ -163,9 +165,9 @@ def add_seeds(experiment_id: str, more: MoreSeeds, service: ActionServiceDep) ->
 
 
 @router.get("/api/workbench/views", dependencies=[SIGNED_IN])
-def list_views(service: ViewServiceDep) -> SavedViews:
+def list_views(service: ViewServiceDep, part: PartDep) -> SavedViews:
     """The named views of the table, by name."""
-    return service.all()
+    return SavedViews(items=part.of(service.all().items))
 
 
 @router.put("/api/workbench/views", responses=CONFLICT, dependencies=[LAUNCH])

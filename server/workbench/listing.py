@@ -16,6 +16,7 @@ from server.database.tables import RunState
 from server.estimates import in_short, last_values
 from server.experiments.pace import seconds_left
 from server.experiments.repository import aggregate_state
+from server.http.paging import Window
 from server.runs.views import SPEED
 from server.schemas import SeedMean
 from server.workbench.fields import ALIASES, ATTRIBUTES
@@ -142,14 +143,16 @@ def figures_of(
     return figures
 
 
-def grouped(session: Session, wanted: ColumnElement[bool], key: str, metrics: Sequence[str]) -> tuple[str, list[Group], int]:
-    """The wanted experiments in groups: the key's whole name, the groups, and how many there are.
+def grouped(
+    session: Session, wanted: ColumnElement[bool], key: str, metrics: Sequence[str], window: Window
+) -> tuple[str, list[Group], int]:
+    """The wanted experiments in groups: the key's whole name, the groups of the window, and how many there are.
 
     Raises:
         QueryError: there is no such key.
     """
     repository = WorkbenchRepository(session)
-    whole, found, total = repository.groups(wanted, key)
+    whole, found, total = repository.groups(wanted, key, window)
     runs = repository.runs_of(wanted)
     latest = repository.latest_of(wanted, metrics) if metrics else {}
     together = [list(chain.from_iterable(runs.get(one, ()) for one in ids)) for _, ids in found]

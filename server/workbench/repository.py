@@ -14,12 +14,12 @@ from server.database import tables
 from server.database.tables import RunState
 from server.errors import InvalidRequestError
 from server.experiments.schemas import ExperimentState
+from server.http.paging import Window
 from server.workbench.fields import asks_for, condition, in_state, resolve, values_of
 from server.workbench.language import Text, parse
 from server.workbench.schemas import Place
 
 _Experiment = tables.Experiment
-MAX_GROUPS = 200
 
 
 class LastEvaluation(NamedTuple):
@@ -152,11 +152,11 @@ class WorkbenchRepository:
             found[experiment_id].append(tag)
         return found
 
-    def groups(self, wanted: ColumnElement[bool], key: str) -> tuple[str, list[tuple[Any, list[str]]], int]:
+    def groups(self, wanted: ColumnElement[bool], key: str, window: Window) -> tuple[str, list[tuple[Any, list[str]]], int]:
         """The wanted experiments by what they have under a key, the largest groups first.
 
         Returns:
-            The key's whole name, the groups as (value, ids), and how many there are; some of the smallest may be left out.
+            The key's whole name, those groups of the window as (value, ids), and how many there are.
 
         Raises:
             QueryError: there is no such key.
@@ -168,7 +168,7 @@ class WorkbenchRepository:
         for experiment_id, value in self._session.execute(query):
             found[value].append(experiment_id)
         ordered = sorted(found.items(), key=lambda group: (-len(group[1]), group[0] is None, group[0]))
-        return whole, ordered[:MAX_GROUPS], len(ordered)
+        return whole, ordered[window.offset : window.offset + window.limit], len(ordered)
 
     def runs_of(self, wanted: ColumnElement[bool]) -> dict[str, list[ListedRun]]:
         """The runs of all wanted experiments, by experiment and seed."""

@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 from sqlalchemy.orm import Session
 
-from server.paging import Window
+from server.http.paging import Window
 from server.services import Services
 from server.workbench.fields import ALIASES, ATTRIBUTES, is_series, resolve
 from server.workbench.keys import KeyRepository
@@ -53,7 +53,7 @@ class WorkbenchService:
             matching = repository.matching(wanted)
             return MatchingIds(ids=repository.ids(matching, MAX_AT_ONCE), total=repository.count(matching))
 
-    def groups(self, wanted: Wanted, *, by: str, columns: Sequence[str]) -> Groups:
+    def groups(self, wanted: Wanted, *, by: str, columns: Sequence[str], window: Window) -> Groups:
         """The experiments that are wanted by the values of a key.
 
         Raises:
@@ -61,7 +61,7 @@ class WorkbenchService:
         """
         with self._services.database.read() as session:
             matching = WorkbenchRepository(session).matching(wanted)
-            whole, items, total = grouped(session, matching, by, _columns(session, columns)[1])
+            whole, items, total = grouped(session, matching, by, _columns(session, columns)[1], window)
             return Groups(by=whole, items=items, total=total)
 
     def keys(self, visible: Collection[str] | None) -> KnownKeys:

@@ -1,6 +1,7 @@
 """Between our own format and the geometry that the simulator drives in; and whether a robot can drive there at all."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,8 +22,8 @@ IMPORT_CLEARANCE = 0.2
 # Metres between the points of a patrol's way that are looked at.
 _PATROL_STEP = 0.02
 
-# Cells along the longer side of a large hall: through larger ones the check stays well below a second.
-_MAX_CELLS = 1000
+MAX_CELLS = 1000
+"""Cells along the longer side of a large hall: through larger ones the check stays well below a second."""
 
 
 def to_arena(document: ArenaFile) -> Arena:
@@ -92,7 +93,7 @@ def _to_entry(mover: Mover) -> AnyMover:
 
 def free_area(arena: Arena, clearance: float = IMPORT_CLEARANCE) -> float:
     """Square metres in which the robot's centre can move without leaving the largest part of the free space."""
-    cell = max(CELL, 2.0 * max(arena.half_width, arena.half_height) / _MAX_CELLS)
+    cell = max(CELL, 2.0 * max(arena.half_width, arena.half_height) / MAX_CELLS)
     _, sizes = components(free_mask(arena, clearance, cell))
     return float(sizes[0]) * cell * cell if len(sizes) else 0.0
 
@@ -118,17 +119,25 @@ def check_patrols(document: ArenaFile) -> None:
     Raises:
         ArenaFormatError: a patrol's way runs through an obstacle or a wall.
     """
+    for number, x, y in blocked_patrols(document):
+        raise ArenaFormatError(
+            f"{document.name}: movers.{number} does not get past ({x:.2f}, {y:.2f}) with its radius of "
+            f"{document.movers[number].radius:g} m: move its waypoints"
+        )
+
+
+def blocked_patrols(document: ArenaFile) -> Iterator[tuple[int, float, float]]:
+    """The patrols that do not get round, by number from 0, and the first place, metres, that each does not get past."""
     arena = to_arena(document)
     for number, mover in enumerate(arena.movers):
         if mover.kind != "patrol":
             continue  # a timed one goes as it is said to, and others find their own way
         corners = np.array([*mover.waypoints, *mover.waypoints[:1]]).reshape(-1, 2)
-        for start, end in pairwise(corners):
-            points = np.linspace(start, end, 2 + int(np.hypot(*(end - start)) / _PATROL_STEP))
-            blocked = points[free_distance(arena, points) < mover.radius]
-            if len(blocked):
-                x, y = blocked[0].tolist()
-                raise ArenaFormatError(
-                    f"{document.name}: movers.{number} does not get past ({x:.2f}, {y:.2f}) with its radius of "
-                    f"{mover.radius:g} m: move its waypoints"
-                )
+        ways = [
+            np.linspace(start, end, 2 + int(np.hypot(*(end - start)) / _PATROL_STEP)) for start, end in pairwise(corners)
+        ]
+        points = np.concatenate(ways) if ways else np.empty((0, 2))
+        blocked = points[free_distance(arena, points) < mover.radius]
+        if len(blocked):
+            x, y = blocked[0].tolist()
+            yield number, x, y

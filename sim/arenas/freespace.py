@@ -18,6 +18,9 @@ from sim.kernels.records import CELL
 MAX_CELLS = 4_000_000
 """Cells of the largest grid: 200 x 200 m."""
 
+SPAWN_MARGIN = 0.2
+"""Metres that starts and targets keep from obstacles beyond what a robot needs to pass: 0.4 m in all by default."""
+
 _HALF_DIAGONAL = CELL * 0.5**0.5
 
 

@@ -1,4 +1,4 @@
-"""What moves in an arena; where it starts and how it goes on is decided by the simulation (`sim.movers`)."""
+"""What moves in an arena; where it starts and how it goes on is decided by the simulation (`sim.engine.movers`)."""
 
 import math
 from dataclasses import dataclass

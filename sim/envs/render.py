@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.arenas.geometry import box_distance
+from sim.engine.world import World
 from sim.lidar import drawn_ray_angles, ray_origins
-from sim.world import World
 
 LONG_SIDE = 480
 """Pixels of a picture's longer side."""

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from sim.actions import action_layout
 from sim.arenas import build_task_arenas
+from sim.engine.world import World
 from sim.envs.render import render_robot
 from sim.envs.vector import Floats, Task, known_mode, read_task, single_spaces
 from sim.envs.window import Window
-from sim.world import World
 
 OUTCOMES = ("none", "arrival", "collision", "timeout")
 

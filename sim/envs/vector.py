@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from sim.actions import action_layout
 from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
+from sim.engine.rewards import term_names
+from sim.engine.world import Restart, World
 from sim.envs.render import render_robot
 from sim.observations import observation_layout
-from sim.rewards import term_names
-from sim.world import Restart, World
 
 Floats = NDArray[np.float32]
 Task = TaskConfig | Mapping[str, Any] | None

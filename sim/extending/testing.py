@@ -10,9 +10,9 @@ from sim.arenas import Arena, build_arenas
 from sim.arrays import Floats
 from sim.baselines.named import AnyBaseline, controller_of
 from sim.config import AnyArenaConfig, ObservationConfig, RewardConfig, TaskConfig
+from sim.engine.world import World
 from sim.extending.control import Controller
 from sim.extending.discovery import installed
-from sim.world import World
 
 
 def found() -> list[tuple[str, str]]:

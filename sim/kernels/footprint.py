@@ -1,6 +1,6 @@
 """Clearance of a rectangular body against walls, circles and oriented boxes, for one robot at a time.
 
-`sim.footprint` is the same written plainly; tests/sim/test_robots.py holds both against Chipmunk's shape queries.
+`sim.engine.footprint` is the same written plainly; tests/sim/test_robots.py holds both against Chipmunk's shape queries.
 """
 
 import math
@@ -42,7 +42,7 @@ def _nearest_corner(x, y, cos, sin, length, width, half_length, half_width):
 
 @kernel(fastmath=FAST)
 def _between(x, y, cos, sin, length, width, half_length, half_width):
-    """Signed distance between a rectangle and another at x, y in its frame, turned by (cos, sin); see `sim.footprint`."""
+    """Signed distance between a rectangle and another at x, y in its frame, turned by (cos, sin): `sim.engine.footprint`."""
     c = abs(cos)
     s = abs(sin)
     # The first one's middle in the other's frame.

@@ -132,7 +132,7 @@ def path_length(x, y, target_x, target_y, index, slot, grids, fields, owners):
         target_y: likewise.
         index: of the arena.
         slot: the row of `fields` that may hold the target's; -1 is none.
-        grids: `sim.paths.Grids`.
+        grids: `sim.engine.paths.Grids`.
         fields: (S, cells) int32, what `lead` wrote.
         owners: (S,) int64, of which arena's cell each is, counted through all arenas.
 

@@ -41,7 +41,7 @@ MAX_RATIO = np.float32(8.0)
 NO_MOVER = np.float32(100.0)
 """Distance of the nearest mover where there is none, metres."""
 
-# Codes of `sim.extending.expression.OPERATIONS`, which `sim.rewards` checks when it is imported.
+# Codes of `sim.extending.expression.OPERATIONS`, which `sim.engine.rewards` checks when it is imported.
 NUMBER, QUANTITY, CONSTANT, NEGATIVE, IF = range(5)
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER = range(5, 10)
 LESS, LESS_EQUAL, GREATER, GREATER_EQUAL = range(10, 14)

@@ -10,11 +10,11 @@ from sim.actions import action_layout
 from sim.arrays import Floats, PolicyFunction
 from sim.config import TaskConfig
 from sim.drivers import Driver
+from sim.engine.world import World
 from sim.errors import PlacementError, SuiteError
 from sim.kernels.records import TIMEOUT
 from sim.suites.scenarios import scenario_world
 from sim.suites.suite import Suite
-from sim.world import World
 
 Observer = Callable[[NDArray[np.int64], World, Floats], None]
 """Told before the first step, and after each one, the scenarios that were under way, the world as it is now, and the actions

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from sim.arrays import Floats
 from sim.config import TaskConfig
+from sim.engine.world import World
 from sim.suites.driving import EpisodeTable, Situation, run_controller
 from sim.suites.scenarios import scenario_world
 from sim.suites.suite import Suite
-from sim.world import World
 
 Doubles = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from sim.arenas import Arena, free_distance
 from sim.arenas.document import to_arena
 from sim.arenas.planner import Planner
 from sim.config import ArenaFile, TaskConfig
+from sim.engine.world import World, spawn_space
 from sim.errors import PlacementError
 from sim.kernels.records import CELL
 from sim.kernels.step import MIN_TARGET_DISTANCE, MOVER_ROOM, SPAWN_TRIES
 from sim.streams import EVALUATION
 from sim.suites.places import BarnPlace, ScenePlace
-from sim.world import World, spawn_space
 
 COLUMNS = ("arena", "x", "y", "heading", "target_x", "target_y", "shortest_path")
 """Of a scenario: the arena's index, metres and radians."""

@@ -197,6 +197,21 @@ def test_a_spool_that_was_not_recorded_whole_proves_nothing(tmp_path: Path) -> N
         recorder.attempts()
 
 
+def test_an_attempt_ends_at_the_line_that_was_torn_on_purpose_with_what_was_written_onto_it(tmp_path: Path) -> None:
+    recorder = Recorder([tmp_path])
+    recorder.close()
+    recorded = tmp_path / "recorded" / "77-abc-1.jsonl"
+    spool = Spool(recorded, 0)
+    for step in (10, 20, 30, 40):
+        spool.metrics(step, 1.0, {"a": 0.5})
+    spool.close()
+    first, second, third, fourth = recorded.read_bytes().splitlines(keepends=True)
+    recorded.with_suffix(".kept").write_bytes(first + second)
+    recorded.write_bytes(first + second[: len(second) // 2] + third + fourth)
+    (attempt,) = recorder.attempts()["abc"]
+    assert [entry["step"] for entry in attempt.items] == [10, 20]
+
+
 def row(state: str, attempt: int, last_seq: int) -> Progress:
     return Progress(state=state, attempt=attempt, last_seq=last_seq, step=0, losses=0, worker=None)
 

@@ -84,6 +84,7 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
         ("/policies", "[data-testid=policy]", ""),
         ("/policies/complex", "[data-testid=episode]", "Download Complex arena"),
         ("/arenas", "text=A wall", "Delete A wall"),
+        ("/arenas/draw", "text=All is well", "Start from…"),
         ("/alerts", "h1", ""),
         ("/studies", "h1", ""),
         ("/queue", "[data-testid=job]", ""),

@@ -8,7 +8,7 @@ import pytest
 from anyio import CapacityLimiter, to_thread
 from starlette.types import Message, Receive, Scope, Send
 
-from server.abandoned import AbandonedRequestsMiddleware, stop_if_abandoned
+from server.http.abandoned import AbandonedRequestsMiddleware, stop_if_abandoned
 
 SCOPE = {"type": "http", "method": "GET", "path": "/api/compare/curves", "headers": []}
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from server.api_changes import breaking, stripped
-from server.openapi import description
 from server.version import version
+from server.written.api_changes import breaking, stripped
+from server.written.openapi import description
 
 KEPT = Path(__file__).with_name("api_kept.json")
 
@@ -21,7 +21,7 @@ def now() -> dict[str, Any]:
 
 def test_nothing_breaks_without_a_new_version(now: dict[str, Any]) -> None:
     kept = json.loads(KEPT.read_text("utf-8"))
-    again = f"python -m server.api_changes {KEPT.relative_to(Path(__file__).parents[2])}"
+    again = f"python -m server.written.api_changes {KEPT.relative_to(Path(__file__).parents[2])}"
 
     assert kept["version"] == version(), f"a new version: keep what it promises ({again})"
     assert breaking(kept, now) == [], f"raise the version in pyproject.toml, say so in CHANGELOG.md, then {again}"

@@ -239,3 +239,19 @@ def test_the_command_draws_what_it_understood_and_asks_who_sits_at_a_terminal(tm
         assert "# obstacle" in done.stdout
         kept.append(len(list((data / "arenas").glob("*.json"))))
     assert kept == [0, 1]
+
+
+def test_an_arena_is_looked_over_while_it_is_drawn(client: TestClient) -> None:
+    arena = {"name": "Drawn", "width": 6.0, "height": 6.0, "target": {"x": 1.0, "y": 1.0}}
+    found = client.post("/api/arenas/reviews", json={"arena": arena}).json()
+    assert found["free_share"] == pytest.approx(found["free_area"] / 36.0, abs=1e-4)
+    assert found["remarks"] == [
+        {"refused": False, "text": "The target is not used without a start: place both, or neither.", "x": 1.0, "y": 1.0}
+    ]
+    # What is drawn is kept as a file of ours is, and what was said to be refused is.
+    kept = upload(client, json.dumps(arena), "drawn.json", keep=True)
+    assert (kept.status_code, kept.json()["title"]) == (200, "Drawn")
+    full = arena | {"boxes": [{"x": 0.0, "y": 0.0, "length": 5.6, "width": 5.6}]}
+    assert client.post("/api/arenas/reviews", json={"arena": full}).json()["remarks"][0]["refused"]
+    assert upload(client, json.dumps(full), "drawn.json").status_code == 422
+    assert client.post("/api/arenas/reviews", json={"arena": arena | {"width": -1.0}}).status_code == 422

@@ -7,7 +7,7 @@ import pytest
 
 from server.experiments.form import form_schema
 from server.experiments.schemas import ExperimentCreate
-from server.openapi import description
+from server.written.openapi import description
 from workers import config
 
 OPENAPI = Path(__file__).parents[2] / "web" / "openapi.json"

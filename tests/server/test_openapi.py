@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from server.openapi import description
+from server.written.openapi import description
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,7 +29,7 @@ def operations(document: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
 
 def test_every_run_writes_the_same(tmp_path: Path) -> None:
     file = tmp_path / "openapi.json"
-    subprocess.run([sys.executable, "-m", "server.openapi", str(file)], cwd=ROOT, check=True)
+    subprocess.run([sys.executable, "-m", "server.written.openapi", str(file)], cwd=ROOT, check=True)
 
     assert file.read_text() == description()
 

@@ -1,6 +1,7 @@
 """The built pages, or a page that says how to build them."""
 
 import gzip
+import json
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,23 @@ def test_every_route_of_the_application_is_its_one_page(dist: Path, client: Test
     assert response.headers["content-type"].startswith("text/html")
     assert response.text == (dist / "index.html").read_text()
     # A new build must be seen at the next visit.
+    assert response.headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize(
+    ("path", "page"),
+    [("/", "Trainings"), ("/runs/abc", "Run"), ("/board", "Board"), ("/board/abc", "Board"), ("/runs/a/b", "NotFound")],
+)
+def test_a_route_has_the_html_of_its_page(dist: Path, client: TestClient, path: str, page: str) -> None:
+    (dist / "pages").mkdir()
+    routes = (("/", "TrainingsPage.html"), ("/runs/[^/]+", "RunPage.html"), ("/board(/[^/]+)?", "BoardPage.html"))
+    (dist / "pages" / "routes.json").write_text(json.dumps(routes))
+    for file in ("TrainingsPage.html", "RunPage.html", "BoardPage.html", "NotFoundPage.html"):
+        (dist / "pages" / file).write_text(f"<!doctype html><title>{file}</title>")
+
+    response = client.get(path)
+
+    assert response.text == f"<!doctype html><title>{page}Page.html</title>"
     assert response.headers["cache-control"] == "no-cache"
 
 

@@ -42,6 +42,7 @@ TABLE = {
         GET /api/status
         GET /api/storage
         GET /api/account
+        GET /api/sign-in/provider/end
         POST /api/sign-out
         GET /api/projects
         GET /api/training/form
@@ -63,6 +64,7 @@ TABLE = {
         GET /api/arenas/imported/{sha256}
         GET /api/evaluations
         GET /api/uploads
+        GET /api/suites
         GET /api/field
         GET /api/leaderboards
         GET /api/leaderboards/{suite_hash}
@@ -87,6 +89,10 @@ TABLE = {
         POST /api/reproduction
         POST /api/studies
         POST /api/arenas/imported
+        POST /api/arenas/reviews
+        POST /api/suites
+        POST /api/suites/{suite_id}/scenarios
+        DELETE /api/suites/{suite_id}/scenarios/{sha256}
     """,
     "invite": """
         GET /api/invitations
@@ -180,6 +186,7 @@ TABLE = {
     "administrate": """
         POST /api/projects
         DELETE /api/arenas/imported/{sha256}
+        DELETE /api/suites/{suite_id}
         POST /api/workers/drain
         POST /api/workers/remove
         GET /api/jobs

@@ -1,6 +1,8 @@
 """A project leaves one server whole and comes to another one with the same ids, run by run."""
 
 import asyncio
+import base64
+import hashlib
 import io
 import json
 import tarfile
@@ -26,8 +28,14 @@ from server.run_log.repository import LogRepository
 from server.services import Services
 from server.settings import Settings
 from server.studies.schemas import StudySpec
+from sim.config import ArenaFile
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+from tests.server.test_evaluations import ended
+from tests.server.test_own_suites import add, made, scenario
+from tests.workers.test_onnx_policy import SIZE, graph
+from workers.export.bundle import bundle, export_checkpoint
 from workers.protocol import LogBatch, LogLine
+from workers.shipped.library import shipped_policy
 
 SEARCHED = StudySpec.model_validate(
     {"training": {}, "settings": [{"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}]}
@@ -188,6 +196,124 @@ def test_a_project_comes_over_whole_with_the_same_ids(
     assert [run.outcome for run in again.runs] == ["there", "there"]
 
 
+LAB = {"name": "Lab", "width": 6.0, "height": 6.0, "circles": [{"x": 1.0, "y": 0.5, "radius": 0.3}]}
+
+
+@pytest.fixture
+def measured(client: TestClient, services: Services, job_worker: None) -> list[dict[str, Any]]:
+    """A checkpoint on an imported arena, an uploaded policy on a suite of one's own, both driven; one that is refused."""
+    here = Server(client, services)
+    arena = {"name": "imported", "sha256": services.arenas.add(ArenaFile.model_validate(LAB))}
+    task = shipped_policy("simple").card.training.task.model_dump(mode="json")
+    run = here.reports.experiment("Measured", task={**task, "arena": arena})["runs"][0]
+    policies: list[Any] = [{"source": "checkpoint", "id": checkpoint(here, run, 1_000, None)}]
+    uploads: list[tuple[bytes, dict[str, Any]]] = [
+        (bundle(export_checkpoint(SHIPPED)), {}),
+        (graph(numbers=SIZE + 1), {"task": {}}),
+    ]
+    for content, more in uploads:
+        body = {"name": "From elsewhere", "content": base64.b64encode(content).decode(), **more}
+        policies.append({"source": "uploaded", "id": client.post("/api/uploads", json=body).json()["id"]})
+    suite = made(client)
+    add(client, suite, scenario(services, "empty"))
+    suites = [{"by": "arena", "arena": arena}, {"by": "scenarios", "id": suite}, {"by": "own"}]
+    return [
+        ended(client, client.post("/api/evaluations", json={"policies": [policy], "suites": [suite]}).json()[0])
+        for policy, suite in zip(policies, suites, strict=True)
+    ]
+
+
+def others(http: TestClient, asked: list[dict[str, Any]]) -> list[Any]:
+    """What the API says of uploads, arenas and evaluations."""
+    get: Callable[[str], Any] = lambda path: http.get(path).raise_for_status().json()  # noqa: E731
+    done = [each["id"] for each in asked if each["figures"]]
+    return [
+        get("/api/uploads"),
+        [{**arena, "imported_at": None} for arena in get("/api/arenas")],
+        # But for the job, which was the other server's.
+        [{**get(f"/api/evaluations/{each['id']}"), "job_id": None} for each in asked],
+        [get(f"/api/evaluations/{each}/episodes") for each in done],
+        [get(f"/api/evaluations/{each}/ways") for each in done],
+        [get(f"/api/leaderboards/{each['suite_hash']}") for each in asked if each["figures"]],
+    ]
+
+
+def test_what_was_measured_comes_along_and_back(
+    client: TestClient, servers: tuple[Server, Server], measured: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    assert [each["state"] for each in measured] == ["done", "done", "failed"]
+    mine, (there, _) = mapless_client.Client(BASE_URL, http=client), servers
+
+    came = there.client.import_project(mine.export_project("default", tmp_path), "default")
+
+    kinds = [*[("arena", "imported")] * 2, *[("policy", "imported")] * 2, *[("evaluation", "imported")] * 3]
+    assert [(each.kind, each.outcome) for each in came.others] == kinds
+    before = others(client, measured)
+    assert others(there.http, measured) == before
+    # The files came to the bit, and a policy drives there: a new evaluation can be asked for, and is no old one.
+    upload = before[0]["items"][0]["id"]
+    with there.services.database.read() as theirs:
+        file = theirs.get_one(tables.UploadedPolicy, upload).graph
+    assert hashlib.sha256(file).hexdigest() == before[0]["items"][0]["sha256"]
+    policy = {"source": "uploaded", "id": upload}
+    (again,) = there.http.post("/api/evaluations", json={"policies": [policy]}).json()
+    assert (again["state"], again["id"] in {each["id"] for each in measured}) == ("queued", False)
+
+    # And back, where all of it was lost.
+    archive = there.client.export_project("default", tmp_path / "back")
+    for each in measured:
+        assert client.delete(f"/api/evaluations/{each['id']}").status_code == 204
+    for item in before[0]["items"]:
+        assert client.delete(f"/api/uploads/{item['id']}").status_code == 204
+    back = mine.import_project(archive, "default")
+    assert [(each.kind, each.outcome) for each in back.others] == [("arena", "there")] * 2 + kinds[2:]
+    assert others(client, measured) == before
+    assert {each.outcome for each in mine.import_project(archive, "default").others} == {"there"}
+
+
+def test_what_is_damaged_or_anothers_is_refused_beside_the_runs(
+    client: TestClient, servers: tuple[Server, Server], measured: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    there, _ = servers
+    archive = mapless_client.Client(BASE_URL, http=client).export_project("default", tmp_path)
+
+    def refused(change: Callable[[str, bytes], bytes | None]) -> dict[str, str]:
+        answer = send(there, rewritten(archive, change)).json()
+        return {each["kind"]: each["why"] for each in answer["others"] if each["outcome"] == "refused"}
+
+    def damaged(name: str, content: bytes) -> bytes | None:
+        if name.endswith(".onnx"):
+            return content[:-1] + b"x"
+        if name.startswith("arenas/"):
+            return content.replace(b"0.3", b"0.4")
+        return content if name.startswith(("policies/", "manifest", "evaluations/")) else None
+
+    without_runs = refused(damaged)
+    assert without_runs["arena"] == "it is not the arena of its hash"
+    assert "SHA-256" in without_runs["policy"]
+    assert "is not in this project" in without_runs["evaluation"]
+    with there.services.database.read() as session:
+        assert session.query(tables.UploadedPolicy).count() == session.query(tables.PolicyEvaluation).count() == 0
+    # Nobody brings figures into another project by an archive: its policies are not theirs.
+    other = there.http.post("/api/projects", json={"name": "Other"}).json()["id"]
+    assert send(there, archive.read_bytes()).status_code == 200
+    content = rewritten(archive, lambda name, content: content if name.startswith(("manifest", "evaluations/")) else None)
+    for old in measured:
+        content = content.replace(old["id"].encode(), old["id"][::-1].encode())
+    answer = there.http.post(f"/api/projects/{other}/import", content=content).json()
+    assert {each["outcome"] for each in answer["others"]} == {"refused"}
+
+
+def test_an_archive_of_the_second_format_is_read(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    archive = rewritten(
+        here.client.export_project("default", tmp_path), lambda _, content: content.replace(b'"format":3', b'"format":2')
+    )
+    assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]
+
+
 def rewritten(archive: Path, change: Callable[[str, bytes], bytes | None]) -> bytes:
     """The archive with some of its files changed, or left out."""
     out = io.BytesIO()
@@ -294,7 +420,7 @@ def test_an_archive_of_the_first_format_is_read(
         if name.endswith("experiment.json"):
             told = json.loads(content)
             return json.dumps({key: told[key] for key in told.keys() - {"campaign", "campaign_row", "study_id"}}).encode()
-        return content.replace(b'"format":2', b'"format":1') if name == "manifest.json" else content
+        return content.replace(b'"format":3', b'"format":1') if name == "manifest.json" else content
 
     archive = rewritten(here.client.export_project("default", tmp_path), before)
     assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]

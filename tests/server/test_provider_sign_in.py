@@ -441,3 +441,18 @@ def test_names_become_such_as_accounts_have(settings: Settings, claims: dict[str
 def test_settings_that_can_not_be_meant(wrong: dict[str, Any], says: str) -> None:
     with pytest.raises(ValidationError, match=says):
         Settings.model_validate(wrong)
+
+
+def test_who_signs_out_is_led_to_the_providers_page_that_ends_the_session_there_and_back(
+    serve: Serve, provider: OidcProvider
+) -> None:
+    provider.knows(ada=ADA)
+    browser = serve(strangers=True)
+    assert browser.get("/api/sign-in/provider/end").status_code == 401
+    sign_in(browser, provider)
+
+    url = browser.get("/api/sign-in/provider/end").json()["url"]
+
+    assert url.startswith(provider.issuer)
+    # The provider checks the address against those that it knows, and asks its visitor.
+    assert provider.sign_out(url) == f"{BASE_URL}/"

@@ -147,7 +147,7 @@ def imported_by(statement: str) -> set[str]:
 
 
 def test_the_server_starts_without_what_only_workers_need() -> None:
-    loaded = imported_by("import server.app, server.serve")
+    loaded = imported_by("import server.app, server.processes.serve")
 
     assert "fastapi" in loaded
     assert loaded.isdisjoint({"torch", "pymunk", "numba", "scipy"})

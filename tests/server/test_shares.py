@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from server.app import create_services
 from server.database import tables
 from server.errors import ConflictError
-from server.paging import Window
+from server.http.paging import Window
 from server.queueing.service import QueueService
 from server.runs.repository import RunRepository
 from server.runs.shares import Shares

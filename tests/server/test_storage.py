@@ -13,7 +13,7 @@ from server.checkpoints.archives import sweep_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.files import StoredFile
-from server.paging import Window
+from server.http.paging import Window
 from server.security.principal import OWNER
 from server.services import Services
 from server.settings import Settings

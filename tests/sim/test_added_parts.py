@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from pydantic import Field, ValidationError
 
-from sim.added_parts import AddedParts
 from sim.arenas import build_arenas
 from sim.config import (
     ActionsPart,
@@ -23,14 +22,15 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
 )
+from sim.engine.added_parts import AddedParts
+from sim.engine.plain import PlainWorld
+from sim.engine.world import Restart, World
 from sim.errors import ObservationError
 from sim.extending import Extension, ObservationNumber, ObservationPart
 from sim.extending.discovery import complete, discover
 from sim.extending.observing import Sight
 from sim.kernels.records import NONE
 from sim.observations import observation_layout, observation_size
-from sim.plain import PlainWorld
-from sim.world import Restart, World
 
 BATCHES = 6
 

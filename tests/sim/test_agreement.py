@@ -27,10 +27,10 @@ from sim.config import (
     TimeTerm,
     preset_terms,
 )
+from sim.engine.plain import PlainWorld, exact_arc
+from sim.engine.world import World
 from sim.errors import ArenaError
 from sim.kernels.records import ARRIVAL, COLLISION, NONE, TIMEOUT
-from sim.plain import PlainWorld, exact_arc
-from sim.world import World
 from tests.sim.scenes import arenas
 
 REWARDS = {

@@ -10,8 +10,8 @@ from sim.arenas import Arena, Mover, build_arenas
 from sim.arenas.drawing import draw
 from sim.arenas.files import load_arena, read_arena, to_arena, to_document, write_own
 from sim.config import ArenaConfig, ArenaFile, TaskConfig, Timed
+from sim.engine.world import World
 from sim.errors import ArenaFileError
-from sim.world import World
 
 WALL = """<model name="back_wall"><static>1</static>\\   <pose frame=>-10 0 .5 0 0 0</pose>
   <link name="box_link"><collision name='c'><geometry><box><size>.5 20 1</size></box></geometry>

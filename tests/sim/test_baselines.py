@@ -24,8 +24,8 @@ from sim.config import (
     SingleMount,
     TaskConfig,
 )
+from sim.engine.footprint import rectangle_clearance
 from sim.errors import BaselineError
-from sim.footprint import rectangle_clearance
 from sim.suites import Situation, Suite, SuiteRules, load_suite, run_controller
 
 AROUND = TaskConfig(

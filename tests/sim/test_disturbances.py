@@ -18,9 +18,9 @@ from sim.config import (
     RewardConfig,
     TaskConfig,
 )
+from sim.engine.plain import exact_arc
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.records import QUANTITIES
-from sim.plain import exact_arc
 from sim.scan import scan
 
 COMPLEX = ArenaConfig(name="complex")

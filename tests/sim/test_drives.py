@@ -33,12 +33,12 @@ from sim.config import (
     TaskConfig,
     preset_terms,
 )
+from sim.engine.plain import PlainWorld, exact_arc
+from sim.engine.world import World
 from sim.envs.point_goal import PointGoalEnv
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError
-from sim.plain import PlainWorld, exact_arc
 from sim.suites import load_suite, run_controller, run_suite
-from sim.world import World
 from tests.sim.scenes import arenas
 from tests.sim.test_agreement import OUTCOMES, assert_observations_equal
 

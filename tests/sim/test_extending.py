@@ -14,11 +14,11 @@ from sim.arenas.families import FAMILIES, generate_arena
 from sim.arenas.families.layout import Plan
 from sim.arrays import Floats
 from sim.config import AddedArenaPool, RewardConfig, TaskConfig, TimeTerm
+from sim.engine.rewards import evaluate, parameters_of, program_of
+from sim.engine.world import World
 from sim.errors import FormulaError
 from sim.extending import ArenaFamily, Extension, Part, RewardTerm
 from sim.extending.discovery import UsedExtension, complete, discover, missing
-from sim.rewards import evaluate, parameters_of, program_of
-from sim.world import World
 
 DECLARATION = """
 from typing import Literal

@@ -4,14 +4,16 @@ import ast
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 import sim.kernels
 import workers.kernels
 from sim.kernels.movers import move_movers
-from sim.kernels.options import kernels_in
+from sim.kernels.options import bound, kernels_in
 from sim.kernels.sensing import scan_poses
 from sim.kernels.step import step_usual_robots
+from workers.kernels.adam import adam_step
 from workers.kernels.dense import tanh
 
 
@@ -49,3 +51,13 @@ def test_kernels_use_nothing_of_ours_that_their_key_leaves_out(package: ModuleTy
             ours = [name for name in names if name.split(".")[0] in {"sim", "workers", "server"}]
             beyond = [name for name in ours if not name.startswith(package.__name__) and name != "sim.kernels.options"]
             assert not beyond, f"{path.name} takes from {beyond}"
+
+
+def test_a_kernel_that_is_bound_is_its_code_for_those_types() -> None:
+    numbers = np.array([0.5, -2.0, 3.0], np.float32)
+    gradients, mean, square = np.full((3, 3), 0.25, np.float32)
+    given = (numbers.copy(), gradients, mean, square, 1e-3, 1e-8)
+    bound(adam_step, *given)(*given)
+    again = (numbers.copy(), gradients, np.full(3, 0.25, np.float32), np.full(3, 0.25, np.float32), 1e-3, 1e-8)
+    adam_step(*again)
+    np.testing.assert_array_equal(given[0], again[0])

@@ -19,13 +19,13 @@ from sim.config import (
     RewardConfig,
     TaskConfig,
 )
+from sim.engine.plain import PlainWorld
+from sim.engine.world import World
 from sim.envs.render import render_robot
 from sim.errors import ArenaError
 from sim.lidar import ray_origins
 from sim.observations import observation_layout
-from sim.plain import PlainWorld
 from sim.scan import scan
-from sim.world import World
 from tests.sim.scenes import arenas
 from tests.sim.test_agreement import OUTCOMES, assert_observations_equal
 

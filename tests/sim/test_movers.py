@@ -20,18 +20,18 @@ from sim.config import (
     RandomisationConfig,
     TaskConfig,
 )
+from sim.engine.movers import Movers
+from sim.engine.physics import add_arena, robot_body, tile_origins
+from sim.engine.shapes import hulls, pack_shapes
+from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError
 from sim.kernels.avoidance import choose_velocity, free_part
 from sim.kernels.records import MAX_LINEAR
 from sim.kernels.surroundings import free_length, obstacle_lines
-from sim.movers import Movers
-from sim.physics import add_arena, robot_body, tile_origins
-from sim.shapes import hulls, pack_shapes
 from sim.streams import ENVIRONMENT
 from sim.suites import load_suite
 from sim.suites.scenarios import draw_scenarios, scenario_world
-from sim.world import World
 from tests.sim.scenes import random_arena
 from tests.sim.test_sensing import TOLERANCE, chipmunk_scan, grazing
 from tests.sim.test_vector_env import drive, random_actions

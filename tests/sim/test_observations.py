@@ -27,11 +27,11 @@ from sim.config import (
     TaskConfig,
     preset_parts,
 )
+from sim.engine.plain import PlainWorld
+from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import ArenaError, ObservationError
 from sim.observations import observation_layout, observation_size
-from sim.plain import PlainWorld
-from sim.world import World
 from tests.sim.scenes import arenas
 
 COMPLEX = ArenaConfig(name="complex")

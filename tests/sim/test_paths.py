@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from sim.arenas import Arena, build_arenas
 from sim.arenas.planner import Planner
 from sim.config import ArenaConfig, PathProgressTerm, RewardConfig, TaskConfig
+from sim.engine.paths import Paths
+from sim.engine.world import World, spawn_space
 from sim.errors import ArenaError, PlacementError
-from sim.paths import Paths
-from sim.world import World, spawn_space
 from tests.sim.scenes import arenas
 
 CLEARANCE = TaskConfig().passable_clearance

@@ -11,11 +11,11 @@ from sim.arenas import Arena, Mover, free_distance
 from sim.arenas.document import to_arena, to_document
 from sim.baselines.simple import go_to_goal
 from sim.config import ArenaFile, JackalConfig, MoverKind, MoversConfig, TaskConfig
+from sim.engine.world import World
 from sim.errors import ArenaError, PlacementError, SuiteError
 from sim.suites import Suite, SuiteRules, content_hash, load_suite, run_controller
 from sim.suites.people import body_gaps, robots_fault, run_among_people
 from sim.suites.scenarios import scenario_world
-from sim.world import World
 from tests.sim.scenes import random_arena
 
 TASK = TaskConfig(step_limit=10_000)

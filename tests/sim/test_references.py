@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from sim.arenas import build_task_arenas
 from sim.config import TaskConfig
+from sim.engine.plain import PlainWorld
 from sim.envs.point_goal import PointGoalVectorEnv
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.records import ARRIVAL
-from sim.plain import PlainWorld
 from tests.references import check, digest
 
 FILE = Path(__file__).parent / "references.json"

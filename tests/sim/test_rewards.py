@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim.config import FormulaTerm, ProgressTerm, RewardConfig, RewardTerm, SmoothnessTerm, TaskConfig, preset_terms
+from sim.engine.rewards import Formulas, constants, evaluate, term_names
+from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.errors import FormulaError
 from sim.extending.expression import CONSTANTS, MAX_DEPTH, QUANTITIES, parse
-from sim.rewards import Formulas, constants, evaluate, term_names
-from sim.world import World
 
 
 def formula(text: str, weight: float = 1.0) -> RewardConfig:

@@ -20,14 +20,14 @@ from sim.config import (
     TaskConfig,
     WaffleConfig,
 )
+from sim.engine.footprint import rectangle_clearance
+from sim.engine.physics import add_arena, robot_body
+from sim.engine.plain import PlainWorld
+from sim.engine.world import World
 from sim.envs.render import render_robot
 from sim.errors import PlacementError, SuiteError
-from sim.footprint import rectangle_clearance
-from sim.physics import add_arena, robot_body
-from sim.plain import PlainWorld
 from sim.scan import body_clearances, clearances
 from sim.suites import load_suite, run_suite, suite_for
-from sim.world import World
 from tests.sim.scenes import arenas
 from tests.sim.test_sensing import random_poses
 

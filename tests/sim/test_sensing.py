@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.arenas import Arena, free_distance
 from sim.config import LidarConfig
+from sim.engine.physics import add_arena
 from sim.lidar import drawn_ray_angles, ray_angles
-from sim.physics import add_arena
 from sim.scan import clearances, scan
 from tests.sim.scenes import arenas
 

@@ -206,7 +206,7 @@ def test_actions_beyond_the_limits_are_clipped() -> None:
 
 def test_a_fast_robot_does_not_jump_through_a_thin_wall() -> None:
     from sim.arenas import Arena
-    from sim.world import World
+    from sim.engine.world import World
 
     wall = Arena("wall", boxes=np.array([[0.0, 0.0, 0.02, 4.9, 0.0]]))
     task = TaskConfig.model_validate({"robot": {"max_linear_speed": 3.0}, "collision_distance": 0.0})

@@ -4,7 +4,6 @@ import pytest
 import torch
 from torch import nn
 
-from workers.algorithms import flat
 from workers.algorithms.flat import FlatAdam, FlatParameters
 
 
@@ -18,7 +17,7 @@ def test_adam_steps_as_torchs(path: str, monkeypatch: pytest.MonkeyPatch) -> Non
     ours, theirs = make_network(), make_network()
     adam = FlatAdam(ours, learning_rate=1e-2)
     if path == "tensors":  # as on any other device than a CPU
-        monkeypatch.setattr(flat, "adam_step", lambda *vectors: adam._step_in_tensors(*vectors[-2:]))
+        monkeypatch.setattr(adam, "_compiled", None)
     reference = torch.optim.Adam(theirs.parameters(), lr=1e-2)
     for step in range(50):
         inputs = torch.randn(16, 3, generator=torch.Generator().manual_seed(step))
@@ -42,11 +41,18 @@ def test_values_and_gradients_are_the_modules_own() -> None:
     assert torch.equal(parameters.gradients[-2:], torch.ones(2))  # the last bias adds to the sum as it is
 
 
-def test_nan_is_seen() -> None:
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf")])
+def test_what_is_not_finite_is_seen(number: float) -> None:
     parameters = FlatParameters(make_network())
     assert parameters.finite
-    parameters.values[5] = float("nan")
+    parameters.values[5] = number
     assert not parameters.finite
+
+
+def test_numbers_whose_sum_is_not_finite_are() -> None:
+    parameters = FlatParameters(make_network())
+    parameters.values.fill_(3e38)
+    assert parameters.finite
 
 
 def test_nan_in_a_gradient_is_not_clipped_away() -> None:

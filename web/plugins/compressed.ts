@@ -1,4 +1,4 @@
-/** Each asset a second and a third time, as small as it gets: the server sends these to whoever takes them (`server/pages.py`). */
+/** Each asset a second and a third time, as small as it gets: the server sends these to whoever takes them (`server/http/pages.py`). */
 import { writeFileSync } from 'node:fs'
 import { join } from 'node:path'
 import { brotliCompressSync, gzipSync } from 'node:zlib'

@@ -1,5 +1,5 @@
 /**
- * Writes src/api/schema.ts from openapi.json (which `python -m server.openapi` writes); with --check, writes nothing and
+ * Writes src/api/schema.ts from openapi.json (which `python -m server.written.openapi` writes); with --check, writes nothing and
  * fails where the committed file differs.
  */
 import { readFile, writeFile } from 'node:fs/promises'

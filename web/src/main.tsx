@@ -1,31 +1,48 @@
 /** Starts the pages. */
-import '@mantine/core/styles.css'
-import '@mantine/notifications/styles.css'
+import '@mantine/core/styles/baseline.layer.css'
+import '@mantine/core/styles/default-css-variables.layer.css'
+import '@mantine/core/styles/global.layer.css'
 import './global.css'
 import { QueryClientProvider } from '@tanstack/react-query'
-import { StrictMode, useLayoutEffect } from 'react'
+import { StrictMode, startTransition, useLayoutEffect } from 'react'
 import { createRoot } from 'react-dom/client'
-import { RouterProvider } from 'react-router/dom'
+import { BrowserRouter } from 'react-router'
 import { createQueryClient } from './api/client'
-import { createRouter } from './app'
+import { App } from './app'
 import { Providers } from './components/Providers'
 
 const root = document.getElementById('root')
 if (!root) throw new Error('index.html has no element with the id "root".')
 
-/** Takes the frame of index.html away in the same picture in which the application's own stands. */
+/** Takes the frame of the HTML away in the same picture in which the application's own stands; the focus goes along. */
 function FrameGone() {
-  useLayoutEffect(() => document.getElementById('frame')?.remove(), [])
+  useLayoutEffect(() => {
+    const frame = document.getElementById('frame')
+    const focused = frame?.querySelector(':focus')
+    const there = focused && document.querySelector<HTMLElement>(`#root ${selectorOf(focused)}`)
+    frame?.remove()
+    there?.focus()
+  }, [])
   return null
 }
 
-createRoot(root).render(
-  <StrictMode>
-    <FrameGone />
-    <QueryClientProvider client={createQueryClient()}>
-      <Providers>
-        <RouterProvider router={createRouter()} />
-      </Providers>
-    </QueryClientProvider>
-  </StrictMode>,
+const selectorOf = (element: Element) =>
+  element instanceof HTMLAnchorElement
+    ? `header a[href="${element.getAttribute('href')}"]:not([aria-label="Mapless, home"])`
+    : `[aria-label="${element.getAttribute('aria-label')}"]`
+
+// A transition: drawn in slices, between which the browser answers.
+startTransition(() =>
+  createRoot(root).render(
+    <StrictMode>
+      <QueryClientProvider client={createQueryClient()}>
+        <Providers>
+          <BrowserRouter>
+            <App />
+          </BrowserRouter>
+        </Providers>
+      </QueryClientProvider>
+      <FrameGone />
+    </StrictMode>,
+  ),
 )

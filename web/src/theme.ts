@@ -1,5 +1,6 @@
 /** Colours, type and component defaults: quiet greys, one petrol accent, dense controls. */
 import { type CSSVariablesResolver, createTheme, type MantineColorsTuple } from '@mantine/core'
+import type { KeyboardEvent } from 'react'
 
 const petrol: MantineColorsTuple = [
   '#eaf6f8',
@@ -78,6 +79,15 @@ export const theme = createTheme({
         withInitialFocusPlaceholder: false,
       },
     },
+    // Escape closes it by itself; the focus goes back to the button that opened it, not to a dialog that comes after it.
+    MenuDropdown: {
+      defaultProps: {
+        onKeyDown: ({ key, currentTarget }: KeyboardEvent<HTMLElement>) => {
+          const opener = currentTarget.getAttribute('aria-labelledby')
+          if (key === 'Escape' && opener) document.getElementById(opener)?.focus()
+        },
+      },
+    },
     // What lies over a page belongs to its content, for those who go from landmark to landmark.
     Portal: { defaultProps: { target: '#main' } },
     Table: {
@@ -86,25 +96,16 @@ export const theme = createTheme({
   },
 })
 
-/** The page is a shade off the panels that lie on it. */
+/** Of the frame's own colours (frame.css) those that Mantine has names for. */
 export const cssVariables: CSSVariablesResolver = () => ({
-  variables: {},
-  light: {
-    '--mantine-color-body': '#ffffff',
-    '--mapless-page': '#f6f7f7',
-    '--mapless-line': '#e1e5e7',
-    '--mapless-text-quiet': '#5d6870',
-    '--mantine-color-dimmed': '#5d6870',
-    '--mantine-color-text': '#1c2327',
+  variables: {
+    '--mantine-color-body': 'var(--mapless-panel)',
+    '--mantine-color-text': 'var(--mapless-text)',
+    '--mantine-color-dimmed': 'var(--mapless-text-quiet)',
   },
+  light: {},
   dark: {
-    '--mantine-color-body': '#171b1f',
-    '--mapless-page': '#101316',
-    '--mapless-line': '#2a3036',
-    '--mapless-text-quiet': '#97a1a9',
     '--mantine-color-default-border': '#353c43',
-    '--mantine-color-dimmed': '#97a1a9',
     '--mantine-color-error': 'var(--mantine-color-red-5)',
-    '--mantine-color-text': '#dbe0e4',
   },
 })

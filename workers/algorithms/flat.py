@@ -1,7 +1,8 @@
 """The parameters of several modules as one vector: one kernel instead of one per layer, for Adam, clipping and averages."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import accumulate
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from sim.kernels.options import bound
 from workers.kernels.adam import BETA1, BETA2, EPSILON, AdamSteps, adam_step, clip_norm
 
 
@@ -41,7 +43,8 @@ class FlatParameters:
     @property
     def finite(self) -> bool:
         """Whether every parameter is a finite number."""
-        return bool(torch.isfinite(self.values).all())
+        # Their sum tells at once, unless it is too large while they are not.
+        return math.isfinite(float(self.values.sum())) or bool(torch.isfinite(self.values).all())
 
     @torch.no_grad()
     def take_over(self, values: NDArray[np.generic]) -> None:
@@ -70,14 +73,18 @@ class FlatAdam(FlatParameters):
         self._steps = 0
         self._mean = torch.zeros_like(self.values)
         self._square = torch.zeros_like(self.values)
+        self._compiled: Callable[[float, float], None] | None = None
+        if self.values.device.type == "cpu":
+            vectors = (self.values, self.gradients, self._mean, self._square)
+            arrays = [vector.numpy() for vector in vectors]
+            self._compiled = partial(bound(adam_step, *arrays, 0.0, 0.0), *arrays)
 
     @torch.no_grad()
     def step(self) -> None:
         """One step against `gradients`."""
         rate, epsilon = self._next()
-        if self.values.device.type == "cpu":
-            vectors = (self.values, self.gradients, self._mean, self._square)
-            adam_step(*(vector.numpy() for vector in vectors), rate, epsilon)
+        if self._compiled is not None:
+            self._compiled(rate, epsilon)
         else:
             self._step_in_tensors(rate, epsilon)
 

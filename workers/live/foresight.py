@@ -12,7 +12,7 @@ from sim.arenas import Arena, free_distance
 from sim.arrays import PolicyFunction
 from sim.config import LidarConfig, TaskConfig
 from sim.drivers import Driver
-from sim.world import World
+from sim.engine.world import World
 from workers.live.showcase import along_arc
 from workers.play_protocol import MAX_ARROWS, MAX_WAY_POINTS, Place, PlaySeen
 

@@ -8,8 +8,8 @@ from sim.arenas import build_task_arenas
 from sim.arrays import PolicyFunction
 from sim.config import ArenaPool, TaskConfig
 from sim.drivers import Driver
+from sim.engine.world import World
 from sim.scan import scan
-from sim.world import World
 from workers.frames import Frame
 
 

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from sim.kernels.options import bound
 from workers.kernels.networks import RELU, RESBLOCK, TANH, Passes, backward, forward, input_gradient
 from workers.networks.config import MlpNetwork, ResBlockNetwork
 from workers.networks.modules import Described
@@ -71,21 +72,25 @@ class TensorPasses:
     """A network's passes for CPU tensors of any layout; results are buffers that the next call overwrites."""
 
     def __init__(self, network: nn.Module, rows: int) -> None:
-        self._passes = passes_of(network, rows)
+        self._passes = passes = passes_of(network, rows)
         self._inputs: NDArray[np.float32]
+        table = np.empty((1, 1), np.float32)
+        self._forward = bound(forward, passes, table, False)
+        self._backward = bound(backward, passes, table, table, False)
+        self._input_gradient = bound(input_gradient, passes, table)
 
     def forward(self, inputs: Tensor) -> Tensor:
         """(n, inputs) to (n, outputs), n at most the rows that there are buffers for."""
         self._inputs = _contiguous(inputs)
-        return torch.from_numpy(forward(self._passes, self._inputs, False))
+        return torch.from_numpy(self._forward(self._passes, self._inputs, False))
 
     def backward(self, grad_output: Tensor) -> None:
         """Overwrites every parameter's `.grad`: `grad_output` (n, outputs) is a scalar's derivative by the last outputs."""
-        backward(self._passes, self._inputs, _contiguous(grad_output), False)
+        self._backward(self._passes, self._inputs, _contiguous(grad_output), False)
 
     def input_gradient(self, grad_output: Tensor) -> Tensor:
         """The derivative (n, inputs) of that scalar by the inputs; leaves the parameters' `.grad` alone."""
-        return torch.from_numpy(input_gradient(self._passes, _contiguous(grad_output)))
+        return torch.from_numpy(self._input_gradient(self._passes, _contiguous(grad_output)))
 
 
 def inference(network: nn.Module, rows: int) -> Callable[[Tensor], Tensor]:

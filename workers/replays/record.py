@@ -13,9 +13,9 @@ from sim.actions import action_layout
 from sim.arenas.document import to_document
 from sim.arrays import Floats
 from sim.config import TaskConfig
+from sim.engine.world import World
 from sim.kernels.records import MAX_ANGULAR, MAX_LINEAR
 from sim.suites import Observer, Suite
-from sim.world import World
 from workers.errors import EpisodesTooLongError
 from workers.job_protocol import OWN_SUITE, AnyPolicy, EvaluateJob, Measurement, SuiteChoice
 from workers.replays.recording import Recording

@@ -12,8 +12,8 @@ from sim.arenas.document import to_document
 from sim.arrays import Floats
 from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
-from sim.suites import EpisodeTable, Observer, Suite, run_controller, run_suite, suite_for, suite_named
-from sim.world import World
+from sim.engine.world import World
+from sim.suites import EpisodeTable, Observer, Suite, run_controller, run_suite, suite_for, suite_named, suite_of
 from workers.checkpoints import read_policy
 from workers.job_protocol import (
     MAX_WAY_POINTS,
@@ -23,6 +23,7 @@ from workers.job_protocol import (
     EvaluateJob,
     Measurement,
     NamedSuite,
+    ScenarioSuite,
     SuiteChoice,
     UploadedPolicy,
 )
@@ -150,11 +151,15 @@ def choose_suite(choice: SuiteChoice, task: TaskConfig) -> Suite:
     Raises:
         SuiteError: there is none of that name.
         ArenaError: the robot has no room in the arena.
+        PlacementError: a scenario can't be driven.
     """
     if isinstance(choice, NamedSuite):
         return suite_named(choice.name, task)
     if isinstance(choice, ArenaSuite):
         return suite_for(task.model_copy(update={"arena": choice.arena}))
+    if isinstance(choice, ScenarioSuite):
+        # For the default robot, as frozen ones are: every policy meets the same scenarios.
+        return suite_of(choice.title, choice.documents)
     return suite_for(task)
 
 

@@ -124,6 +124,7 @@ class Training:
         self.actions = action_layout(config.task.robot)
         device = torch.device(config.device)
         self.algorithm = build_algorithm(config.algorithm, self.inputs, seed, device, self.actions)
+        self.threaded = self.algorithm if isinstance(self.algorithm, Threaded) else None
         self.threads = ThreadCount(config.threads)
         self.task = with_maps_of(config.task, seed)
         self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
@@ -177,8 +178,8 @@ class Training:
 
     def update(self) -> None:
         """One update of the algorithm."""
-        if isinstance(self.algorithm, Threaded):
-            self.algorithm.threads = self.threads.now()
+        if self.threaded is not None:
+            self.threaded.threads = self.threads.now()
         with self.metrics.phase("update"):
             diagnostics = self.algorithm.update(self.updates / self.total_updates)
             self.updates += 1

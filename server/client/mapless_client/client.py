@@ -28,6 +28,7 @@ from mapless_client.transport import Transport
 from mapless_client.watching import watch
 
 _PAGE = 200
+_EVENTS = 1_000
 
 
 Table = Literal["figures", "verdicts", "improvements", "differences"]
@@ -206,7 +207,12 @@ class Client:
 
     def events(self, run_id: str) -> list[RunEvent]:
         """A run's event log, oldest first."""
-        return [RunEvent.model_validate(each) for each in self._transport.get(f"/api/runs/{run_id}/events")]
+        found: list[RunEvent] = []
+        while True:
+            part = self._transport.get(f"/api/runs/{run_id}/events", {"limit": _EVENTS, "offset": len(found)})
+            found += map(RunEvent.model_validate, part)
+            if len(part) != _EVENTS:
+                return found
 
     def diagnoses(self, run_id: str) -> Diagnoses:
         """Whether a run learns, and if not, why, and what to try."""

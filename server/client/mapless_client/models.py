@@ -169,12 +169,22 @@ class ImportedRun(Model):
     why: str | None
 
 
+class ImportedThing(Model):
+    """What came of something beside the runs: an `arena`, a `policy`, or an `evaluation` that was asked for."""
+
+    kind: str
+    id: str
+    outcome: str
+    why: str | None
+
+
 class ProjectImport(Model):
-    """What came of an archive; `checkpoints` came with the runs that are new."""
+    """What came of an archive; `checkpoints` came with the runs that are new. A server of before told of no `others`."""
 
     project_id: str
     runs: list[ImportedRun]
     checkpoints: int
+    others: list[ImportedThing] = []
 
 
 class RunEvent(Model):

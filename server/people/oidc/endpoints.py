@@ -8,14 +8,14 @@ from fastapi.responses import RedirectResponse
 from pydantic import StringConstraints
 
 from server.errors import NotFoundError, TooManyAttemptsError, UnauthorizedError
+from server.http.problems import NOT_FOUND, PROVIDER_FAILED, UNAUTHORIZED
 from server.people.oidc.admission import AdmissionService
 from server.people.oidc.journey import MAX_SECONDS, begin, seal, unseal
 from server.people.oidc.provider import Provider
 from server.people.oidc.refusals import ProviderUnusableError, Refusal, SignInRefusedError, in_words
 from server.people.oidc.schemas import ProviderAddress, ProviderSignIn
-from server.problems import NOT_FOUND, PROVIDER_FAILED, UNAUTHORIZED
 from server.security.cookies import clear_journey, journey_cookie_name, set_journey, set_session
-from server.security.permissions import OPEN
+from server.security.permissions import OPEN, SIGNED_IN
 from server.security.principal import PrincipalDep
 from server.services import Services, ServicesDep
 
@@ -90,6 +90,19 @@ async def come_from_provider(
         set_session(response, request, services.settings, secret)
     clear_journey(response, services.settings)
     return response
+
+
+@router.get("/api/sign-in/provider/end", responses=NOT_FOUND | UNAUTHORIZED | PROVIDER_FAILED, dependencies=[SIGNED_IN])
+async def leave_provider(request: Request, services: ServicesDep) -> ProviderAddress:
+    """Where the browser ends its session with the provider, for who signs out here; its page asks, and leads back."""
+    provider = _provider(services)
+    try:
+        url = await provider.farewell(str(request.base_url))
+    except SignInRefusedError as error:
+        raise ProviderUnusableError(in_words(error.reason, provider.settings.title)) from error
+    if url is None:
+        raise NotFoundError(f"{provider.settings.title} has no page that ends a session: close the browser.")
+    return ProviderAddress(url=url)
 
 
 def _redirect(path: str) -> Response:

@@ -9,6 +9,7 @@ from urllib.parse import quote_plus
 
 import httpx
 from authlib.common.errors import AuthlibBaseError
+from authlib.common.urls import add_params_to_uri
 from authlib.oauth2.rfc6749.parameters import prepare_grant_uri
 from authlib.oauth2.rfc7636 import create_s256_code_challenge
 from authlib.oidc.core import CodeIDToken
@@ -69,6 +70,22 @@ class Provider:
             code_challenge=create_s256_code_challenge(journey.verifier),
             code_challenge_method="S256",
         )
+        return url
+
+    async def farewell(self, back: str) -> str | None:
+        """Where the browser ends its session with the provider, which then leads `back`; None where it has no such page.
+
+        By OpenID Connect RP-Initiated Logout 1.0, section 2. No ID token is kept here that could go along as a hint: the
+        provider asks its visitor instead.
+
+        Raises:
+            SignInRefusedError: the provider can't be reached, or describes itself wrongly.
+        """
+        description = await self._asked(self._description.get())
+        page = description.get("end_session_endpoint")
+        if not isinstance(page, str) or not is_safe_url(page):
+            return None
+        url: str = add_params_to_uri(page, [("client_id", self.settings.client_id), ("post_logout_redirect_uri", back)])
         return url
 
     async def identify(self, journey: Journey, code: str, callback: str) -> Identity:

@@ -22,4 +22,4 @@ class ProviderSignIn(Schema):
 class ProviderAddress(Schema):
     """Where to send the browser."""
 
-    url: str = Field(description="The provider's page; it sends the browser back here.")
+    url: str = Field(description="The provider's page, from where the browser comes back here.")

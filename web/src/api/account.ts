@@ -1,6 +1,6 @@
 /** Who is signed in; without accounts everybody is the owner of the server's token, and nothing of people is shown. */
-import { $api } from './client'
+import { $now } from './client'
 
 export function useAccount(enabled = true) {
-  return $api.useQuery('get', '/api/account', undefined, { enabled, staleTime: 30_000 })
+  return $now.useQuery('get', '/api/account', undefined, { enabled, staleTime: 30_000 })
 }

@@ -2,6 +2,7 @@
 import { MutationCache, QueryCache, QueryClient } from '@tanstack/react-query'
 import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
+import { useDeferredValue, useMemo } from 'react'
 import { ApiError, errorOf, isUnauthorized, OfflineError } from './errors'
 import type { paths } from './schema'
 
@@ -26,7 +27,22 @@ api.use({
   },
 })
 
-export const $api = createQueryHooks(api)
+/** The hooks as they come: for what has to be told at once, whether a question is under way among it. */
+export const $now = createQueryHooks(api)
+
+/**
+ * The same for the pages. What has been answered is drawn in slices, between which the browser answers: a long list holds up
+ * nobody who types or presses. Of a question's state it tells `data`, `error` and `status`, and what follows from them.
+ */
+export const $api: typeof $now = {
+  ...$now,
+  useQuery: ((...asked: Parameters<typeof $now.useQuery>) => {
+    const result = $now.useQuery(...asked)
+    const { data, error, status } = result
+    // biome-ignore lint/correctness/useExhaustiveDependencies: the result is new each time, what it says is not.
+    return useDeferredValue(useMemo(() => result, [data, error, status]))
+  }) as typeof $now.useQuery,
+}
 
 const statusKey = ['get', '/api/status'] as const
 

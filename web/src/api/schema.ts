@@ -360,6 +360,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/arenas/reviews": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Review Arena
+         * @description Look an arena over while it is drawn: whether it can be kept, and what a robot would not get to.
+         */
+        post: operations["review_arena_api_arenas_reviews_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/audit": {
         parameters: {
             query?: never;
@@ -2312,6 +2332,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sign-in/provider/end": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Leave Provider
+         * @description Where the browser ends its session with the provider, for who signs out here; its page asks, and leads back.
+         */
+        get: operations["leave_provider_api_sign_in_provider_end_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sign-out": {
         parameters: {
             query?: never;
@@ -2475,6 +2515,90 @@ export interface paths {
          */
         post: operations["stop_study_api_studies__study_id__stop_post"];
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/suites": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Own Suites
+         * @description Suites that people have put together, by name.
+         */
+        get: operations["list_own_suites_api_suites_get"];
+        put?: never;
+        /**
+         * Make Own Suite
+         * @description Begin a suite.
+         */
+        post: operations["make_own_suite_api_suites_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/suites/{suite_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Delete Own Suite
+         * @description Forget a suite; what was measured on it stays.
+         */
+        delete: operations["delete_own_suite_api_suites__suite_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/suites/{suite_id}/scenarios": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Own Scenario
+         * @description Add an arena of the gallery, with its start and target, to a suite.
+         */
+        post: operations["add_own_scenario_api_suites__suite_id__scenarios_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/suites/{suite_id}/scenarios/{sha256}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Remove Own Scenario
+         * @description Take a scenario out of a suite.
+         */
+        delete: operations["remove_own_scenario_api_suites__suite_id__scenarios__sha256__delete"];
         options?: never;
         head?: never;
         patch?: never;
@@ -3445,6 +3569,60 @@ export interface components {
             width: number;
         };
         /**
+         * ArenaRemark
+         * @description One thing to mend in an arena.
+         */
+        ArenaRemark: {
+            /**
+             * Refused
+             * @description Whether the arena can't be kept as it is.
+             */
+            refused: boolean;
+            /** Text */
+            text: string;
+            /**
+             * X
+             * @description Where, metres.
+             */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * ArenaReview
+         * @description What was found in an arena; nothing where it is as it should be.
+         */
+        ArenaReview: {
+            /**
+             * Free Area
+             * @description Square metres in one piece for the robot's centre.
+             */
+            free_area: number;
+            /**
+             * Free Share
+             * @description The same over the floor's area, 0 to 1.
+             */
+            free_share: number;
+            /**
+             * Remarks
+             * @description What is refused first; the first twenty.
+             */
+            remarks: components["schemas"]["ArenaRemark"][];
+        };
+        /**
+         * ArenaReviewRequest
+         * @description An arena that is being drawn.
+         */
+        ArenaReviewRequest: {
+            arena: components["schemas"]["ArenaFile-Input"];
+            /**
+             * Clearance
+             * @description Metres that the robot needs around its centre; what the Burger needs.
+             * @default 0.2
+             */
+            clearance: number;
+        };
+        /**
          * ArenaSuite
          * @description The suite that is drawn for an arena: a family at a difficulty, an imported one, a built-in one.
          */
@@ -3610,7 +3788,7 @@ export interface components {
          */
         AskedEvaluation: {
             /** Choice */
-            choice: components["schemas"]["NamedSuite-Output"] | components["schemas"]["ArenaSuite-Output"] | components["schemas"]["OwnSuite-Output"];
+            choice: components["schemas"]["NamedSuite-Output"] | components["schemas"]["ArenaSuite-Output"] | components["schemas"]["ScenarioSuite-Output"] | components["schemas"]["workers__job_protocol__OwnSuite-Output"];
             /** Created At */
             created_at: number;
             /** Error */
@@ -5454,7 +5632,7 @@ export interface components {
              *       }
              *     ]
              */
-            suites: (components["schemas"]["NamedSuite-Input"] | components["schemas"]["ArenaSuite-Input"] | components["schemas"]["OwnSuite-Input"])[];
+            suites: (components["schemas"]["NamedSuite-Input"] | components["schemas"]["ArenaSuite-Input"] | components["schemas"]["ScenarioSuite-Input"] | components["schemas"]["OwnSuite-Input"])[];
         };
         /**
          * EvaluationWays
@@ -6156,6 +6334,32 @@ export interface components {
             /**
              * Outcome
              * @description `there`: it had been imported before, and is left as it is.
+             * @enum {string}
+             */
+            outcome: "imported" | "there" | "refused";
+            /**
+             * Why
+             * @description Why it was refused.
+             */
+            why: string | null;
+        };
+        /**
+         * ImportedThing
+         * @description What came of something beside the runs.
+         */
+        ImportedThing: {
+            /**
+             * Id
+             * @description Its id; of an arena its hash.
+             */
+            id: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "arena" | "policy" | "evaluation";
+            /**
+             * Outcome
              * @enum {string}
              */
             outcome: "imported" | "there" | "refused";
@@ -7504,6 +7708,17 @@ export interface components {
             role: ("viewer" | "editor" | "admin") | null;
         };
         /**
+         * NewScenario
+         * @description An arena of the gallery that a suite is to have.
+         */
+        NewScenario: {
+            /**
+             * Sha256
+             * @description Of an arena of the gallery.
+             */
+            sha256: string;
+        };
+        /**
          * NewWorkerToken
          * @description A worker token that was just made.
          */
@@ -7647,6 +7862,19 @@ export interface components {
             sideways: number;
         };
         /**
+         * OwnScenario
+         * @description An arena of the gallery: its start and its target.
+         */
+        OwnScenario: {
+            /** Name */
+            name: string;
+            /**
+             * Sha256
+             * @description Of an arena of the gallery.
+             */
+            sha256: string;
+        };
+        /**
          * OwnSuite
          * @description The suite of the policy's own task.
          */
@@ -7658,15 +7886,12 @@ export interface components {
             by: "own";
         };
         /**
-         * OwnSuite
-         * @description The suite of the policy's own task.
+         * OwnSuiteName
+         * @description What a suite is to be called.
          */
-        "OwnSuite-Output": {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            by: "own";
+        OwnSuiteName: {
+            /** Name */
+            name: string;
         };
         /** Page[AuditEntry] */
         Page_AuditEntry_: {
@@ -8681,6 +8906,12 @@ export interface components {
              * @description That came with the imported runs.
              */
             checkpoints: number;
+            /**
+             * Others
+             * @description Arenas, uploaded policies, and evaluations that were asked for.
+             * @default []
+             */
+            others: components["schemas"]["ImportedThing"][];
             /** Project Id */
             project_id: string;
             /** Runs */
@@ -8693,7 +8924,7 @@ export interface components {
         ProviderAddress: {
             /**
              * Url
-             * @description The provider's page; it sends the browser back here.
+             * @description The provider's page, from where the browser comes back here.
              */
             url: string;
         };
@@ -10215,6 +10446,74 @@ export interface components {
             items: components["schemas"]["SavedView"][];
         };
         /**
+         * ScenarioSuite
+         * @description A suite that people put together: the start and target of each of its arenas.
+         *
+         *     Attributes:
+         *         id: of the suite; all else the server puts in, whatever a request says.
+         *         name: that it has.
+         *         arenas: their hashes, as they were when the suite was asked for.
+         *         documents: these arenas, for the worker alone.
+         */
+        "ScenarioSuite-Input": {
+            /**
+             * Arenas
+             * @default []
+             */
+            arenas: string[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "scenarios";
+            /**
+             * Documents
+             * @default []
+             */
+            documents: components["schemas"]["ArenaFile-Input"][];
+            /** Id */
+            id: string;
+            /**
+             * Name
+             * @default
+             */
+            name: string;
+        };
+        /**
+         * ScenarioSuite
+         * @description A suite that people put together: the start and target of each of its arenas.
+         *
+         *     Attributes:
+         *         id: of the suite; all else the server puts in, whatever a request says.
+         *         name: that it has.
+         *         arenas: their hashes, as they were when the suite was asked for.
+         *         documents: these arenas, for the worker alone.
+         */
+        "ScenarioSuite-Output": {
+            /**
+             * Arenas
+             * @default []
+             */
+            arenas: string[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "scenarios";
+            /**
+             * Documents
+             * @default []
+             */
+            documents: components["schemas"]["ArenaFile-Output"][];
+            /** Id */
+            id: string;
+            /**
+             * Name
+             * @default
+             */
+            name: string;
+        };
+        /**
          * SeedCurve
          * @description One run on the common grid; null before its first point and after its last.
          */
@@ -10274,6 +10573,20 @@ export interface components {
             steps: number[];
             /** Values */
             values: (number | null)[];
+        };
+        /**
+         * OwnSuite
+         * @description A list of scenarios; what is measured on it stays with the scenarios that it had then.
+         */
+        server__suites__schemas__OwnSuite: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Scenarios */
+            scenarios: components["schemas"]["OwnScenario"][];
         };
         /**
          * UploadedPolicy
@@ -12086,6 +12399,11 @@ export interface components {
             /** Id */
             id: string;
             /**
+             * Parallel Runs
+             * @description Of its experiment's runs that may be under way at a time; null: as the installation says.
+             */
+            parallel_runs: number | null;
+            /**
              * Position
              * @description In the whole queue, from 1; those that one may not see count.
              */
@@ -12294,6 +12612,17 @@ export interface components {
             items: components["schemas"]["Worker"][];
         };
         /**
+         * OwnSuite
+         * @description The suite of the policy's own task.
+         */
+        "workers__job_protocol__OwnSuite-Output": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            by: "own";
+        };
+        /**
          * UploadedPolicy
          * @description An ONNX file that somebody has uploaded.
          *
@@ -12436,6 +12765,12 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "old": "correct horse battery staple",
+                 *       "new": "a longer sentence than before"
+                 *     }
+                 */
                 "application/json": components["schemas"]["PasswordChange"];
             };
         };
@@ -12478,7 +12813,12 @@ export interface operations {
     };
     list_sessions_api_account_sessions_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -12501,6 +12841,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -12554,7 +12903,12 @@ export interface operations {
     };
     list_tokens_api_account_tokens_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -12579,6 +12933,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     make_token_api_account_tokens_post: {
@@ -12590,6 +12953,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "notebook",
+                 *       "scope": "launch",
+                 *       "days": 90
+                 *     }
+                 */
                 "application/json": components["schemas"]["ApiTokenCreate"];
             };
         };
@@ -12600,6 +12970,18 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "id": "9k2f7d0q1m3z",
+                     *       "name": "notebook",
+                     *       "scope": "launch",
+                     *       "projects": null,
+                     *       "created_at": 1700000000,
+                     *       "expires_at": 1707776000,
+                     *       "seen_at": null,
+                     *       "token": "shown this once"
+                     *     }
+                     */
                     "application/json": components["schemas"]["NewApiToken"];
                 };
             };
@@ -12862,6 +13244,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "event": "success",
+                 *       "threshold": 0.95,
+                 *       "channel": "browser"
+                 *     }
+                 */
                 "application/json": components["schemas"]["AlertRuleCreate"];
             };
         };
@@ -12980,6 +13369,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "enabled": false
+                 *     }
+                 */
                 "application/json": components["schemas"]["AlertRuleEdit"];
             };
         };
@@ -13080,7 +13474,12 @@ export interface operations {
     };
     list_arenas_api_arenas_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -13105,6 +13504,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     get_fixed_arena_api_arenas_fixed_get: {
@@ -13112,7 +13520,10 @@ export interface operations {
             query: {
                 name: "simple" | "complex";
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -13126,6 +13537,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ArenaView"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13154,7 +13572,10 @@ export interface operations {
                 name: string;
                 seed?: number;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -13168,6 +13589,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ArenaView"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13207,6 +13635,17 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "files": [
+                 *         {
+                 *           "name": "lab.yaml",
+                 *           "content": "Zm9ybWF0OiBtYXBsZXNzLWFyZW5hLzEKbmFtZTogTGFiCndpZHRoOiA4LjAKaGVpZ2h0OiA2LjAK"
+                 *         }
+                 *       ],
+                 *       "keep": true
+                 *     }
+                 */
                 "application/json": components["schemas"]["ArenaUpload"];
             };
         };
@@ -13252,7 +13691,10 @@ export interface operations {
     get_imported_arena_api_arenas_imported__sha256__get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 sha256: string;
             };
@@ -13268,6 +13710,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ArenaView"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13350,6 +13799,74 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    review_arena_api_arenas_reviews_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "arena": {
+                 *         "name": "Lab",
+                 *         "width": 8,
+                 *         "height": 6,
+                 *         "circles": [
+                 *           {
+                 *             "x": 1,
+                 *             "y": 0.5,
+                 *             "radius": 0.3
+                 *           }
+                 *         ]
+                 *       },
+                 *       "clearance": 0.2
+                 *     }
+                 */
+                "application/json": components["schemas"]["ArenaReviewRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArenaReview"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -13461,7 +13978,10 @@ export interface operations {
     download_bundle_api_checkpoints__checkpoint_id__bundle_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 checkpoint_id: string;
             };
@@ -13477,6 +13997,13 @@ export interface operations {
                 content: {
                     "application/zip": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13529,6 +14056,8 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
                 "If-Range"?: string | null;
                 Range?: string | null;
             };
@@ -13547,6 +14076,13 @@ export interface operations {
                 content: {
                     "application/zip": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13580,7 +14116,10 @@ export interface operations {
     list_episodes_api_checkpoints__checkpoint_id__episodes_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 checkpoint_id: string;
             };
@@ -13596,6 +14135,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Episodes"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -13686,6 +14232,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "mode": "policy",
+                 *       "robots": 4,
+                 *       "speed": 2
+                 *     }
+                 */
                 "application/json": components["schemas"]["LiveSettings"];
             };
         };
@@ -14268,6 +14821,26 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "policies": [
+                 *         {
+                 *           "source": "shipped",
+                 *           "name": "simple"
+                 *         },
+                 *         {
+                 *           "source": "baseline",
+                 *           "name": "go-to-goal"
+                 *         }
+                 *       ],
+                 *       "suites": [
+                 *         {
+                 *           "by": "name",
+                 *           "name": "simple-200"
+                 *         }
+                 *       ]
+                 *     }
+                 */
                 "application/json": components["schemas"]["EvaluationRequest"];
             };
         };
@@ -14476,7 +15049,10 @@ export interface operations {
     list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 evaluation_id: string;
             };
@@ -14492,6 +15068,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["AskedEpisodes"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -14761,6 +15344,33 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Maze, longer sight",
+                 *       "seeds": [
+                 *         0,
+                 *         1,
+                 *         2,
+                 *         3,
+                 *         4
+                 *       ],
+                 *       "parallel_runs": 2,
+                 *       "training": {
+                 *         "steps": 200000,
+                 *         "task": {
+                 *           "arena": {
+                 *             "name": "maze",
+                 *             "difficulty": 0.5
+                 *           }
+                 *         },
+                 *         "algorithm": {
+                 *           "name": "ppo",
+                 *           "gamma": 0.995,
+                 *           "learning_rate": 0.0005
+                 *         }
+                 *       }
+                 *     }
+                 */
                 "application/json": components["schemas"]["ExperimentLaunch"];
             };
         };
@@ -14910,6 +15520,12 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Maze, baseline",
+                 *       "parallel_runs": 1
+                 *     }
+                 */
                 "application/json": components["schemas"]["ExperimentPatch"];
             };
         };
@@ -14958,7 +15574,10 @@ export interface operations {
                 /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
                 format?: "csv" | "json" | "tensorboard";
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 experiment_id: string;
             };
@@ -14977,6 +15596,13 @@ export interface operations {
                     "application/zip": string;
                     "text/csv": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -15116,6 +15742,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "notes": "Turns too *late* in narrow passages."
+                 *     }
+                 */
                 "application/json": components["schemas"]["Notes"];
             };
         };
@@ -15227,6 +15858,15 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "seeds": [
+                 *         5,
+                 *         6,
+                 *         7
+                 *       ]
+                 *     }
+                 */
                 "application/json": components["schemas"]["MoreSeeds"];
             };
         };
@@ -15401,6 +16041,15 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "rule": {
+                 *         "last": 5,
+                 *         "every": 10,
+                 *         "best": true
+                 *       }
+                 *     }
+                 */
                 "application/json": components["schemas"]["RuleChange"];
             };
         };
@@ -15523,7 +16172,12 @@ export interface operations {
     };
     list_invitations_api_invitations_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -15548,6 +16202,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     invite_api_invitations_post: {
@@ -15559,6 +16222,14 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "project_id": "default",
+                 *       "role": "viewer",
+                 *       "note": "Grace, until May",
+                 *       "days": 7
+                 *     }
+                 */
                 "application/json": components["schemas"]["InvitationCreate"];
             };
         };
@@ -15675,6 +16346,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "code": "what the link ends with",
+                 *       "name": "grace",
+                 *       "password": "correct horse battery staple"
+                 *     }
+                 */
                 "application/json": components["schemas"]["InvitationAccept"];
             };
         };
@@ -15751,6 +16429,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "code": "what the link ends with"
+                 *     }
+                 */
                 "application/json": components["schemas"]["InvitationCode"];
             };
         };
@@ -15945,7 +16628,12 @@ export interface operations {
     };
     list_leaderboards_api_leaderboards_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -15970,11 +16658,25 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     get_leaderboard_api_leaderboards__suite_hash__get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path: {
                 suite_hash: string;
@@ -16030,6 +16732,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "token": "the token that the server printed at start"
+                 *     }
+                 */
                 "application/json": components["schemas"]["Login"];
             };
         };
@@ -16124,6 +16831,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "admin": true
+                 *     }
+                 */
                 "application/json": components["schemas"]["PersonPatch"];
             };
         };
@@ -16233,6 +16945,17 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "policy": {
+                 *         "source": "shipped",
+                 *         "name": "simple"
+                 *       },
+                 *       "arena": {
+                 *         "name": "rooms"
+                 *       }
+                 *     }
+                 */
                 "application/json": components["schemas"]["PlaygroundRequest"];
             };
         };
@@ -16391,6 +17114,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Rooms with a chair"
+                 *     }
+                 */
                 "application/json": components["schemas"]["KeptArenaName"];
             };
         };
@@ -16444,6 +17172,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "act": "put target",
+                 *       "x": 1.5,
+                 *       "y": -0.5
+                 *     }
+                 */
                 "application/json": components["schemas"]["PutRobot"] | components["schemas"]["PutTarget"] | components["schemas"]["PutMover"] | components["schemas"]["Push"] | components["schemas"]["Steps"] | components["schemas"]["PutCircle"] | components["schemas"]["PutBox"] | components["schemas"]["Remove"] | components["schemas"]["Choose-Input"];
             };
         };
@@ -16497,6 +17232,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "speed": 0.5,
+                 *       "rays": true,
+                 *       "follow": true
+                 *     }
+                 */
                 "application/json": components["schemas"]["PlaygroundSettings-Input"];
             };
         };
@@ -16541,8 +17283,16 @@ export interface operations {
     };
     list_policies_api_policies_get: {
         parameters: {
-            query?: never;
-            header?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -16557,6 +17307,13 @@ export interface operations {
                     "application/json": components["schemas"]["ShippedPolicy"][];
                 };
             };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description No valid login */
             401: {
                 headers: {
@@ -16566,12 +17323,24 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     get_policy_api_policies__name__get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 name: string;
             };
@@ -16587,6 +17356,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ShippedPolicy"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -16687,7 +17463,10 @@ export interface operations {
     download_policy_api_policies__name__download_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 name: string;
             };
@@ -16703,6 +17482,13 @@ export interface operations {
                 content: {
                     "application/zip": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -16793,6 +17579,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "mode": "policy",
+                 *       "robots": 4,
+                 *       "speed": 2
+                 *     }
+                 */
                 "application/json": components["schemas"]["LiveSettings"];
             };
         };
@@ -16838,7 +17631,10 @@ export interface operations {
     list_policy_episodes_api_policies__name__suites__suite__episodes_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 name: string;
                 suite: string;
@@ -16855,6 +17651,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["PolicyEpisodes"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -16974,6 +17777,20 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "items": [
+                     *         {
+                     *           "id": "default",
+                     *           "name": "Default",
+                     *           "created_at": 1700000000,
+                     *           "experiments": 12,
+                     *           "role": "admin"
+                     *         }
+                     *       ],
+                     *       "total": 1
+                     *     }
+                     */
                     "application/json": components["schemas"]["Page_Project_"];
                 };
             };
@@ -17006,6 +17823,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Corridors"
+                 *     }
+                 */
                 "application/json": components["schemas"]["ProjectEdit"];
             };
         };
@@ -17059,6 +17881,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Corridors, second attempt"
+                 *     }
+                 */
                 "application/json": components["schemas"]["ProjectEdit"];
             };
         };
@@ -17180,6 +18007,28 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "project_id": "default",
+                     *       "runs": [
+                     *         {
+                     *           "id": "7f3k1q9z2m4x",
+                     *           "experiment_id": "5t8s8mvrv66w",
+                     *           "outcome": "imported",
+                     *           "why": null
+                     *         }
+                     *       ],
+                     *       "checkpoints": 3,
+                     *       "others": [
+                     *         {
+                     *           "kind": "policy",
+                     *           "id": "1p8c5v7b3n2m",
+                     *           "outcome": "there",
+                     *           "why": null
+                     *         }
+                     *       ]
+                     *     }
+                     */
                     "application/json": components["schemas"]["ProjectImport"];
                 };
             };
@@ -17296,6 +18145,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "role": "editor"
+                 *     }
+                 */
                 "application/json": components["schemas"]["MemberEdit"];
             };
         };
@@ -17662,7 +18516,12 @@ export interface operations {
     };
     list_beside_api_replays__subjects__beside_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path: {
                 subjects: string;
@@ -17820,6 +18679,12 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "seeds": 5,
+                 *       "effort": 0.01
+                 *     }
+                 */
                 "application/json": components["schemas"]["CampaignCreate"];
             };
         };
@@ -18156,6 +19021,18 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "items": [
+                     *         {
+                     *           "id": "2bn19yhqm8ap",
+                     *           "step": 16384,
+                     *           "success": 0.62
+                     *         }
+                     *       ],
+                     *       "total": 1
+                     *     }
+                     */
                     "application/json": components["schemas"]["CheckpointSteps"];
                 };
             };
@@ -18239,7 +19116,12 @@ export interface operations {
     };
     list_events_api_runs__run_id__events_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path: {
                 run_id: string;
@@ -18254,6 +19136,17 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example [
+                     *       {
+                     *         "id": 1,
+                     *         "at": 1700000000,
+                     *         "step": 0,
+                     *         "level": "info",
+                     *         "message": "Attempt 1 on gpu-1@lab."
+                     *       }
+                     *     ]
+                     */
                     "application/json": components["schemas"]["RunEvent"][];
                 };
             };
@@ -18292,7 +19185,10 @@ export interface operations {
                 /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
                 format?: "csv" | "json" | "tensorboard";
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 run_id: string;
             };
@@ -18311,6 +19207,13 @@ export interface operations {
                     "application/zip": string;
                     "text/csv": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -18631,6 +19534,13 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "mode": "policy",
+                 *       "robots": 4,
+                 *       "speed": 2
+                 *     }
+                 */
                 "application/json": components["schemas"]["LiveSettings"];
             };
         };
@@ -18788,7 +19698,10 @@ export interface operations {
                 /** @description The newest step that is known: only the points from there on are wanted. */
                 since?: number | null;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 run_id: string;
             };
@@ -18802,8 +19715,47 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "series": [
+                     *         {
+                     *           "name": "train/return",
+                     *           "steps": [
+                     *             8192,
+                     *             16384
+                     *           ],
+                     *           "values": [
+                     *             -3.2,
+                     *             1.75
+                     *           ],
+                     *           "min": null,
+                     *           "max": null
+                     *         },
+                     *         {
+                     *           "name": "eval/success_rate",
+                     *           "steps": [
+                     *             16384
+                     *           ],
+                     *           "values": [
+                     *             0.62
+                     *           ],
+                     *           "min": null,
+                     *           "max": null
+                     *         }
+                     *       ],
+                     *       "attempt": 1,
+                     *       "since": null
+                     *     }
+                     */
                     "application/json": components["schemas"]["Metrics"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -18845,6 +19797,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "priority": 10
+                 *     }
+                 */
                 "application/json": components["schemas"]["Priority"];
             };
         };
@@ -19069,6 +20026,12 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "ada",
+                 *       "password": "correct horse battery staple"
+                 *     }
+                 */
                 "application/json": components["schemas"]["SignIn"];
             };
         };
@@ -19118,6 +20081,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "back": "/queue"
+                 *     }
+                 */
                 "application/json": components["schemas"]["ProviderSignIn"];
             };
         };
@@ -19215,6 +20183,53 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    leave_provider_api_sign_in_provider_end_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProviderAddress"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description The provider of identities can't be used now */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -19370,6 +20385,23 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Which discount?",
+                 *       "training": {
+                 *         "steps": 100000
+                 *       },
+                 *       "settings": [
+                 *         {
+                 *           "kind": "range",
+                 *           "path": "algorithm.gamma",
+                 *           "low": 0.9,
+                 *           "high": 0.999
+                 *         }
+                 *       ],
+                 *       "trials": 10
+                 *     }
+                 */
                 "application/json": components["schemas"]["StudyLaunch"];
             };
         };
@@ -19519,6 +20551,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "trials": 5
+                 *     }
+                 */
                 "application/json": components["schemas"]["StudyExtension"];
             };
         };
@@ -19686,10 +20723,285 @@ export interface operations {
             };
         };
     };
-    get_training_form_api_training_form_get: {
+    list_own_suites_api_suites_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["server__suites__schemas__OwnSuite"][];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    make_own_suite_api_suites_post: {
         parameters: {
             query?: never;
             header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "name": "My lab"
+                 *     }
+                 */
+                "application/json": components["schemas"]["OwnSuiteName"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["server__suites__schemas__OwnSuite"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_own_suite_api_suites__suite_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                suite_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    add_own_scenario_api_suites__suite_id__scenarios_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                suite_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "sha256": "0000000000000000000000000000000000000000000000000000000000000000"
+                 *     }
+                 */
+                "application/json": components["schemas"]["NewScenario"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["server__suites__schemas__OwnSuite"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    remove_own_scenario_api_suites__suite_id__scenarios__sha256__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sha256: string;
+                suite_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["server__suites__schemas__OwnSuite"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_training_form_api_training_form_get: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -19704,6 +21016,13 @@ export interface operations {
                     "application/json": components["schemas"]["TrainingForm"];
                 };
             };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description No valid login */
             401: {
                 headers: {
@@ -19711,6 +21030,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -19759,6 +21087,10 @@ export interface operations {
     list_start_policies_api_training_starts_get: {
         parameters: {
             query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
                 /** @description Part of a training's name, or of a policy's title. */
                 search?: string;
             };
@@ -19849,6 +21181,17 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "From elsewhere",
+                 *       "content": "CAgSB3B5dG9yY2g=",
+                 *       "task": {
+                 *         "arena": {
+                 *           "name": "complex"
+                 *         }
+                 *       }
+                 *     }
+                 */
                 "application/json": components["schemas"]["PolicyUpload"];
             };
         };
@@ -19976,6 +21319,15 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "action": "tag",
+                 *       "experiments": [
+                 *         "5t8s8mvrv66w"
+                 *       ],
+                 *       "tag": "baseline"
+                 *     }
+                 */
                 "application/json": components["schemas"]["Action"];
             };
         };
@@ -19986,6 +21338,19 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
+                    /**
+                     * @example {
+                     *       "done": [
+                     *         "5t8s8mvrv66w"
+                     *       ],
+                     *       "left_out": [
+                     *         {
+                     *           "id": "e1x71c26mw1q",
+                     *           "reason": "It is in the trash."
+                     *         }
+                     *       ]
+                     *     }
+                     */
                     "application/json": components["schemas"]["ActionDone"];
                 };
             };
@@ -20024,6 +21389,10 @@ export interface operations {
                 by: string;
                 /** @description Keys of settings and metrics that the rows should have. */
                 column?: string[];
+                /** @description Groups at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
                 place?: "live" | "archived" | "trash";
                 /** @description Id of the project; all without it. */
                 project?: string | null;
@@ -20181,7 +21550,12 @@ export interface operations {
     };
     list_views_api_workbench_views_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -20206,6 +21580,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     save_view_api_workbench_views_put: {
@@ -20217,6 +21600,12 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "Good ones",
+                 *       "address": "query=success%20%3E%200.9&sort=-success"
+                 *     }
+                 */
                 "application/json": components["schemas"]["SavedViewEdit"];
             };
         };
@@ -20308,7 +21697,12 @@ export interface operations {
     };
     list_worker_tokens_api_worker_tokens_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -20333,6 +21727,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     make_worker_token_api_worker_tokens_post: {
@@ -20344,6 +21747,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "name": "gpu-1"
+                 *     }
+                 */
                 "application/json": components["schemas"]["WorkerTokenCreate"];
             };
         };
@@ -20435,7 +21843,12 @@ export interface operations {
     };
     list_workers_api_workers_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -20460,6 +21873,15 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
         };
     };
     drain_worker_api_workers_drain_post: {
@@ -20471,6 +21893,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "worker": "gpu-1@lab"
+                 *     }
+                 */
                 "application/json": components["schemas"]["DrainRequest"];
             };
         };
@@ -20522,6 +21949,11 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "worker": "gpu-1@lab"
+                 *     }
+                 */
                 "application/json": components["schemas"]["WorkerName"];
             };
         };

@@ -4,6 +4,7 @@ import { useEffect, useMemo, useRef, useState } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
+import { useNear } from '../lib/near'
 import { roundTick } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
@@ -52,6 +53,9 @@ export function Chart({
 }: ChartProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const frame = useRef<HTMLDivElement>(null)
+  const near = useNear(frame)
+  const place = useRef(at)
+  place.current = at
   const plot = useRef<uPlot | null>(null)
   const readout = useRef<(index: number | null) => void>(() => {})
   const linked = useLinkedCharts()
@@ -82,7 +86,7 @@ export function Chart({
   // biome-ignore lint/correctness/useExhaustiveDependencies: `structure` stands for the lines.
   useEffect(() => {
     const element = frame.current
-    if (!element) return
+    if (!element || !near) return
     const made = new uPlot(
       {
         // A strip among others says below what x is, where it reads its values.
@@ -124,11 +128,14 @@ export function Chart({
         },
         hooks: {
           ready: [
-            (chart) =>
+            (chart) => {
               chart.over.addEventListener('click', () => {
                 const left = chart.cursor.left ?? -1
                 if (left >= 0) seek.current?.(chart.posToVal(left, 'x'))
-              }),
+              })
+              // Its scales are known only now, and nothing may move the cursor again.
+              putCursor(chart, place.current)
+            },
           ],
           setCursor: [(chart) => readout.current(chart.cursor.idx ?? null)],
           setSelect: [
@@ -154,7 +161,7 @@ export function Chart({
       made.destroy()
       plot.current = null
     }
-  }, [structure, dark, low, high, logarithmic, height, format, xTitle, xFormat])
+  }, [near, structure, dark, low, high, logarithmic, height, format, xTitle, xFormat])
 
   const range = linked?.range ?? null
   const inside = useRef(false)
@@ -175,12 +182,12 @@ export function Chart({
     const [shownFrom, shownTo] = rangeOf(chart)
     if (from === undefined || to === undefined || (from === shownFrom && to === shownTo)) return
     chart.setScale('x', { min: from, max: to })
-  }, [range, structure, dark, logarithmic])
+  }, [near, range, structure, dark, logarithmic])
 
   // biome-ignore lint/correctness/useExhaustiveDependencies: a plot that is made anew, or zoomed, has its cursor elsewhere.
   useEffect(() => {
     const chart = plot.current
-    if (chart && at !== null) chart.setCursor({ left: chart.valToPos(at, 'x'), top: 0 })
+    if (chart) putCursor(chart, at)
   }, [at, columns, structure, dark, range, zoomed])
 
   const zoomOut = useRef(() => {})
@@ -259,6 +266,10 @@ function isAlone(column: uPlot.AlignedData[number] | undefined): boolean {
   let found = 0
   for (const value of column ?? []) if (value !== null && value !== undefined && ++found > 1) return false
   return found === 1
+}
+
+function putCursor(chart: uPlot, at: number | null): void {
+  if (at !== null) chart.setCursor({ left: chart.valToPos(at, 'x'), top: 0 })
 }
 
 function rangeOf(chart: uPlot): [number, number] {

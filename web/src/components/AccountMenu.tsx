@@ -1,15 +1,16 @@
-/** Who is signed in, and where they may go; nothing where there are no accounts. */
+/** Who is signed in, and where they may go. */
 import { Button, Menu } from '@mantine/core'
+import { notifications } from '@mantine/notifications'
 import { useQueryClient } from '@tanstack/react-query'
 import { Link } from 'react-router'
-import { useAccount } from '../api/account'
+import type { useAccount } from '../api/account'
 import { $api } from '../api/client'
+import { refusalOf } from '../api/errors'
+import { useSignInOptions } from './people/ProviderButton'
 
-export function AccountMenu() {
+export function AccountMenu({ account }: { account: NonNullable<ReturnType<typeof useAccount>['data']> }) {
   const client = useQueryClient()
-  const { data: account } = useAccount()
   const signOut = $api.useMutation('post', '/api/sign-out', { onSuccess: () => client.resetQueries() })
-  if (!account?.people) return null
   return (
     <Menu position="bottom-end">
       <Menu.Target>
@@ -44,7 +45,25 @@ export function AccountMenu() {
         )}
         <Menu.Divider />
         <Menu.Item onClick={() => signOut.mutate({})}>Sign out</Menu.Item>
+        {account.connected && <SignOutOfProvider />}
       </Menu.Dropdown>
     </Menu>
   )
+}
+
+/** Its address is asked for while somebody is signed in, and followed once nobody is. */
+function SignOutOfProvider() {
+  const { data: options } = useSignInOptions()
+  const signOut = $api.useMutation('post', '/api/sign-out')
+  const leave = $api.useMutation('get', '/api/sign-in/provider/end', {
+    onSuccess: ({ url }) => signOut.mutate({}, { onSuccess: () => window.location.assign(url) }),
+    onError: (error: unknown) =>
+      notifications.show({
+        color: 'red',
+        title: `Could not sign out of ${options?.provider}`,
+        message: refusalOf(error),
+      }),
+  })
+  if (!options?.provider) return null
+  return <Menu.Item onClick={() => leave.mutate({})}>Sign out of {options.provider}, too</Menu.Item>
 }

@@ -7,11 +7,11 @@ import { Link } from 'react-router'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaSummary, ArenaView } from '../api/types'
-import { arenaFacts, trainOn } from '../lib/arenas'
+import { arenaFacts, drawOn, trainOn } from '../lib/arenas'
 import classes from './ArenaCard.module.css'
 import { ArenaDrawing } from './ArenaDrawing'
 import { evaluate, suiteInArena } from './evaluations/choices'
-import { IconRefresh, IconTrash } from './icons'
+import { IconPencil, IconRefresh, IconTrash } from './icons'
 
 interface ArenaCardProps {
   arena: ArenaSummary
@@ -153,7 +153,20 @@ function Card({ title, isNew = false, view, error, config, action, children }: C
       </div>
       <Group justify="space-between" wrap="nowrap" gap={4} mt={8} mih={28}>
         <h3 className={classes.title}>{title}</h3>
-        {action}
+        <Group gap={0} wrap="nowrap">
+          <Tooltip label="Draw on a copy">
+            <ActionIcon
+              component={Link}
+              to={drawOn(config)}
+              variant="subtle"
+              color="gray"
+              aria-label={`Draw on a copy of ${title}`}
+            >
+              <IconPencil size={16} stroke={1.6} />
+            </ActionIcon>
+          </Tooltip>
+          {action}
+        </Group>
       </Group>
       <Text size="xs" c="dimmed" className={classes.facts}>
         {view ? arenaFacts(view) : ' '}

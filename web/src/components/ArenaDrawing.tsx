@@ -1,5 +1,6 @@
 /** An arena from above, drawn to scale: walls, obstacles, and where it has them ways of what moves, start and target. */
 import type { ArenaGeometry } from '../api/types'
+import { isRound, wayOf } from '../lib/arenas'
 import classes from './ArenaDrawing.module.css'
 
 interface ArenaDrawingProps {
@@ -15,17 +16,10 @@ const WALL = 0.012
 /** Length of the arrow at the start, likewise. */
 const ARROW = 0.05
 
-/** Where a mover goes, as far as the arena says: a patrol's corners, or a timed one's places in order. */
-function wayOf(mover: ArenaGeometry['movers'][number]): readonly { x: number; y: number }[] {
-  if (mover.kind === 'patrol') return mover.waypoints
-  return mover.kind === 'timed' ? mover.keyframes : []
-}
-
 export function ArenaDrawing({ geometry, label, children }: ArenaDrawingProps) {
-  const { width, height, circles, boxes, movers, start, target } = geometry
+  const { width, height } = geometry
   const unit = Math.max(width, height)
   const wall = unit * WALL
-  const arrow = unit * ARROW
   return (
     <svg
       className={classes.drawing}
@@ -43,47 +37,67 @@ export function ArenaDrawing({ geometry, label, children }: ArenaDrawingProps) {
       />
       {/* Arenas count y upwards, drawings downwards. */}
       <g transform="scale(1,-1)">
-        <g className={classes.obstacles}>
-          {circles.map(({ x, y, radius }) => (
-            <circle key={`${x} ${y} ${radius}`} cx={x} cy={y} r={radius} />
-          ))}
-          {boxes.map(({ x, y, length, width: across, angle }) => (
-            <rect
-              key={`${x} ${y} ${length} ${across} ${angle}`}
-              x={-length / 2}
-              y={-across / 2}
-              width={length}
-              height={across}
-              transform={`translate(${x} ${y}) rotate(${angle})`}
-            />
-          ))}
-        </g>
-        {movers.map((mover, index) => {
-          const way = wayOf(mover)
-          const Line = mover.kind === 'timed' ? 'polyline' : 'polygon'
-          return way.length > 0 ? (
-            // biome-ignore lint/suspicious/noArrayIndexKey: an arena's movers stay in their order, and two may be alike.
-            <g key={index}>
-              <Line
-                className={classes.round}
-                points={way.map(({ x, y }) => `${x},${y}`).join(' ')}
-                strokeWidth={wall / 2}
-                strokeDasharray={`${2 * wall} ${1.5 * wall}`}
-              />
-              <circle className={classes.mover} cx={way[0]?.x} cy={way[0]?.y} r={mover.radius} />
-            </g>
-          ) : null
-        })}
-        {start && (
-          <path
-            className={classes.start}
-            d={`M${arrow} 0L${-arrow / 2} ${arrow / 2}L${-arrow / 2} ${-arrow / 2}Z`}
-            transform={`translate(${start.x} ${start.y}) rotate(${start.heading})`}
-          />
-        )}
-        {target && <circle className={classes.target} cx={target.x} cy={target.y} r={arrow / 2} />}
+        <ArenaShapes geometry={geometry} stroke={wall / 2} mark={(unit * ARROW) / 2} />
         {children}
       </g>
     </svg>
+  )
+}
+
+interface ArenaShapesProps {
+  geometry: ArenaGeometry
+  /** How thick ways are drawn, metres. */
+  stroke: number
+  /** From the middle of start and target to their edges, metres. */
+  mark: number
+}
+
+/** What stands in an arena and goes about in it, in metres, y upwards. */
+export function ArenaShapes({ geometry, stroke, mark }: ArenaShapesProps) {
+  const { circles, boxes, movers, start, target } = geometry
+  return (
+    <>
+      <g className={classes.obstacles}>
+        {circles.map(({ x, y, radius }, index) => (
+          // biome-ignore lint/suspicious/noArrayIndexKey: an arena's obstacles stay in their order, and two may be alike.
+          <circle key={index} cx={x} cy={y} r={radius} />
+        ))}
+        {boxes.map(({ x, y, length, width: across, angle }, index) => (
+          <rect
+            // biome-ignore lint/suspicious/noArrayIndexKey: likewise.
+            key={index}
+            x={-length / 2}
+            y={-across / 2}
+            width={length}
+            height={across}
+            transform={`translate(${x} ${y}) rotate(${angle})`}
+          />
+        ))}
+      </g>
+      {movers.map((mover, index) => {
+        const way = wayOf(mover)
+        const Line = isRound(mover) ? 'polygon' : 'polyline'
+        return way.length > 0 ? (
+          // biome-ignore lint/suspicious/noArrayIndexKey: likewise.
+          <g key={index}>
+            <Line
+              className={classes.round}
+              points={way.map(({ x, y }) => `${x},${y}`).join(' ')}
+              strokeWidth={stroke}
+              strokeDasharray={`${4 * stroke} ${3 * stroke}`}
+            />
+            <circle className={classes.mover} cx={way[0]?.x} cy={way[0]?.y} r={mover.radius} />
+          </g>
+        ) : null
+      })}
+      {start && (
+        <path
+          className={classes.start}
+          d={`M${2 * mark} 0L${-mark} ${mark}L${-mark} ${-mark}Z`}
+          transform={`translate(${start.x} ${start.y}) rotate(${start.heading})`}
+        />
+      )}
+      {target && <circle className={classes.target} cx={target.x} cy={target.y} r={mark} />}
+    </>
   )
 }

@@ -66,7 +66,12 @@ export function ArenaUpload({ onImported }: ArenaUploadProps) {
     <>
       <FileButton multiple accept={ACCEPTED} onChange={(chosen) => void look(chosen)}>
         {(props) => (
-          <Button {...props} leftSection={<IconUpload size={16} />} loading={upload.isPending && !preview}>
+          <Button
+            {...props}
+            variant="default"
+            leftSection={<IconUpload size={16} />}
+            loading={upload.isPending && !preview}
+          >
             Import arena
           </Button>
         )}

@@ -1,10 +1,20 @@
 /** Theme and notifications, for the pages and for their tests alike; `still` leaves out all motion. */
 import { MantineProvider } from '@mantine/core'
-import { Notifications } from '@mantine/notifications'
-import type { ReactNode } from 'react'
+import { notificationsStore } from '@mantine/notifications'
+import { lazy, type ReactNode, Suspense, useEffect, useSyncExternalStore } from 'react'
 import { cssVariables, theme } from '../theme'
 
+const corner = () => import('./Notifications')
+const Notifications = lazy(async () => ({ default: (await corner()).Notifications }))
+/** The page comes first. Fetched before it is needed: what there is to say may be that the server is gone. */
+const AFTER_MS = 1_500
+
 export function Providers({ children, still = false }: { children: ReactNode; still?: boolean }) {
+  const notified = useSyncExternalStore(notificationsStore.subscribe, anyNotified)
+  useEffect(() => {
+    const timer = setTimeout(corner, AFTER_MS)
+    return () => clearTimeout(timer)
+  }, [])
   return (
     <MantineProvider
       theme={theme}
@@ -12,8 +22,17 @@ export function Providers({ children, still = false }: { children: ReactNode; st
       defaultColorScheme="auto"
       env={still ? 'test' : 'default'}
     >
-      <Notifications position="bottom-right" limit={3} />
+      {notified && (
+        <Suspense fallback={null}>
+          <Notifications />
+        </Suspense>
+      )}
       {children}
     </MantineProvider>
   )
+}
+
+function anyNotified(): boolean {
+  const { notifications, queue } = notificationsStore.getState()
+  return notifications.length + queue.length > 0
 }

@@ -1,31 +1,28 @@
 /** The frame around every page: navigation, the state of the service, colour scheme, version. */
-import {
-  ActionIcon,
-  Anchor,
-  Group,
-  Text,
-  Tooltip,
-  useComputedColorScheme,
-  useMantineColorScheme,
-} from '@mantine/core'
-import { Suspense } from 'react'
+import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
+import { lazy, memo, Suspense } from 'react'
 import { Link, NavLink, Outlet, useLocation } from 'react-router'
 import { useAlertNews } from '../alerts/useAlertNews'
+import { useAccount } from '../api/account'
 import { isUnauthorized } from '../api/errors'
 import { useServerEvents } from '../api/events'
 import type { Status } from '../api/types'
 import { useStatus } from '../api/useStatus'
+import { BELL, MOON, NAVIGATION, SUN } from '../frame'
 import { plural } from '../lib/format'
-import { LoginPage } from '../pages/LoginPage'
-import { AccountMenu } from './AccountMenu'
-import { IconBell, IconMoon, IconSun } from './icons'
+import { Boundary } from './Broken'
 import classes from './Shell.module.css'
+
+const LoginPage = lazy(async () => ({ default: (await import('../pages/LoginPage')).LoginPage }))
+const AccountMenu = lazy(async () => ({ default: (await import('./AccountMenu')).AccountMenu }))
 
 export function Shell() {
   const { data: status, error, isError } = useStatus()
   const locked = isUnauthorized(error)
+  const { data: account } = useAccount(!locked)
   // Who follows an invitation has no login yet.
-  const joining = useLocation().pathname === '/join'
+  const { pathname } = useLocation()
+  const joining = pathname === '/join'
   const offline = isError && !locked
   useServerEvents(status !== undefined && !locked)
   useAlertNews(status !== undefined && !locked)
@@ -35,43 +32,38 @@ export function Shell() {
       <a href="#main" className={classes.skip}>
         Skip to content
       </a>
-      <header className={classes.header}>
-        <Link to="/" className={classes.name} aria-label="Mapless, home">
+      <header className="frame-header">
+        <Link to="/" className="frame-name" aria-label="Mapless, home">
           <img src="/favicon.svg" alt="" width={22} height={22} />
           <span>Mapless</span>
         </Link>
         {!locked && (
-          <nav aria-label="Main" className={classes.nav}>
-            <NavLink to="/" end>
-              Trainings
-            </NavLink>
-            <NavLink to="/new">
-              New<span className={classes.wide}> training</span>
-            </NavLink>
-            <NavLink to="/studies">Studies</NavLink>
-            <NavLink to="/compare">Compare</NavLink>
-            <NavLink to="/evaluations">
-              Eval<span className={classes.wide}>uations</span>
-            </NavLink>
-            <NavLink to="/policies">Policies</NavLink>
-            <NavLink to="/arenas">Arenas</NavLink>
-            <NavLink to="/playground">Play</NavLink>
-            <NavLink to="/reproduction">Paper</NavLink>
-            <NavLink to="/queue">Queue</NavLink>
+          <nav aria-label="Main" className="frame-nav">
+            {NAVIGATION.map(([to, label]) => {
+              const [short, rest] = label.split('|')
+              return (
+                <NavLink key={to} to={to} end={to === '/'}>
+                  {short}
+                  {rest && <span className="frame-wide">{rest}</span>}
+                </NavLink>
+              )
+            })}
           </nav>
         )}
-        <Group gap={10} ml="auto" wrap="nowrap">
+        <div className="frame-tools">
           {!locked && <ServiceState status={status} offline={offline} />}
           {!locked && (
-            <Tooltip label="Alerts">
-              <ActionIcon component={Link} to="/alerts" variant="subtle" color="gray" aria-label="Alerts">
-                <IconBell size={18} stroke={1.6} />
-              </ActionIcon>
-            </Tooltip>
+            <Link to="/alerts" className="frame-icon" aria-label="Alerts" title="Alerts">
+              <Icon paths={BELL} />
+            </Link>
           )}
-          {!locked && <AccountMenu />}
+          {!locked && account?.people && (
+            <Suspense fallback={null}>
+              <AccountMenu account={account} />
+            </Suspense>
+          )}
           <SchemeSwitch />
-        </Group>
+        </div>
       </header>
       {offline && status !== undefined && (
         <div role="alert" className={classes.offline} data-testid="offline">
@@ -80,36 +72,33 @@ export function Shell() {
         </div>
       )}
       <main id="main" className={classes.main} tabIndex={-1}>
-        {locked && !joining ? (
-          <LoginPage />
-        ) : (
-          <Suspense fallback={null}>
-            <Outlet />
-          </Suspense>
-        )}
+        <Content at={pathname} login={locked && !joining} />
       </main>
       <footer className={classes.footer}>
         <span>Mapless{status ? ` ${status.version}` : ''}</span>
         {status?.commit && <code>{status.commit}</code>}
-        <Group gap="md" className={classes.docs}>
+        <div className={classes.docs}>
           {!locked && (
             <>
-              <Anchor component={Link} to="/projects" inherit c="inherit">
-                Projects
-              </Anchor>
-              <Anchor component={Link} to="/storage" inherit c="inherit">
-                Storage
-              </Anchor>
+              <Link to="/projects">Projects</Link>
+              <Link to="/storage">Storage</Link>
             </>
           )}
-          <Anchor component={Link} to="/reference" inherit c="inherit">
-            API
-          </Anchor>
-        </Group>
+          <Link to="/reference">API</Link>
+        </div>
       </footer>
     </div>
   )
 }
+
+/** Not drawn anew with the header: news of the service would draw a page that is on its way at one go, not in slices. */
+const Content = memo(function Content({ at, login }: { at: string; login: boolean }) {
+  return (
+    <Boundary at={at}>
+      <Suspense fallback={<div aria-busy="true" />}>{login ? <LoginPage /> : <Outlet />}</Suspense>
+    </Boundary>
+  )
+})
 
 /** "4 workers, 2 running": whether anything can be trained, and whether anything is. */
 function ServiceState({ status, offline }: { status: Status | undefined; offline: boolean }) {
@@ -150,19 +139,18 @@ function workerInShort({ name, trouble, run_id, extensions }: Status['workers'][
 
 function Badge({ tone, text, hint }: { tone: 'bad' | 'busy' | 'idle' | 'none'; text: string; hint: string }) {
   return (
-    <Tooltip label={<span style={{ whiteSpace: 'pre-line' }}>{hint}</span>} disabled={!hint}>
-      <Text
-        component="span"
-        size="xs"
+    <span className={hint ? classes.hinted : undefined} data-hint={hint}>
+      <span
         className={classes.badge}
         data-tone={tone}
         role="status"
+        aria-description={hint}
         data-testid="service-state"
         tabIndex={hint ? 0 : -1}
       >
         {text}
-      </Text>
-    </Tooltip>
+      </span>
+    </span>
   )
 }
 
@@ -171,15 +159,24 @@ function SchemeSwitch() {
   const dark = useComputedColorScheme('light') === 'dark'
   const label = dark ? 'Light colours' : 'Dark colours'
   return (
-    <Tooltip label={label}>
-      <ActionIcon
-        variant="subtle"
-        color="gray"
-        aria-label={label}
-        onClick={() => setColorScheme(dark ? 'light' : 'dark')}
-      >
-        {dark ? <IconSun size={18} stroke={1.6} /> : <IconMoon size={18} stroke={1.6} />}
-      </ActionIcon>
-    </Tooltip>
+    <button
+      type="button"
+      className="frame-icon"
+      aria-label={label}
+      title={label}
+      onClick={() => setColorScheme(dark ? 'light' : 'dark')}
+    >
+      <Icon paths={dark ? SUN : MOON} />
+    </button>
+  )
+}
+
+function Icon({ paths }: { paths: readonly string[] }) {
+  return (
+    <svg viewBox="0 0 24 24" aria-hidden>
+      {paths.map((d) => (
+        <path key={d} d={d} />
+      ))}
+    </svg>
   )
 }

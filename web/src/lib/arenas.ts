@@ -1,5 +1,5 @@
 /** What the gallery says about an arena, and how the launch form learns which one was chosen. */
-import type { ArenaConfig, ArenaView } from '../api/types'
+import type { ArenaConfig, ArenaGeometry, ArenaView } from '../api/types'
 import type { Json } from '../form/schema'
 import { plural, significant } from './format'
 
@@ -15,6 +15,22 @@ export function arenaFacts({ geometry, obstacles, free_share }: ArenaView): stri
     .map((fact) => fact.replaceAll(' ', '\u00a0'))
     .join('\u00a0· ')
 }
+
+export type Mover = ArenaGeometry['movers'][number]
+
+/** Where a mover goes, as far as the arena says: corners of its way, or a timed one's places in order. */
+export function wayOf(mover: Mover): readonly { x: number; y: number }[] {
+  if (mover.kind === 'timed') return mover.keyframes
+  return mover.kind === 'walker' ? [] : (mover.waypoints ?? [])
+}
+
+/** Whether it goes from the last corner straight to the first. */
+export const isRound = (mover: Mover): boolean =>
+  mover.kind === 'patrol' || (mover.kind === 'pedestrian' && !mover.stays)
+
+/** The address of the page on which one draws on a copy of this arena. */
+export const drawOn = (config: ArenaConfig): string =>
+  `/arenas/draw?from=${encodeURIComponent(JSON.stringify(config))}`
 
 /** The address of a launch form with this arena. */
 export const trainOn = (config: ArenaConfig): string =>

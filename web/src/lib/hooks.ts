@@ -1,6 +1,6 @@
 /** Small hooks that several pages share. */
 import { useCallback, useEffect, useState } from 'react'
-import { useSearchParams } from 'react-router'
+import { useLocation, useNavigate, useSearchParams } from 'react-router'
 
 /** Names the tab: "Runs – Mapless". */
 export function useTitle(title: string): void {
@@ -44,18 +44,26 @@ const REPLAY = 'replay'
 const REPLAY_BEFORE = 'episode'
 /** Who is shown beside, once for each. */
 const TOGETHER = 'with'
+/** What the history keeps beside the address of a replay that was opened on its page: to close it is to go back. */
+const OPENED_HERE = 'replay opened here'
 
 /**
- * The episode that is replayed, counted from 0, or null. Opening one is a step of its own, so that Back closes it; going from
- * one to the next is not.
+ * The episode that is replayed, counted from 0, or null. Opening one is a step of its own, so that Back closes it, and closing
+ * it goes back; going from one to the next is no step.
  */
 export function useReplayInAddress(): [number | null, (episode: number | null) => void] {
   const [search, setSearch] = useSearchParams()
+  const navigate = useNavigate()
+  const openedHere = useLocation().state === OPENED_HERE
   const wanted = wholeNumber(search.get(REPLAY))
   const episode = wanted === null ? wholeNumber(search.get(REPLAY_BEFORE)) : wanted - 1
   const open = episode !== null && episode >= 0
   const set = useCallback(
-    (next: number | null) =>
+    (next: number | null) => {
+      if (next === null && openedHere) {
+        void navigate(-1)
+        return
+      }
       setSearch(
         (before) => {
           const after = new URLSearchParams(before)
@@ -66,9 +74,14 @@ export function useReplayInAddress(): [number | null, (episode: number | null) =
           } else after.set(REPLAY, String(next + 1))
           return after
         },
-        { replace: open || next === null, preventScrollReset: true },
-      ),
-    [open, setSearch],
+        {
+          replace: open || next === null,
+          preventScrollReset: true,
+          state: next !== null && (!open || openedHere) ? OPENED_HERE : null,
+        },
+      )
+    },
+    [open, openedHere, setSearch, navigate],
   )
   return [open ? episode : null, set]
 }
@@ -76,6 +89,7 @@ export function useReplayInAddress(): [number | null, (episode: number | null) =
 /** The policies that a replay shows beside the one whose episode it is, as addresses of replays name them. */
 export function useTogetherInAddress(): [string[], (others: readonly string[]) => void] {
   const [search, setSearch] = useSearchParams()
+  const { state } = useLocation()
   const set = useCallback(
     (others: readonly string[]) =>
       setSearch(
@@ -85,9 +99,9 @@ export function useTogetherInAddress(): [string[], (others: readonly string[]) =
           for (const each of others) after.append(TOGETHER, each)
           return after
         },
-        { replace: true, preventScrollReset: true },
+        { replace: true, preventScrollReset: true, state },
       ),
-    [setSearch],
+    [setSearch, state],
   )
   return [[...new Set(search.getAll(TOGETHER))], set]
 }

@@ -2,19 +2,20 @@
 import { Button, Group, Modal, Skeleton, Stack, Text, TextInput } from '@mantine/core'
 import { useQueryClient } from '@tanstack/react-query'
 import { useState } from 'react'
+import { Link } from 'react-router'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaSummary } from '../api/types'
 import { ArenaCard } from '../components/ArenaCard'
 import { ArenaFormats, ArenaUpload } from '../components/ArenaUpload'
-import { IconSearch } from '../components/icons'
+import { IconPencil, IconSearch } from '../components/icons'
 import { Notice, Page, Panel, QueryError } from '../components/ui'
 import { useTitle } from '../lib/hooks'
 import classes from './ArenasPage.module.css'
 
 /** One's own first: whoever imports one sees it. */
 const SECTIONS = [
-  { kind: 'imported', title: 'Imported', text: 'Read from files, the newest first.' },
+  { kind: 'imported', title: 'Imported', text: 'Read from files or drawn, the newest first.' },
   { kind: 'fixed', title: 'Built in', text: 'The two arenas of the paper.' },
   {
     kind: 'generated',
@@ -32,7 +33,18 @@ export function ArenasPage() {
   const [newest, setNewest] = useState<string>()
   const [deleting, setDeleting] = useState<ArenaSummary>()
   return (
-    <Page title="Arenas" below={<ArenaFormats />} actions={<ArenaUpload onImported={setNewest} />}>
+    <Page
+      title="Arenas"
+      below={<ArenaFormats />}
+      actions={
+        <Group gap="xs">
+          <Button component={Link} to="/arenas/draw" leftSection={<IconPencil size={16} />}>
+            Draw an arena
+          </Button>
+          <ArenaUpload onImported={setNewest} />
+        </Group>
+      }
+    >
       {error && !data ? (
         <Panel>
           <QueryError error={error} what="list of arenas" retry={refetch} />
@@ -122,7 +134,7 @@ function DeleteDialog({ arena, onClose }: { arena: ArenaSummary; onClose: () => 
   return (
     <Modal opened onClose={onClose} title={`Delete “${arena.title}”?`}>
       <Stack>
-        <Text size="sm">It can be imported again from its file.</Text>
+        <Text size="sm">It is gone then; an arena from a file can be imported again.</Text>
         {remove.error && (
           <Notice title="Not deleted" bad role="alert">
             {messageOf(remove.error)}

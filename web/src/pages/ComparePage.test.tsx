@@ -1,4 +1,4 @@
-import { screen, within } from '@testing-library/react'
+import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import { comparison, curves, form, listed, profiles } from '../testing/examples'
 import { open } from '../testing/render'
@@ -24,12 +24,18 @@ test('figures with intervals and N, warnings, curves, and what differs', async (
   expect(figures).toHaveTextContent(/Seeds: 98\.0\s%, 98\.8\s%None of 2 seeds failed: up to 78 % may/)
   expect(screen.getByTestId('warnings')).toHaveTextContent('Alone has not been evaluated yet.')
   const differences = await screen.findByTestId('differences')
-  expect(
-    within(differences)
-      .getAllByRole('row')
-      .slice(1)
-      .map((row) => row.textContent),
-  ).toEqual(['Learning rateAlgorithm0.0010.0003', 'Hidden layersNetwork64, 64–', 'WeightProgress500left out'])
+  await waitFor(() =>
+    expect(
+      within(differences)
+        .getAllByRole('row')
+        .slice(1)
+        .map((row) => row.textContent),
+    ).toEqual([
+      'Learning rateAlgorithm0.0010.0003',
+      'Hidden layersNetwork64, 64–',
+      'WeightProgress500left out',
+    ]),
+  )
   const [chart] = await screen.findAllByRole('figure', { name: 'Success rate' })
   expect(chart).toHaveTextContent('Corridor, 2 seeds')
   expect(chart).toHaveTextContent('Alone, 1 seed')

@@ -65,6 +65,7 @@ const routes = {
     suites: [{ suite: 'complex-200', suite_hash: 'abc', entries: 3, frozen: true }],
   },
   'GET /api/arenas': [],
+  'GET /api/suites': [],
   'GET /api/uploads': { items: [], total: 0 },
   'GET /api/projects': {
     items: [{ id: 'default', name: 'Default', role: 'admin', experiments: 0 }],
@@ -121,6 +122,38 @@ test('policies on suites are chosen, or come with the address', async () => {
       { by: 'name', name: 'complex-200' },
     ],
   })
+})
+
+test('suites of one’s own are listed, chosen and deleted', async () => {
+  const suite = {
+    id: 'su1',
+    name: 'My lab',
+    created_at: 1,
+    scenarios: [
+      { sha256: 'a'.repeat(64), name: 'A chair' },
+      { sha256: 'b'.repeat(64), name: 'A crowd' },
+    ],
+  }
+  const none = { ...suite, id: 'su2', name: 'Begun', scenarios: [] }
+  const server = startServer({
+    ...routes,
+    'GET /api/suites': [none, suite],
+    'DELETE /api/suites/su2': new Response(null, { status: 204 }),
+  })
+  const { user } = open('/evaluations?policy=shipped:crowd')
+  const [begun, whole] = await screen.findAllByTestId('own-suite')
+  expect(begun).toHaveTextContent(/Begun\s*none yet/)
+  expect(whole).toHaveTextContent(/My lab\s*2 scenarios: A chair, A crowd/)
+  await user.click(screen.getByRole('combobox', { name: 'On' }))
+  await user.click(await screen.findByRole('option', { name: 'My lab' }))
+  await user.click(screen.getByRole('button', { name: 'Evaluate, 1 time' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(server.changes[0]?.body).toMatchObject({ suites: [{ by: 'scenarios', id: 'su1' }] })
+  await user.click(screen.getByRole('button', { name: 'Delete Begun' }))
+  const question = await screen.findByRole('dialog', { name: 'Delete “Begun”?' })
+  expect(server.changes).toHaveLength(1)
+  await user.click(within(question).getByRole('button', { name: 'Delete' }))
+  await waitFor(() => expect(server.changes.at(-1)?.route).toBe('DELETE /api/suites/su2'))
 })
 
 test('an evaluation shows its figures and its ways, and a click on one replays it', async () => {

@@ -5,6 +5,7 @@ import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import { AskForm } from '../components/evaluations/AskForm'
 import { EvaluationTable, isOpen } from '../components/evaluations/EvaluationTable'
+import { OwnSuites } from '../components/evaluations/OwnSuites'
 import { PolicyUpload } from '../components/evaluations/PolicyUpload'
 import { Pager } from '../components/Pager'
 import { Message, Page, Panel, QueryError } from '../components/ui'
@@ -41,6 +42,7 @@ export function EvaluationsPage() {
           {/* Another address is another question. */}
           <AskForm key={search.toString()} />
         </Panel>
+        <OwnSuites />
         <Panel title="Measured" flush>
           {error && !data ? (
             <QueryError error={error} what="list of evaluations" retry={refetch} />

@@ -34,6 +34,24 @@ test('stopping it stops its runs', async () => {
   await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/experiments/exp1/stop'))
 })
 
+test('how many of its runs are under way at a time is said, changed and given up', async () => {
+  const server = startServer({ ...routes, 'PATCH /api/experiments/exp1': experiment })
+  const { user } = open('/experiments/exp1')
+  const button = await screen.findByRole('button', { name: 'No limit of its own: Corridor' })
+  expect(button).toHaveTextContent('No limit of its own')
+  await user.click(button)
+  const number = await screen.findByRole('textbox', { name: 'At most at a time' })
+  await user.type(number, '2')
+  await user.click(screen.getByRole('button', { name: 'Save' }))
+  await waitFor(() =>
+    expect(server.changes).toEqual([{ route: 'PATCH /api/experiments/exp1', body: { parallel_runs: 2 } }]),
+  )
+  await waitFor(() => expect(number).not.toBeInTheDocument())
+  await user.click(button)
+  await user.click(screen.getByRole('button', { name: 'Save' }))
+  await waitFor(() => expect(server.changes[1]?.body).toEqual({ parallel_runs: 0 }))
+})
+
 test('notes are Markdown without their HTML, and are written here', async () => {
   const marks = {
     tags: ['baseline'],

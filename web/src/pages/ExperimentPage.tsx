@@ -6,12 +6,14 @@ import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Experiment } from '../api/types'
 import charts from '../charts/MetricChart.module.css'
+import { Below } from '../components/Below'
 import { Configuration } from '../components/Configuration'
 import { COMPARED, CurveChart } from '../components/CurveChart'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { ExperimentLineage } from '../components/Lineage'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
+import { ParallelRuns } from '../components/ParallelRuns'
 import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
@@ -145,27 +147,34 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
           flush
           title={plural(experiment.runs.length, 'run')}
           actions={
-            experiment.success && (
-              <Text size="sm" component="div">
-                Success <SuccessEstimate estimate={experiment.success} detail />
-              </Text>
-            )
+            <Group gap="md">
+              {(canStop(states) || experiment.parallel_runs !== null) && (
+                <ParallelRuns experiment={experiment} />
+              )}
+              {experiment.success && (
+                <Text size="sm" component="div">
+                  Success <SuccessEstimate estimate={experiment.success} detail />
+                </Text>
+              )}
+            </Group>
           }
         >
           <RunTable runs={experiment.runs} />
         </Panel>
-        <ExperimentLineage experimentId={experiment.id} />
-        <Panel title="Curves">
-          <div className={charts.grid}>
-            {COMPARED.map((metric) => (
-              <CurveChart key={metric.name} metric={metric} experiments={[experiment.id]} />
-            ))}
-          </div>
-        </Panel>
-        <Panel title="Configuration">
-          <Configuration training={experiment.training} />
-        </Panel>
-        <NotesPanel experimentId={experiment.id} />
+        <Below height={1_400}>
+          <ExperimentLineage experimentId={experiment.id} />
+          <Panel title="Curves">
+            <div className={charts.grid}>
+              {COMPARED.map((metric) => (
+                <CurveChart key={metric.name} metric={metric} experiments={[experiment.id]} />
+              ))}
+            </div>
+          </Panel>
+          <Panel title="Configuration">
+            <Configuration training={experiment.training} />
+          </Panel>
+          <NotesPanel experimentId={experiment.id} />
+        </Below>
       </Stack>
     </Page>
   )

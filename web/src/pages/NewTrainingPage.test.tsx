@@ -135,6 +135,28 @@ test('seeds can be chosen one by one', async () => {
   expect(sent(server).seeds).toEqual([7, 11])
 })
 
+test('of several seeds as many run at a time as one says', async () => {
+  const server = start()
+  const { user } = open('/new')
+  const seeds = await screen.findByRole('textbox', { name: 'Number of seeds' })
+  // A single run needs no limit.
+  await user.clear(seeds)
+  await user.type(seeds, '1')
+  expect(screen.queryByRole('textbox', { name: 'At most at a time' })).not.toBeInTheDocument()
+  await user.clear(seeds)
+  await user.type(seeds, '5')
+  await user.type(await screen.findByRole('textbox', { name: 'At most at a time' }), '2')
+  await user.click(screen.getByRole('button', { name: 'Launch' }))
+  await waitFor(() => expect(server.changes).toHaveLength(1))
+  expect(sent(server)).toMatchObject({ seeds: [0, 1, 2, 3, 4], parallel_runs: 2 })
+})
+
+test('a duplicate runs as many at a time as its original', async () => {
+  start({ 'GET /api/experiments/exp1': { ...experiment, parallel_runs: 1 } })
+  open('/new?from=exp1')
+  expect(await screen.findByRole('textbox', { name: 'At most at a time' })).toHaveValue('1')
+})
+
 test('a duplicate starts with the settings, the seeds and the name of its original', async () => {
   const original = { ...experiment, training: { ...training, steps: 5000 } }
   start({ 'GET /api/experiments/exp1': original })

@@ -6,9 +6,11 @@ import { $api } from '../api/client'
 import { ApiError, messageOf } from '../api/errors'
 import type { components } from '../api/schema'
 import type { Experiment, Preset, ShippedPolicy, StartFrom, StartPolicy } from '../api/types'
+import { Below } from '../components/Below'
 import { IconRocket } from '../components/icons'
 import { ArenaFields, isOfArena } from '../components/launch/ArenaFields'
 import { TimeEstimate } from '../components/launch/TimeEstimate'
+import { ParallelRunsInput } from '../components/ParallelRuns'
 import { useLaunchProject } from '../components/people/useLaunchProject'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
@@ -31,6 +33,7 @@ import classes from './NewTrainingPage.module.css'
 const LONGEST_COPIED_NAME = 110
 
 const NAME = ['name']
+const PARALLEL = ['parallel_runs']
 
 type ExperimentLaunch = components['schemas']['ExperimentLaunch']
 type StudyLaunch = components['schemas']['StudyLaunch']
@@ -137,7 +140,7 @@ function likePolicy(policy: ShippedPolicy | undefined, further: boolean): Json |
 function useCopy(original: Experiment | undefined, start: StartPolicy | undefined): Json | undefined {
   const [copy, setCopy] = useState<Json>()
   if (original && copy === undefined) {
-    const { name, runs, training } = original
+    const { name, runs, training, parallel_runs } = original
     const short = name.slice(0, LONGEST_COPIED_NAME)
     setCopy(
       start
@@ -149,6 +152,7 @@ function useCopy(original: Experiment | undefined, start: StartPolicy | undefine
         : {
             name: `${short} (copy)`,
             seeds: runs.map((run) => run.seed),
+            ...(parallel_runs === null ? {} : { parallel_runs }),
             training: training as unknown as Json,
           },
     )
@@ -237,6 +241,7 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
   const preset = presets.find((one) => sameValue(fresh(training), fresh(one.training as unknown as Json)))
   const runs = valueAt(form.values, ['seeds'])
   const steps = valueAt(training, ['steps'])
+  const parallel = valueAt(form.values, PARALLEL)
   const otherError =
     launched.error && !(launched.error instanceof ApiError && launched.error.problems.length > 0)
   const into = project === undefined ? {} : { project_id: project }
@@ -306,7 +311,9 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
               </div>
               <StartFromInput form={form} />
               <ArenaFields fields={place} {...shared} />
-              <FieldGrid fields={main.filter((field) => !isOfArena(field))} {...shared} />
+              <Below height={700}>
+                <FieldGrid fields={main.filter((field) => !isOfArena(field))} {...shared} />
+              </Below>
             </Stack>
           </Panel>
           <AdvancedFields fields={advanced} refused={refused} {...shared} />
@@ -329,6 +336,12 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
               <StudySettings settings={settings.length} choices={choices} onChange={setChoices} />
             ) : (
               seeds && <SeedsInput key={Array.isArray(runs) ? 'list' : 'none'} field={seeds} form={form} />
+            )}
+            {!isStudy && Array.isArray(runs) && runs.length > 1 && (
+              <ParallelRunsInput
+                value={typeof parallel === 'number' ? parallel : null}
+                onChange={(number) => form.set(PARALLEL, number)}
+              />
             )}
             <Text size="sm" className={classes.sum} data-testid="launch-summary">
               {isStudy && typeof steps === 'number'

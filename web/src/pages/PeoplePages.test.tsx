@@ -151,6 +151,11 @@ test('a project leads to its trainings, to its members for who administrates it,
       project_id: 'p1',
       runs: [run, { ...run, outcome: 'refused', why: 'This server has another run of that id.' }],
       checkpoints: 1,
+      others: [
+        { kind: 'policy', id: 'u1', outcome: 'imported', why: null },
+        { kind: 'evaluation', id: 'v1', outcome: 'imported', why: null },
+        { kind: 'evaluation', id: 'v2', outcome: 'imported', why: null },
+      ],
     },
   })
   const { user } = open('/projects')
@@ -169,7 +174,9 @@ test('a project leads to its trainings, to its members for who administrates it,
     new File(['{"a": "tar"}'], 'mapless-halls.tar', { type: 'application/x-tar' }),
   )
   expect(
-    await screen.findByText('1 run imported, 1 run refused. This server has another run of that id.'),
+    await screen.findByText(
+      '1 run imported, 1 upload imported, 2 evaluations imported, 1 run refused. This server has another run of that id.',
+    ),
   ).toBeVisible()
   expect(server.changes).toEqual([{ route: 'POST /api/projects/p1/import', body: { a: 'tar' } }])
 })
@@ -195,4 +202,17 @@ test('the log is filtered, and goes into a table', async () => {
   await user.type(screen.getByLabelText('By whom'), 'ada')
   await vi.waitFor(() => expect(server.asked.at(-1)).toBe('/api/audit?actor=ada&limit=50&offset=0'))
   expect(screen.getByRole('link', { name: 'CSV' })).toHaveAttribute('href', '/api/audit/csv?actor=ada')
+})
+
+test('who came by a provider may sign out there, too; a provider without such a page is quoted', async () => {
+  const server = startServer({
+    'GET /api/account': { ...account, connected: true },
+    'GET /api/sign-in': { people: true, provider: 'the university' },
+    'GET /api/sign-in/provider/end': refusal(404, 'The university has no page that ends a session.'),
+  })
+  const { user } = open('/nowhere')
+  await user.click(await screen.findByRole('button', { name: 'Account of ada' }))
+  await user.click(await screen.findByRole('menuitem', { name: 'Sign out of the university, too' }))
+  expect(await screen.findByText('The university has no page that ends a session.')).toBeInTheDocument()
+  expect(server.changes).toEqual([])
 })

@@ -137,21 +137,33 @@ function ProjectTools({ project, people }: { project: Project; people: boolean }
   )
 }
 
-/** "3 imported, 1 there already", and why what was refused was. */
-function importNews({ runs }: ProjectImport) {
-  const refused = runs.filter(({ outcome }) => outcome === 'refused')
-  const told = [
-    [runs.filter(({ outcome }) => outcome === 'imported').length, 'imported'],
-    [runs.filter(({ outcome }) => outcome === 'there').length, 'there already'],
-    [refused.length, 'refused'],
-  ] as const
-  const counts = told
-    .filter(([number]) => number > 0)
-    .map(([number, word]) => `${plural(number, 'run')} ${word}`)
-  const why = refused[0]?.why
+const KINDS = [
+  ['run', 'run'],
+  ['policy', 'upload'],
+  ['evaluation', 'evaluation'],
+  ['arena', 'arena'],
+] as const
+const OUTCOMES = [
+  ['imported', 'imported'],
+  ['there', 'there already'],
+  ['refused', 'refused'],
+] as const
+
+/** "3 runs imported, 1 upload there already", and why what was refused was. */
+function importNews({ runs, others }: ProjectImport) {
+  const things = [...runs.map((run) => ({ ...run, kind: 'run' as const })), ...others]
+  const counts = OUTCOMES.flatMap(([wanted, word]) =>
+    KINDS.map(([of, name]) => ({
+      number: things.filter(({ kind, outcome }) => kind === of && outcome === wanted).length,
+      name,
+    }))
+      .filter(({ number }) => number > 0)
+      .map(({ number, name }) => `${plural(number, name)} ${word}`),
+  )
+  const refused = things.find(({ outcome }) => outcome === 'refused')
   return {
-    title: refused.length > 0 ? 'Not all could be imported' : 'Imported',
-    message: `${counts.join(', ') || 'There was no run in it'}.${why ? ` ${why}` : ''}`,
-    ...(refused.length > 0 ? { color: 'red' } : {}),
+    title: refused ? 'Not all could be imported' : 'Imported',
+    message: `${counts.join(', ') || 'There was nothing in it'}.${refused?.why ? ` ${refused.why}` : ''}`,
+    ...(refused ? { color: 'red' } : {}),
   }
 }

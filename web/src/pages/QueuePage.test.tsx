@@ -1,4 +1,4 @@
-import { screen, within } from '@testing-library/react'
+import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
@@ -27,6 +27,7 @@ const run = {
   queued_at: 1,
   position: 1,
   waits_for: 'turn',
+  parallel_runs: null as number | null,
   extensions: [],
   starts_in: 125,
 }
@@ -115,6 +116,22 @@ test('a refused priority is said, and taken back', async () => {
   await user.type(input, '101{Enter}')
   expect(await screen.findByText(said)).toBeInTheDocument()
   expect(input).toHaveValue('0')
+})
+
+test('a limit that a run waits for can be changed where it waits', async () => {
+  const waits = { ...stuck, waits_for: 'experiment limit', parallel_runs: 1 }
+  const queue = { items: [run, waits], total: 2, hidden: 0, jobs: 0 }
+  const server = startServer({ ...routes, 'GET /api/queue': queue, 'PATCH /api/experiments/e1': done })
+  const { user } = open('/queue')
+  const button = await screen.findByRole('button', { name: 'At most 1 at a time: Corridor' })
+  expect(button).toHaveTextContent('At most 1 at a time')
+  await user.click(button)
+  const number = await screen.findByRole('textbox', { name: 'At most at a time' })
+  await user.clear(number)
+  await user.type(number, '3{Enter}')
+  await waitFor(() =>
+    expect(server.changes).toEqual([{ route: 'PATCH /api/experiments/e1', body: { parallel_runs: 3 } }]),
+  )
 })
 
 test('a worker shows its run, its machine and its week; one that has gone its last words', async () => {

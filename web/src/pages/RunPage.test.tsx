@@ -370,6 +370,19 @@ test('Back closes a replay that was opened here, and leaves the page where it is
   expect(router.state.location.pathname + router.state.location.search).toBe('/runs/run1')
 })
 
+test('to close a replay that was opened here is to go back: nothing of it stays behind', async () => {
+  startServer({ ...routes, 'GET /api/replays/checkpoint%3Acp2/1': replay })
+  const { user, router } = open('/nowhere')
+  await router.navigate('/runs/run1')
+  await user.click(await screen.findByRole('button', { name: 'Replay episode 2' }))
+  await screen.findByRole('dialog', { name: 'Episode 2' })
+  await user.keyboard('{Escape}')
+  await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
+  expect(router.state.location.pathname + router.state.location.search).toBe('/runs/run1')
+  await router.navigate(-1)
+  await waitFor(() => expect(router.state.location.pathname).toBe('/nowhere'))
+})
+
 test('one goes on from one failure to the next without closing the replay', async () => {
   startServer({
     ...routes,

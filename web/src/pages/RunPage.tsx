@@ -12,6 +12,7 @@ import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
 import { chartOf } from '../charts/shape'
+import { Below } from '../components/Below'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
@@ -123,10 +124,10 @@ function LoadedRun({ run }: { run: RunDetail }) {
           {summaryOf(inShort(run.training, arena))}
         </Text>
       }
-      actions={<RunActions run={run} best={checkpoints.data?.best ?? null} />}
+      actions={<RunActions run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />}
     >
       <Stack gap="md">
-        <Vitals run={run} best={checkpoints.data?.best ?? null} />
+        <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
         {run.error && (
           <Notice bad title={run.state === 'failed' ? 'This run failed' : 'What happened'}>
             <Text size="sm" className={classes.error}>
@@ -166,59 +167,61 @@ function LoadedRun({ run }: { run: RunDetail }) {
             </Stack>
           </Panel>
         </div>
-        <Diagnoses runId={run.id} state={run.state} />
-        <Panel title="Curves">
-          <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
-            <Tabs.List mb="md" className={classes.tabs}>
-              {SECTIONS.map(({ title }) => (
-                <Tabs.Tab key={title} value={title}>
-                  {title}
-                </Tabs.Tab>
+        <Below height={1_600} now={episode !== null || step !== null}>
+          <Diagnoses runId={run.id} state={run.state} />
+          <Panel title="Curves">
+            <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
+              <Tabs.List mb="md" className={classes.tabs}>
+                {SECTIONS.map(({ title }) => (
+                  <Tabs.Tab key={title} value={title}>
+                    {title}
+                  </Tabs.Tab>
+                ))}
+              </Tabs.List>
+              {SECTIONS.map(({ title, charts }) => (
+                <Tabs.Panel key={title} value={title}>
+                  <div className={grid.grid}>
+                    {charts.map((spec) => (
+                      <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
+                    ))}
+                  </div>
+                </Tabs.Panel>
               ))}
-            </Tabs.List>
-            {SECTIONS.map(({ title, charts }) => (
-              <Tabs.Panel key={title} value={title}>
-                <div className={grid.grid}>
-                  {charts.map((spec) => (
-                    <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
-                  ))}
-                </div>
-              </Tabs.Panel>
-            ))}
-          </Tabs>
-        </Panel>
-        <Panel title="Checkpoints" flush>
-          {checkpoints.data ? (
-            <>
-              <CheckpointTable
-                checkpoints={bestFirst(checkpoints.data)}
-                chosen={chosen}
-                onChoose={choose}
-                onWatch={watch}
-              />
-              <Pager
-                page={page}
-                size={CHECKPOINTS_A_PAGE}
-                total={checkpoints.data.total}
-                label="Pages of checkpoints"
-                onChange={setPage}
-              />
-            </>
-          ) : checkpoints.error ? (
-            <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
-          ) : (
-            <Skeleton height={120} m="md" w="auto" />
+            </Tabs>
+          </Panel>
+          <Panel title="Checkpoints" flush>
+            {checkpoints.data ? (
+              <>
+                <CheckpointTable
+                  checkpoints={bestFirst(checkpoints.data)}
+                  chosen={chosen}
+                  onChoose={choose}
+                  onWatch={watch}
+                />
+                <Pager
+                  page={page}
+                  size={CHECKPOINTS_A_PAGE}
+                  total={checkpoints.data.total}
+                  label="Pages of checkpoints"
+                  onChange={setPage}
+                />
+              </>
+            ) : checkpoints.error ? (
+              <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
+            ) : (
+              <Skeleton height={120} m="md" w="auto" />
+            )}
+          </Panel>
+          <RunLineage runId={run.id} />
+          {chosen?.evaluation && (
+            <div ref={episodes} className={classes.episodes}>
+              <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>
+                <CheckpointEpisodes key={chosen.id} checkpoint={chosen} />
+              </Panel>
+            </div>
           )}
-        </Panel>
-        <RunLineage runId={run.id} />
-        {chosen?.evaluation && (
-          <div ref={episodes} className={classes.episodes}>
-            <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>
-              <CheckpointEpisodes key={chosen.id} checkpoint={chosen} />
-            </Panel>
-          </div>
-        )}
-        <RunLog runId={run.id} state={run.state} />
+          <RunLog runId={run.id} state={run.state} />
+        </Below>
       </Stack>
       {lapse !== null && <LapseDialog runId={run.id} onClose={() => setLapse(null)} />}
     </Page>
@@ -264,9 +267,11 @@ interface OfRun {
   run: RunDetail
   /** Its best checkpoint so far. */
   best: Checkpoint | null
+  /** Whether it has been told; until then its place is kept, so that nothing jumps. */
+  known: boolean
 }
 
-function RunActions({ run, best }: OfRun) {
+function RunActions({ run, best, known }: OfRun) {
   const navigate = useNavigate()
   const actions = useActions()
   const of = { params: { path: { run_id: run.id } } }
@@ -274,7 +279,7 @@ function RunActions({ run, best }: OfRun) {
     params: { path: { experiment_id: run.experiment_id } },
   })
   return (
-    <Group gap="xs">
+    <Group gap={6}>
       {canStop([run.state]) && (
         <Button
           variant="default"
@@ -305,6 +310,7 @@ function RunActions({ run, best }: OfRun) {
           Download the best
         </Button>
       )}
+      {!known && <Skeleton width={178} height={36} />}
       <Button
         variant="default"
         leftSection={<IconCopy size={16} />}
@@ -313,6 +319,7 @@ function RunActions({ run, best }: OfRun) {
       >
         Duplicate
       </Button>
+      {experiment.isPending && <Skeleton width={28} height={28} />}
       {experiment.data && (
         <ExperimentMenu
           experiment={{
@@ -329,7 +336,7 @@ function RunActions({ run, best }: OfRun) {
 }
 
 /** The figures that are glanced at: all in one line, with the progress under it. */
-function Vitals({ run, best }: OfRun) {
+function Vitals({ run, best, known }: OfRun) {
   const progress = run.step / run.total_steps
   const figures: [label: string, value: string][] = [
     // The last rollout is whole, so that a completed run has some steps more than it was given.
@@ -353,7 +360,9 @@ function Vitals({ run, best }: OfRun) {
               .join(' at '),
           ] as [string, string],
         ]
-      : []),
+      : known
+        ? []
+        : [['Best checkpoint', '…'] as [string, string]]),
     ...(run.attempt > 1 ? [['Attempt', count(run.attempt)] as [string, string]] : []),
     ...(run.worker ? [['Worker', run.worker] as [string, string]] : []),
   ]

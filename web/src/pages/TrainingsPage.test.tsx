@@ -57,6 +57,21 @@ test('one looks at a project, and goes on with it', async () => {
   localStorage.clear()
 })
 
+test('a project that was chosen some time and is gone hides nothing', async () => {
+  localStorage.setItem('mapless.project', 'gone')
+  startServer({
+    'GET /api/experiments': (request: Request) =>
+      new URL(request.url).searchParams.has('project') ? { items: [], total: 0, next: null } : two,
+    'GET /api/projects': {
+      items: [{ id: 'p1', name: 'Halls', created_at: 1, experiments: 2, role: 'editor' }],
+      total: 1,
+    },
+  })
+  open('/')
+  expect(await screen.findByRole('link', { name: 'Corridor' })).toBeInTheDocument()
+  expect(localStorage.getItem('mapless.project')).toBeNull()
+})
+
 test('ticked trainings are compared', async () => {
   startServer({ 'GET /api/experiments': two })
   const { router, user } = open('/')

@@ -7,6 +7,7 @@ import { $api } from '../api/client'
 import type { WaitingRun } from '../api/types'
 import { IconArrowUp } from '../components/icons'
 import { Pager } from '../components/Pager'
+import { ParallelRuns } from '../components/ParallelRuns'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
 import { Panel } from '../components/ui'
@@ -79,6 +80,17 @@ function WaitingRow({ run, mayOrder }: { run: WaitingRun; mayOrder: boolean }) {
         <span className={classes.waits} data-stuck={run.waits_for !== 'turn' || undefined}>
           {waitsFor(run)}
         </span>
+        {mayOrder && (run.waits_for === 'experiment limit' || run.parallel_runs !== null) && (
+          <div>
+            <ParallelRuns
+              experiment={{
+                id: run.experiment_id,
+                name: run.experiment_name,
+                parallel_runs: run.parallel_runs,
+              }}
+            />
+          </div>
+        )}
       </Table.Td>
       <Table.Td className={ui.number}>{begins(run)}</Table.Td>
       <Table.Td className={ui.number}>{age(run.queued_at, now)}</Table.Td>

@@ -1,21 +1,33 @@
 /** Renders the application at an address, as a browser would show it. */
 import { QueryClientProvider } from '@tanstack/react-query'
-import { render } from '@testing-library/react'
+import { act, render } from '@testing-library/react'
 import userEvent from '@testing-library/user-event'
-import { createMemoryRouter, RouterProvider } from 'react-router'
+import { type Location, MemoryRouter, type NavigateFunction, useLocation, useNavigate } from 'react-router'
 import { createQueryClient } from '../api/client'
-import { routes } from '../app'
+import { App } from '../app'
 import { Providers } from '../components/Providers'
 
-/** The application at `address`; `user` acts on it, `router` tells where it has gone. */
+/** The application at `address`; `user` acts on it, `router` tells where it has gone, and goes elsewhere. */
 export function open(address: string) {
-  const router = createMemoryRouter(routes, { initialEntries: [address] })
+  const seen = {} as { location: Location; navigate: NavigateFunction }
+  function Seen() {
+    seen.location = useLocation()
+    seen.navigate = useNavigate()
+    return null
+  }
+  const router = {
+    state: seen,
+    navigate: (to: string | -1) => act(async () => void (await seen.navigate(to as string))),
+  }
   const client = createQueryClient()
   client.setDefaultOptions({ queries: { ...client.getDefaultOptions().queries, retry: false } })
   const { unmount } = render(
     <QueryClientProvider client={client}>
       <Providers still>
-        <RouterProvider router={router} />
+        <MemoryRouter initialEntries={[address]}>
+          <Seen />
+          <App />
+        </MemoryRouter>
       </Providers>
     </QueryClientProvider>,
   )

@@ -1,6 +1,6 @@
 /** The table of trainings with what finds, orders and groups them. */
 import { Button, Select } from '@mantine/core'
-import { type ReactNode, useCallback, useState } from 'react'
+import { type ReactNode, useCallback, useEffect, useState } from 'react'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Group, ListedExperiment } from '../api/types'
@@ -147,6 +147,13 @@ function lookAt(project: string): Partial<TableView> {
 function ProjectSelect({ view, onView }: Pick<TrainingsProps, 'view' | 'onView'>) {
   const { data } = $api.useQuery('get', '/api/projects', { params: { query: { limit: 200 } } })
   const projects = data?.items ?? []
+  // Deleted since, or no longer this person's: nobody finds an empty list for what was chosen some time.
+  const isGone =
+    data !== undefined && data.total <= projects.length && !projects.some(({ id }) => id === view.project)
+  const forgets = isGone && view.project !== '' && view.project === chosenProject()
+  useEffect(() => {
+    if (forgets) onView(lookAt(''))
+  }, [forgets, onView])
   if (projects.length < 2 && !view.project) return null
   return (
     <Select

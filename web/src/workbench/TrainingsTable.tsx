@@ -19,7 +19,7 @@ import { nextSort, type TableView } from './view'
 import classes from './workbench.module.css'
 
 const ROW_PX = 46
-const CARD_PX = 88
+const CARD_PX = 100
 const TICK_PX = 40
 const MENU_PX = 48
 /** Rows before the end of what is there at which more is asked for. */
@@ -52,6 +52,9 @@ export function TrainingsTable(props: TrainingsTableProps) {
     getScrollElement: () => scroll.current,
     estimateSize: (index) => (narrow && rows[index]?.kind === 'training' ? CARD_PX : ROW_PX),
     overscan: 8,
+    // As high as it will be about: the rows of the first picture are drawn with the page, not once more after it.
+    initialRect: { width: 0, height: window.innerHeight * 0.8 },
+    useFlushSync: false,
     getItemKey: (index) => rows[index]?.key ?? index,
   })
   // biome-ignore lint/correctness/useExhaustiveDependencies: other rows have other heights.

@@ -1,6 +1,6 @@
 /** The rows of the table: trainings, part by part as one scrolls, or groups with the trainings of those that are open. */
 import { keepPreviousData, useQueries } from '@tanstack/react-query'
-import { useEffect, useMemo, useRef } from 'react'
+import { useDeferredValue, useEffect, useMemo, useRef } from 'react'
 import { $api } from '../api/client'
 import type { Group, ListedExperiment } from '../api/types'
 import { askedFor } from './cells'
@@ -54,6 +54,7 @@ function useAskedRows(view: TableView, open: ReadonlySet<string>): Rows {
       enabled: !grouped,
     },
   )
+  const parts = useDeferredValue(list.data)
   const groups = $api.useQuery(
     'get',
     '/api/workbench/groups',
@@ -72,14 +73,14 @@ function useAskedRows(view: TableView, open: ReadonlySet<string>): Rows {
     ),
   })
   if (!grouped) {
-    const pages = list.data?.pages ?? []
+    const pages = parts?.pages ?? []
     return {
       rows: pages
         .flatMap(({ items }) => items)
         .map((experiment) => ({ kind: 'training', key: experiment.id, experiment, nested: false })),
       total: pages[0]?.total,
       error: list.error,
-      isPending: list.isPending,
+      isPending: parts === undefined && !list.error,
       refetch: () => void list.refetch(),
       more: () => {
         if (list.hasNextPage && !list.isFetchingNextPage) void list.fetchNextPage()

@@ -40,12 +40,12 @@ export const chooseProject = (id: string): void =>
   id ? localStorage.setItem(PROJECT, id) : localStorage.removeItem(PROJECT)
 
 /** The view that an address's query describes; what it does not say is as usual. */
-export function viewOf(search: URLSearchParams): TableView {
+export function viewOf(search: URLSearchParams, chosen = chosenProject()): TableView {
   const place = search.get('place') ?? ''
   const columns = search.get('columns')
   return {
     query: search.get('q') ?? '',
-    project: search.get('project') ?? chosenProject(),
+    project: search.get('project') ?? chosen,
     sort: search.get('sort') || DEFAULTS.sort,
     columns: columns === null ? DEFAULT_COLUMNS : [...new Set(columns.split(',').filter(Boolean))],
     pinned: Math.max(0, Number(search.get('pinned')) || 0),
@@ -70,7 +70,8 @@ export function addressOf(view: TableView): URLSearchParams {
 /** The view in the address, and how to change parts of it. */
 export function useView(): [TableView, (change: Partial<TableView>) => void] {
   const [search, setSearch] = useSearchParams()
-  const view = useMemo(() => viewOf(search), [search])
+  const chosen = chosenProject()
+  const view = useMemo(() => viewOf(search, chosen), [search, chosen])
   const change = useCallback(
     (part: Partial<TableView>) =>
       setSearch((before) => addressOf({ ...viewOf(before), ...part }), {

@@ -18,6 +18,7 @@ import {
   suiteByName,
   suiteInArena,
   suiteOf,
+  suiteOfOnesOwn,
   suiteTitle,
 } from './choices'
 
@@ -73,6 +74,7 @@ export function AskForm() {
   const uploads = $api.useQuery('get', '/api/uploads', { params: { query: { limit: 200 } } })
   const boards = $api.useQuery('get', '/api/leaderboards')
   const arenas = $api.useQuery('get', '/api/arenas')
+  const together = $api.useQuery('get', '/api/suites')
   const trainings = $api.useQuery(
     'get',
     '/api/experiments',
@@ -105,8 +107,11 @@ export function AskForm() {
     (arenas.data ?? [])
       .filter((each) => each.kind === kind)
       .map((each) => ({ value: suiteInArena(each.config), label: each.title }))
+  const ofOnesOwn: Option[] = (together.data ?? [])
+    .filter(({ scenarios }) => scenarios.length > 0)
+    .map(({ id, name }) => ({ value: suiteOfOnesOwn(id), label: name }))
   const known = [...own, ...sent, ...ready, ...untrained]
-  const grounds = [...frozen, ...places('generated'), ...places('imported'), ...places('fixed')]
+  const grounds = [...ofOnesOwn, ...frozen, ...places('generated'), ...places('imported'), ...places('fixed')]
   const families = suites.some((key) => {
     const suite = suiteOf(key, difficulty)
     return suite?.by === 'arena' && isFamily(suite.arena)
@@ -171,6 +176,7 @@ export function AskForm() {
               ),
             },
             { group: 'Of the policy', items: [{ value: OWN, label: "The policy's own suite" }] },
+            { group: 'Suites of your own', items: ofOnesOwn },
             { group: 'Frozen suites', items: frozen },
             { group: 'Generated families', items: places('generated') },
             { group: 'Imported arenas', items: places('imported') },

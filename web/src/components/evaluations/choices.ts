@@ -41,10 +41,11 @@ export function policyOf(key: string): PolicyChoice | null {
   }
 }
 
-/** "own", "name:crowd-200", "arena:{…}". */
+/** "own", "name:crowd-200", "arena:{…}", "scenarios:4f2…". */
 export const OWN = 'own'
 export const suiteByName = (name: string) => `name:${name}`
 export const suiteInArena = (arena: ArenaConfig) => `arena:${JSON.stringify(arena)}`
+export const suiteOfOnesOwn = (id: string) => `scenarios:${id}`
 
 /**
  * The suite of a key.
@@ -53,6 +54,9 @@ export const suiteInArena = (arena: ArenaConfig) => `arena:${JSON.stringify(aren
 export function suiteOf(key: string, difficulty: number): SuiteChoice | null {
   if (key === OWN) return { by: 'own' }
   if (key.startsWith('name:')) return { by: 'name', name: key.slice(5) }
+  // What it has the server knows.
+  if (key.startsWith('scenarios:'))
+    return { by: 'scenarios', id: key.slice(10), name: '', arenas: [], documents: [] }
   if (!key.startsWith('arena:')) return null
   try {
     const arena = JSON.parse(key.slice(6)) as ArenaConfig
@@ -76,6 +80,8 @@ export function suiteTitle(choice: SuiteChoice): string {
       return 'Its own suite'
     case 'name':
       return choice.name
+    case 'scenarios':
+      return choice.name || "A suite of one's own"
     case 'arena':
       return isFamily(choice.arena)
         ? `${choice.arena.name}, difficulty ${choice.arena.difficulty}`

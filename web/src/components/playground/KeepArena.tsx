@@ -1,20 +1,42 @@
 /** The arena as it stands, for the gallery: to train on, to be measured in. */
-import { Button, Group, Stack, Text, TextInput } from '@mantine/core'
-import { useQueryClient } from '@tanstack/react-query'
+import { Autocomplete, Button, Group, Stack, Text, TextInput } from '@mantine/core'
+import { useMutation, useQueryClient } from '@tanstack/react-query'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../../api/client'
 import { messageOf } from '../../api/errors'
 import type { Playground } from '../../api/types'
 import { trainOn } from '../../lib/arenas'
-import { evaluate, suiteInArena } from '../evaluations/choices'
+import { plural } from '../../lib/format'
+import { evaluate, suiteInArena, suiteOfOnesOwn } from '../evaluations/choices'
 import { Notice, Panel } from '../ui'
 
 export function KeepArena({ ground }: { ground: Playground }) {
   const client = useQueryClient()
   const [name, setName] = useState('')
-  const keep = $api.useMutation('post', '/api/playgrounds/{playground_id}/arena', {
-    onSuccess: () => client.invalidateQueries({ queryKey: ['get', '/api/arenas'] }),
+  const [suite, setSuite] = useState('')
+  const suites = $api.useQuery('get', '/api/suites')
+  const arena = $api.useMutation('post', '/api/playgrounds/{playground_id}/arena')
+  const made = $api.useMutation('post', '/api/suites')
+  const added = $api.useMutation('post', '/api/suites/{suite_id}/scenarios')
+  const keep = useMutation({
+    networkMode: 'always',
+    mutationFn: async () => {
+      const { config } = await arena.mutateAsync({
+        params: { path: { playground_id: ground.id } },
+        body: { name },
+      })
+      const wanted = suite.trim()
+      if (wanted === '') return { config, suite: null }
+      const known = suites.data?.find((each) => each.name === wanted)
+      const { id } = known ?? (await made.mutateAsync({ body: { name: wanted } }))
+      const path = { suite_id: id }
+      return { config, suite: await added.mutateAsync({ params: { path }, body: { sha256: config.sha256 } }) }
+    },
+    onSettled: () =>
+      Promise.all(
+        ['/api/arenas', '/api/suites'].map((path) => client.invalidateQueries({ queryKey: ['get', path] })),
+      ),
   })
   return (
     <Panel title="Keep this moment">
@@ -23,20 +45,30 @@ export function KeepArena({ ground }: { ground: Playground }) {
         gap="xs"
         onSubmit={(event) => {
           event.preventDefault()
-          keep.mutate({ params: { path: { playground_id: ground.id } }, body: { name } })
+          keep.mutate()
         }}
       >
         <Text size="xs" c="dimmed">
-          As an arena of the gallery: what stands here, the robot's place as its start, and its target.
+          As an arena of the gallery: what stands here, the robot's place as its start, and its target; and,
+          if you like, as a scenario of a suite of your own.
         </Text>
+        <TextInput
+          size="xs"
+          label="Name"
+          maxLength={80}
+          value={name}
+          onChange={(event) => setName(event.currentTarget.value)}
+        />
         <Group gap="xs" wrap="nowrap" align="flex-end">
-          <TextInput
+          <Autocomplete
             flex={1}
             size="xs"
-            label="Name"
-            maxLength={80}
-            value={name}
-            onChange={(event) => setName(event.currentTarget.value)}
+            label="Suite of your own"
+            placeholder="None; a new name begins one"
+            maxLength={40}
+            value={suite}
+            onChange={setSuite}
+            data={(suites.data ?? []).map((each) => each.name)}
           />
           <Button
             type="submit"
@@ -53,6 +85,11 @@ export function KeepArena({ ground }: { ground: Playground }) {
             {messageOf(keep.error)}
           </Notice>
         )}
+        {keep.data?.suite && (
+          <Text size="xs" role="status">
+            {keep.data.suite.name} has {plural(keep.data.suite.scenarios.length, 'scenario')} now.
+          </Text>
+        )}
         {keep.data && (
           <Group gap="xs">
             <Button component={Link} to={trainOn(keep.data.config)} size="xs">
@@ -60,11 +97,14 @@ export function KeepArena({ ground }: { ground: Playground }) {
             </Button>
             <Button
               component={Link}
-              to={evaluate([], [suiteInArena(keep.data.config)])}
+              to={evaluate(
+                [],
+                [keep.data.suite ? suiteOfOnesOwn(keep.data.suite.id) : suiteInArena(keep.data.config)],
+              )}
               size="xs"
               variant="default"
             >
-              Evaluate on it
+              {keep.data.suite ? 'Evaluate on the suite' : 'Evaluate on it'}
             </Button>
           </Group>
         )}

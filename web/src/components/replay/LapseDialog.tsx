@@ -1,13 +1,10 @@
 /** A run's learning over the page: the same scenarios, driven by one checkpoint after another. */
 import { Button, Group, Modal, Text, useComputedColorScheme } from '@mantine/core'
 import { useRef } from 'react'
-import { $api } from '../../api/client'
+import { $now } from '../../api/client'
 import { count, percent } from '../../lib/format'
-import { IconDownload } from '../icons'
-import { QueryError } from '../ui'
-import classes from './Replay.module.css'
+import { DownloadPage, Stage } from './Stage'
 import { usePlayer } from './usePlayer'
-import { Waiting } from './Waiting'
 
 const ASK_MS = 700
 
@@ -15,8 +12,8 @@ export function LapseDialog({ runId, onClose }: { runId: string; onClose: () => 
   const dark = useComputedColorScheme('light') === 'dark'
   const frame = useRef<HTMLIFrameElement>(null)
   const init = { params: { path: { run_id: runId } } }
-  const lapse = $api.useQuery('get', '/api/runs/{run_id}/lapse', init, { retry: false })
-  const progress = $api.useQuery('get', '/api/runs/{run_id}/lapse/progress', init, {
+  const lapse = $now.useQuery('get', '/api/runs/{run_id}/lapse', init, { retry: false })
+  const progress = $now.useQuery('get', '/api/runs/{run_id}/lapse/progress', init, {
     enabled: lapse.isFetching,
     refetchInterval: ASK_MS,
     retry: false,
@@ -27,23 +24,17 @@ export function LapseDialog({ runId, onClose }: { runId: string; onClose: () => 
   const now = chapters.filter(({ begins }) => time !== null && begins <= time + 0.01).length - 1
   return (
     <Modal opened onClose={onClose} size={1080} title="Time lapse">
-      <div className={classes.stage} data-testid="lapse">
-        {page ? (
-          <iframe
-            key={page}
-            ref={frame}
-            title="The run's learning in 3D"
-            src={page}
-            allow="fullscreen"
-            data-seconds={time ?? undefined}
-          />
-        ) : lapse.error ? (
-          <QueryError error={lapse.error} what="time lapse" retry={() => void lapse.refetch()} />
-        ) : (
-          <Waiting progress={progress.data} />
-        )}
-      </div>
-      {lapse.data && (
+      <Stage
+        frame={frame}
+        testId="lapse"
+        title="The run's learning in 3D"
+        what="time lapse"
+        page={page}
+        time={time}
+        query={lapse}
+        progress={progress.data}
+      />
+      {lapse.data && page && (
         <>
           <Group gap={6} mt="sm" role="group" aria-label="Checkpoints">
             {chapters.map(({ step, success, begins }, place) => (
@@ -57,18 +48,9 @@ export function LapseDialog({ runId, onClose }: { runId: string; onClose: () => 
                 {count(step)}: {percent(success)}
               </Button>
             ))}
-            <Button
-              component="a"
-              href={`${page}?download`}
-              download
-              variant="default"
-              size="compact-sm"
-              ml="auto"
-              leftSection={<IconDownload size={14} />}
-              title="One file that plays in any browser, without Mapless"
-            >
-              Download
-            </Button>
+            <Group ml="auto">
+              <DownloadPage page={page} />
+            </Group>
           </Group>
           <Text size="xs" c="dimmed" mt={6}>
             {lapse.data.scenarios} scenarios of {lapse.data.suite}, the same at every checkpoint; the rates

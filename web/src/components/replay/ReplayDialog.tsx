@@ -1,18 +1,17 @@
 /** An episode over the page: in 3D, beside its charts and beside what others did in the same place; to seek, to take away. */
 import { Button, Group, Modal, MultiSelect, Text, useComputedColorScheme } from '@mantine/core'
 import { useRef } from 'react'
-import { $api } from '../../api/client'
+import { $now } from '../../api/client'
 import type { EpisodeReplay } from '../../api/types'
 import { OUTCOMES } from '../../lib/episodes'
 import { count, percent } from '../../lib/format'
 import { useTogetherInAddress } from '../../lib/hooks'
-import { IconDownload, IconMaximize } from '../icons'
-import { QueryError } from '../ui'
+import { IconMaximize } from '../icons'
 import classes from './Replay.module.css'
 import { ReplayCharts } from './ReplayCharts'
+import { Download, DownloadPage, Stage } from './Stage'
 import { letter } from './strips'
 import { usePlayer } from './usePlayer'
-import { Waiting } from './Waiting'
 
 /** Nothing of an evaluation ever changes. */
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY, retry: false }
@@ -37,14 +36,14 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
   const [others, setOthers] = useTogetherInAddress()
   const subjects = [of, ...others.filter((each) => each !== of).slice(0, MAX_BESIDE)].join(',')
   const path = { subjects, episode }
-  const replay = $api.useQuery('get', '/api/replays/{subjects}/{episode}', { params: { path } }, FOR_GOOD)
-  const series = $api.useQuery(
+  const replay = $now.useQuery('get', '/api/replays/{subjects}/{episode}', { params: { path } }, FOR_GOOD)
+  const series = $now.useQuery(
     'get',
     '/api/replays/{subjects}/{episode}/series',
     { params: { path } },
     { ...FOR_GOOD, enabled: replay.data !== undefined },
   )
-  const progress = $api.useQuery(
+  const progress = $now.useQuery(
     'get',
     '/api/replays/{subjects}/progress',
     { params: { path: { subjects } } },
@@ -56,23 +55,17 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
   return (
     <Modal opened onClose={onClose} size={1440} title={`Episode ${count(episode + 1)}`}>
       <div className={classes.sides}>
-        <div ref={stage} className={classes.stage} data-testid="replay">
-          {page ? (
-            <iframe
-              key={page}
-              ref={frame}
-              title="The episode in 3D"
-              src={page}
-              allow="fullscreen"
-              data-testid="replay-frame"
-              data-seconds={time ?? undefined}
-            />
-          ) : replay.error ? (
-            <QueryError error={replay.error} what="replay" retry={() => void replay.refetch()} />
-          ) : (
-            <Waiting progress={progress.data} />
-          )}
-        </div>
+        <Stage
+          ref={stage}
+          frame={frame}
+          testId="replay"
+          title="The episode in 3D"
+          what="replay"
+          page={page}
+          time={time}
+          query={replay}
+          progress={progress.data}
+        />
         <section className={classes.charts} aria-label="Charts of the episode">
           {replay.data && <ReplayCharts query={series} time={time} onSeek={seek} />}
         </section>
@@ -93,28 +86,13 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
               >
                 Full screen
               </Button>
-              <Button
-                component="a"
-                href={`${page}?download`}
-                download
-                variant="default"
-                size="xs"
-                leftSection={<IconDownload size={14} />}
-                title="One file that plays in any browser, without Mapless"
-              >
-                Download
-              </Button>
-              <Button
-                component="a"
+              <DownloadPage page={page} />
+              <Download
                 href={`/api/replays/${subjects}/${episode}/mcap`}
-                download
-                variant="default"
-                size="xs"
-                leftSection={<IconDownload size={14} />}
                 title="Scans, odometry, commands and transforms as ROS 2 messages, for Foxglove and ROS"
               >
                 MCAP
-              </Button>
+              </Download>
             </>
           )}
         </Group>
@@ -171,7 +149,7 @@ interface BesideSelectProps {
 
 /** Who else is shown in the same place. */
 function BesideSelect({ of, chosen, onChoose }: BesideSelectProps) {
-  const { data } = $api.useQuery(
+  const { data } = $now.useQuery(
     'get',
     '/api/replays/{subjects}/beside',
     { params: { path: { subjects: of } } },

@@ -13,7 +13,7 @@ import {
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
-import { $api } from '../../api/client'
+import { $api, $now } from '../../api/client'
 import type { KeepRule, StoredExperiment } from '../../api/types'
 import { count, fileSize, plural } from '../../lib/format'
 import { useChange } from '../people/useChange'
@@ -36,7 +36,7 @@ export function RuleDialog({ experiment, days, onClose }: RuleDialogProps) {
   const wanted: KeepRule = all ? { last: null, every: null, best: true } : rule
   const [asked] = useDebouncedValue(wanted, 200)
   const path = { experiment_id: experiment.id }
-  const preview = $api.useQuery(
+  const preview = $now.useQuery(
     'get',
     '/api/experiments/{experiment_id}/thinning',
     {

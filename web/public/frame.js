@@ -1,0 +1,39 @@
+// What the frame in the HTML does before the application has come. A file of its own because the content security policy
+// allows no inline script.
+const KEY = 'mantine-color-scheme-value'
+const root = document.documentElement
+
+// The colour scheme is set before the first paint, so that a dark page never flashes white.
+let chosen = null
+try {
+  chosen = localStorage.getItem(KEY)
+} catch {
+  // Storage may be forbidden: then the system's preference counts.
+}
+const dark = chosen === 'dark' || (chosen !== 'light' && matchMedia('(prefers-color-scheme: dark)').matches)
+root.setAttribute('data-mantine-color-scheme', dark ? 'dark' : 'light')
+
+// The application reads what was chosen meanwhile.
+document.addEventListener('click', ({ target }) => {
+  const scheme = target.closest('#frame [data-scheme]')?.dataset.scheme
+  if (!scheme) return
+  root.setAttribute('data-mantine-color-scheme', scheme)
+  try {
+    localStorage.setItem(KEY, scheme)
+  } catch {
+    // It holds for this page.
+  }
+})
+
+// The application starts when the page is read and the frame's first picture drawn, which a tab in the background never is.
+const { entry } = document.currentScript.dataset
+if (entry) {
+  document.addEventListener('DOMContentLoaded', () => {
+    const patience = setTimeout(start, 300)
+    requestAnimationFrame(() => setTimeout(start))
+    function start() {
+      clearTimeout(patience)
+      import(entry)
+    }
+  })
+}

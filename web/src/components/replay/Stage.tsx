@@ -1,0 +1,75 @@
+/** Where a recording plays in 3D, once it is there; and the way to take it along. */
+import { Button } from '@mantine/core'
+import type { ComponentProps, RefObject } from 'react'
+import { IconDownload } from '../icons'
+import { QueryError } from '../ui'
+import classes from './Replay.module.css'
+import { Waiting } from './Waiting'
+
+interface StageProps {
+  ref?: RefObject<HTMLDivElement | null>
+  frame: RefObject<HTMLIFrameElement | null>
+  testId: string
+  /** What the recording is called aloud, and in an error. */
+  title: string
+  what: string
+  /** The recording's page; none while it is made. */
+  page: string | undefined
+  /** Seconds at which it is. */
+  time: number | null
+  query: { error: ComponentProps<typeof QueryError>['error'] | null; refetch: () => unknown }
+  progress: ComponentProps<typeof Waiting>['progress']
+}
+
+export function Stage({ ref, frame, testId, title, what, page, time, query, progress }: StageProps) {
+  return (
+    <div ref={ref} className={classes.stage} data-testid={testId}>
+      {page ? (
+        <iframe
+          key={page}
+          ref={frame}
+          title={title}
+          src={page}
+          allow="fullscreen"
+          data-testid={`${testId}-frame`}
+          data-seconds={time ?? undefined}
+        />
+      ) : query.error ? (
+        <QueryError error={query.error} what={what} retry={() => void query.refetch()} />
+      ) : (
+        <Waiting progress={progress} />
+      )}
+    </div>
+  )
+}
+
+interface DownloadProps {
+  href: string
+  title: string
+  children: string
+}
+
+export function Download({ href, title, children }: DownloadProps) {
+  return (
+    <Button
+      component="a"
+      href={href}
+      download
+      variant="default"
+      size="xs"
+      leftSection={<IconDownload size={14} />}
+      title={title}
+    >
+      {children}
+    </Button>
+  )
+}
+
+/** The recording itself. */
+export function DownloadPage({ page }: { page: string }) {
+  return (
+    <Download href={`${page}?download`} title="One file that plays in any browser, without Mapless">
+      Download
+    </Download>
+  )
+}

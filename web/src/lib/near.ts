@@ -1,0 +1,48 @@
+/** What lies far below what is seen is made when one comes near, or when the browser has nothing else to do, one by one. */
+import { type RefObject, startTransition, useEffect, useState } from 'react'
+
+/** How far beyond the window is near. */
+const MARGIN = '600px'
+/** After the page's own beginning. */
+const FIRST_MS = 1_200
+
+const waiting = new Set<() => void>()
+let coming = false
+
+/** Shows one of those that wait, and comes again. */
+function showOne(): void {
+  coming = false
+  const [first] = waiting
+  if (!first) return
+  first()
+  waiting.delete(first)
+  later(0)
+}
+
+function later(ms: number): void {
+  if (coming) return
+  coming = true
+  setTimeout(() => ('requestIdleCallback' in window ? window.requestIdleCallback(showOne) : showOne()), ms)
+}
+
+/** Whether `ref` is, or once was, near what is seen. */
+export function useNear(ref: RefObject<Element | null>): boolean {
+  const [near, setNear] = useState(!('IntersectionObserver' in window))
+  useEffect(() => {
+    const element = ref.current
+    if (near || !element) return
+    const show = () => startTransition(() => setNear(true))
+    const observer = new IntersectionObserver(
+      (entries) => entries.some(({ isIntersecting }) => isIntersecting) && show(),
+      { rootMargin: MARGIN },
+    )
+    observer.observe(element)
+    waiting.add(show)
+    later(FIRST_MS)
+    return () => {
+      observer.disconnect()
+      waiting.delete(show)
+    }
+  }, [near, ref])
+  return near
+}

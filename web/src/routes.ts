@@ -1,0 +1,32 @@
+/** Which address is which page: for the application, and for the build, which makes each an HTML of its own. */
+
+/** Paths as React Router reads them, and the pages (`pages/NAME.tsx`) that they open. */
+export const ROUTES = {
+  '/': 'TrainingsPage',
+  '/new': 'NewTrainingPage',
+  '/experiments/:experimentId': 'ExperimentPage',
+  '/runs/:runId': 'RunPage',
+  '/compare': 'ComparePage',
+  '/policies': 'PoliciesPage',
+  '/policies/:name': 'PolicyPage',
+  '/arenas': 'ArenasPage',
+  '/arenas/draw': 'ArenaEditorPage',
+  '/queue': 'QueuePage',
+  '/evaluations': 'EvaluationsPage',
+  '/evaluations/:evaluationId': 'EvaluationPage',
+  '/leaderboards/:suiteHash?': 'LeaderboardPage',
+  '/studies': 'StudiesPage',
+  '/studies/:studyId': 'StudyPage',
+  '/playground/:playgroundId?': 'PlaygroundPage',
+  '/reproduction': 'ReproductionPage',
+  '/join': 'JoinPage',
+  '/account': 'AccountPage',
+  '/projects': 'ProjectsPage',
+  '/projects/:projectId': 'ProjectPage',
+  '/alerts': 'AlertsPage',
+  '/people': 'PeoplePage',
+  '/storage': 'StoragePage',
+  '/audit': 'AuditPage',
+  '/reference': 'ApiPage',
+  '*': 'NotFoundPage',
+} as const
