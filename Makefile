@@ -65,11 +65,13 @@ test: .venv/.dev pages .venv/.kernels
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
 else
-	@# In two halves side by side, one with whole services and a browser.
+	@# In two halves side by side, one with whole services and a browser. AGAIN=5: up to so many that fail are tried once more, alone.
 	@log=$$(mktemp) && trap 'rm -f $$log' EXIT; \
-	$(BIN)/python -m pytest $(STACK_TESTS) >$$log 2>&1 & stack=$$!; \
-	$(BIN)/python -m pytest $(STACK_TESTS:%=--ignore=%); rest=$$?; \
-	wait $$stack; stack=$$?; cat $$log; exit $$((rest > stack ? rest : stack))
+	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/stack $(STACK_TESTS) >$$log 2>&1 & stack=$$!; \
+	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/rest $(STACK_TESTS:%=--ignore=%); rest=$$?; \
+	wait $$stack; stack=$$?; cat $$log; worst=$$((rest > stack ? rest : stack)); \
+	if [ $$worst -ne 1 ] || [ -z "$(AGAIN)" ]; then exit $$worst; fi; \
+	$(BIN)/python .ci/again.py $(AGAIN) .pytest_cache/stack .pytest_cache/rest
 endif
 
 check: .venv/.dev pages

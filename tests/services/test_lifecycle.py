@@ -14,9 +14,10 @@ ENDLESS = 50_000_000
 
 
 def until_checkpoint(service: Service, run_id: str, beyond: int = 0) -> int:
-    """The step of the first checkpoint beyond a step, once the curve has gone past it."""
+    """The step of the first checkpoint beyond a step, once the curve has gone past it, as the run goes on."""
 
     def passed() -> int | None:
+        assert service.run(run_id)["state"] != "completed", "it ended before anybody looked"
         newest = max(service.checkpoints(run_id), default=0)
         return newest if newest > beyond and max(service.steps(run_id)) > newest else None
 

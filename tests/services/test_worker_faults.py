@@ -12,12 +12,14 @@ from tests.services.test_lifecycle import ENDLESS, until_checkpoint, until_resum
 from workers.checkpoints import read_checkpoint
 
 STEPS, SAVE_EVERY = 24 * ROLLOUT, 4 * ROLLOUT
+# Enough for its disk to be damaged in mid-training, however late this process gets its turn.
+MANY_STEPS = 4 * STEPS
 
 
 def final_state(service: Service, run_id: str, directory: Path) -> dict[str, bytes]:
     """Weights, optimiser, random states and environment of the run's last checkpoint."""
     last = service.api.get(f"/api/runs/{run_id}/checkpoints").json()["items"][0]
-    assert last["step"] == STEPS
+    assert last["step"] == MANY_STEPS
     path = directory / f"{run_id}.zip"
     response: httpx.Response = service.api.get(f"/api/checkpoints/{last['id']}/download")
     path.write_bytes(response.raise_for_status().content)
@@ -44,7 +46,7 @@ def test_a_damaged_spool_line_rewinds_the_run_which_ends_bit_for_bit_as_an_undis
 ) -> None:
     server = service.start_server()
     service.start_worker()
-    (disturbed,) = service.launch(STEPS, save_every=SAVE_EVERY)
+    (disturbed,) = service.launch(MANY_STEPS, save_every=SAVE_EVERY)
     until_checkpoint(service, disturbed)
     (spool,) = (tmp_path / "work").glob("*/spool.jsonl")
     # The server stands still, so that what is reported now waits on the worker's disk.
@@ -59,7 +61,7 @@ def test_a_damaged_spool_line_rewinds_the_run_which_ends_bit_for_bit_as_an_undis
     assert any("cannot be read back" in message for message in service.events(disturbed))
     assert_one_unbroken_curve(service, disturbed)
 
-    (undisturbed,) = service.launch(STEPS, save_every=SAVE_EVERY)
+    (undisturbed,) = service.launch(MANY_STEPS, save_every=SAVE_EVERY)
     service.until_state(undisturbed, "completed")
     assert final_state(service, disturbed, tmp_path) == final_state(service, undisturbed, tmp_path)
 
