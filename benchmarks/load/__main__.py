@@ -133,9 +133,9 @@ class _Part:
 
     def told(self, model: type[M], seconds: float) -> M:
         """What it tells when it is over, which must be so within `seconds`."""
-        assert self._process.stdout is not None
-        self._process.wait(seconds)
-        return model.model_validate_json(self._process.stdout.read())
+        # Read while it writes: what many pages took does not fit into a pipe.
+        told, _ = self._process.communicate(timeout=seconds)
+        return model.model_validate_json(told)
 
     def _say(self, line: str) -> None:
         assert self._process.stdin is not None

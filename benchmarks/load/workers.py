@@ -85,13 +85,14 @@ class SyntheticRun:
 
     def show(self, moment: float) -> None:
         """One frame, while somebody watches: robots that go round in circles."""
-        if self._watch is None or self._link is None:
+        watch = self._watch  # orders change it meanwhile
+        if watch is None or self._link is None:
             return
-        robots, rays = self._watch.robots, LidarConfig().rays
+        robots, rays = watch.robots, LidarConfig().rays
         angles = moment + np.arange(robots, dtype=np.float32)
         self._link.frame(
             Frame(
-                mode=self._watch.mode,
+                mode=watch.mode,
                 step=self._step,
                 sim_time=moment,
                 speed=1.0,

@@ -4,16 +4,17 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
-from sqlalchemy import delete, func, select
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import Table, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.http.abandoned import stop_if_abandoned
 from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
+from server.metrics.latest import set_latest
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized, summary_of
 
@@ -26,6 +27,7 @@ _LONG = 4_096
 # Rows in one INSERT; SQLite takes at most 32,766 parameters.
 _INSERT_ROWS = 1_000
 _RUNS_A_QUERY = 1_000
+_ROWS = cast("Table", tables.MetricRow.__table__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,22 +47,17 @@ class MetricRepository:
         self._session = session
         self._summaries = SummaryRepository(session)
         self._axes = AxisRepository(session)
-        backend = session.get_bind().dialect.name
-        # Both databases know ON CONFLICT; SQLAlchemy has it in each one's own insert.
-        self._insert = postgresql.insert if backend == "postgresql" else sqlite.insert
 
-    def append_rows(self, run_id: str, rows: Sequence[ReportedRow]) -> None:
-        """Add rows that came in order; those that are there already, as rows or in chunks (seq <= `last_seq`), are skipped.
+    def append(self, rows: Mapping[str, Sequence[ReportedRow]]) -> None:
+        """Add rows that came in order, by run; those that are there already, as rows or in chunks, must not be among them.
 
         `Run.last_seq` is left to the caller, who moves it in the same transaction once everything numbered so far is stored.
         """
-        last_seq = self._session.scalar(select(tables.Run.last_seq).where(tables.Run.id == run_id)) or 0
-        fresh = [row for row in rows if row.seq > last_seq and row.values]
-        if not fresh:
-            return
+        fresh = [(run_id, row) for run_id, reported in rows.items() for row in reported if row.values]
+        self._session.flush()
         for start in range(0, len(fresh), _INSERT_ROWS):
-            self._session.execute(
-                self._insert(tables.MetricRow).on_conflict_do_nothing(),
+            self._session.connection().execute(
+                insert(_ROWS),
                 [
                     {
                         "run_id": run_id,
@@ -69,11 +66,16 @@ class MetricRepository:
                         "wall_time": row.wall_time,
                         "values": {name: value if math.isfinite(value) else None for name, value in row.values.items()},
                     }
-                    for row in fresh[start : start + _INSERT_ROWS]
+                    for run_id, row in fresh[start : start + _INSERT_ROWS]
                 ],
             )
-        newest = {name: (row.step, value) for row in fresh for name, value in row.values.items() if math.isfinite(value)}
-        self._set_latest(run_id, newest)
+        newest = {
+            (run_id, name): (row.step, value)
+            for run_id, row in fresh
+            for name, value in row.values.items()
+            if math.isfinite(value)
+        }
+        set_latest(self._session, newest)
 
     def needs_compaction(self, run_id: str) -> bool:
         """Whether enough rows wait."""
@@ -306,15 +308,7 @@ class MetricRepository:
             self._session.add(_chunk(run_id, name, part, self._axes.keep(run_id, part)))
 
     def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
-        if not newest:
-            return
-        insert = self._insert(tables.LatestMetric)
-        self._session.execute(
-            insert.on_conflict_do_update(
-                index_elements=["run_id", "name"], set_={"step": insert.excluded.step, "value": insert.excluded.value}
-            ),
-            [{"run_id": run_id, "name": name, "step": step, "value": value} for name, (step, value) in newest.items()],
-        )
+        set_latest(self._session, {(run_id, name): last for name, last in newest.items()})
 
 
 @dataclass(frozen=True)

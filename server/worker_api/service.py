@@ -17,7 +17,6 @@ from server.events.changes import Change, ChangeKind
 from server.experiments.stored import StoredTraining, read_training, training_of
 from server.files import StoredFile
 from server.lineage.starts import start_archive
-from server.metrics.repository import MetricRepository, ReportedRow
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, takers
@@ -30,6 +29,7 @@ from server.worker_api.attempts import FencedError
 from server.worker_api.batches import in_turn
 from server.worker_api.errors import TooEarlyError
 from server.worker_api.ingest import Outcome, Report
+from server.worker_api.items import ReportedItems
 from server.worker_api.losses import exhausted, hopeful
 from sim.extending.discovery import missing, wording
 from workers.config import TrainingConfig
@@ -38,7 +38,6 @@ from workers.protocol import (
     CheckpointUpload,
     Claim,
     ClaimRequest,
-    EventItem,
     Final,
     Heartbeat,
     HeartbeatAnswer,
@@ -49,9 +48,6 @@ from workers.protocol import (
 )
 
 logger = logging.getLogger(__name__)
-
-# Compaction is looked at once in so many items: counting rows costs a query.
-_COMPACT_EVERY = 64
 
 
 class WorkerService:
@@ -163,6 +159,7 @@ class WorkerService:
                 for_update=not is_read,
                 with_experiments=any(report.batch.final for report in reports),
             )
+            items = ReportedItems(session)
             for report in reports:
                 try:
                     run = attempts.unfenced(runs.get(report.run_id), report.run_id, report.attempt)
@@ -170,8 +167,9 @@ class WorkerService:
                     outcomes.append(error)
                     continue
                 batch, gap = in_turn(report.batch, run.last_seq)
-                self._store(session, run, batch.items)
+                items.add(run, batch.items)
                 if batch.final is not None:
+                    items.write()
                     damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
                     attempts.end(session, run, batch.final, takers(session, run, training_of(run.experiment)), damaged)
                     ended.append(run)
@@ -187,6 +185,7 @@ class WorkerService:
                 for item in batch.items:
                     kind: ChangeKind = "metrics" if isinstance(item, MetricItem) else "run"
                     changes[Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind)] = None
+            items.write()
         self._services.instruments.losses.inc(lost)
         for change in changes:
             self._services.bus.publish(change)
@@ -298,26 +297,6 @@ class WorkerService:
             if run.state not in states.ACTIVE or run.claimed_with != principal.credential or start is None:
                 raise NotFoundError.of("policy to start from of run", run_id)
         return start_archive(start, self._services.files)
-
-    def _store(self, session: Session, run: tables.Run, items: Sequence[MetricItem | EventItem]) -> None:
-        if not items:
-            return
-        rows = [
-            ReportedRow(item.seq, item.step, item.at, {k: float("nan") if v is None else v for k, v in item.values.items()})
-            for item in items
-            if isinstance(item, MetricItem)
-        ]
-        metrics = MetricRepository(session)
-        metrics.append_rows(run.id, rows)
-        session.add_all(
-            tables.RunEvent(run_id=run.id, at=item.at, step=item.step, level=item.level, message=item.message)
-            for item in items
-            if isinstance(item, EventItem)
-        )
-        before, run.last_seq = run.last_seq, items[-1].seq
-        run.step = max([run.step, *(row.step for row in rows)])
-        if before // _COMPACT_EVERY != run.last_seq // _COMPACT_EVERY and metrics.needs_compaction(run.id):
-            metrics.compact(run.id)
 
     def _announce(self, run: tables.Run) -> None:
         """After an attempt's end: tell whoever looks on, and wake another worker where the run waits for one."""

@@ -59,9 +59,9 @@ def database(tmp_path: Path) -> Iterator[Database]:
         stored = ((1, 10, 0.5), (3, 20, 0.5), (4, 30, 0.5), (5, 40, math.nan))
         rows = [ReportedRow(seq, step, 100.0 + seq, {"a": value, "b": 1.5}) for seq, step, value in stored]
         metrics = MetricRepository(session)
-        metrics.append_rows(RUN, rows[:2])
+        metrics.append({RUN: rows[:2]})
         metrics.compact(RUN)  # half of them as chunks, half as rows
-        metrics.append_rows(RUN, rows[2:])
+        metrics.append({RUN: rows[2:]})
     yield database
     database.dispose()
 

@@ -83,7 +83,7 @@ class Reports:
         """Report one series."""
         rows = [ReportedRow(seq, step, 0.0, {name: value}) for seq, (step, value) in enumerate(points.items(), start=1)]
         with self.services.database.write() as session:
-            MetricRepository(session).append_rows(run["id"], rows)
+            MetricRepository(session).append({run["id"]: rows})
 
     def cut(self, run: dict[str, Any], step: int) -> None:
         """Forget what was reported beyond a step."""

@@ -110,7 +110,7 @@ def curves(services: Services, run: dict[str, Any], **series: list[float]) -> No
         for i in range(len(next(iter(series.values()))))
     ]
     with services.database.write() as session:
-        MetricRepository(session).append_rows(run["id"], rows)
+        MetricRepository(session).append({run["id"]: rows})
         session.get_one(tables.Run, run["id"]).step = rows[-1].step
 
 

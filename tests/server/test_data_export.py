@@ -63,7 +63,7 @@ def test_every_point_is_a_row(client: TestClient, services: Services, reports: R
     add_points(services, first, "train/return", [10, 20, 30], [0.1, -2.0, 1e-9])
     with services.database.write() as session:
         row = ReportedRow(seq=1, step=40, wall_time=1_040.5, values={"train/return": 7.25, "loss/policy": 0.5})
-        MetricRepository(session).append_rows(first["id"], [row])
+        MetricRepository(session).append({first["id"]: [row]})
     add_points(services, second, "train/return", [10], [4.0])
 
     response = export(client, "experiments", experiment, "csv")

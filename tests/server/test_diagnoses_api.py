@@ -24,7 +24,7 @@ def report(services: Services, run_id: str, **curves: list[float]) -> None:
         for i in range(length)
     ]
     with services.database.write() as session:
-        MetricRepository(session).append_rows(run_id, rows)
+        MetricRepository(session).append({run_id: rows})
 
 
 def test_a_run_that_has_not_begun_has_none(client: TestClient, run_id: str) -> None:

@@ -44,8 +44,8 @@ def rows(*steps: int, first_seq: int = 1, name: str = "loss/policy") -> list[Rep
 def append(database: Database, new: list[ReportedRow]) -> None:
     """What the link does with a batch: rows and cursor in one transaction."""
     with database.write() as session:
-        MetricRepository(session).append_rows("r", new)
         run = session.get_one(tables.Run, "r")
+        MetricRepository(session).append({"r": [row for row in new if row.seq > run.last_seq]})
         run.last_seq = max(run.last_seq, *(row.seq for row in new))
 
 
@@ -364,9 +364,9 @@ def test_many_runs_are_read_in_three_queries(database: Database) -> None:
         session.flush()
         for run in experiment.runs:
             repository = MetricRepository(session)
-            repository.append_rows(run.id, [ReportedRow(1, 10, 0.0, {"a": 1.0, "b": 2.0})])
+            repository.append({run.id: [ReportedRow(1, 10, 0.0, {"a": 1.0, "b": 2.0})]})
             repository.compact(run.id)
-            repository.append_rows(run.id, [ReportedRow(2, 20, 0.0, {"a": float(run.seed)})])
+            repository.append({run.id: [ReportedRow(2, 20, 0.0, {"a": float(run.seed)})]})
     asked: list[str] = []
 
     @event.listens_for(database.engine, "before_cursor_execute")
@@ -469,7 +469,7 @@ def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None
     run_id = run_of(client)
     with services.database.write() as session:
         reported = [ReportedRow(i, i * 10, 0.0, {"train/return": i / 4, "loss/value": math.nan}) for i in range(1, 6)]
-        MetricRepository(session).append_rows(run_id, reported)
+        MetricRepository(session).append({run_id: reported})
 
     everything = client.get(f"/api/runs/{run_id}/metrics").json()["series"]
     assert [series["name"] for series in everything] == ["loss/value", "train/return"]
@@ -498,7 +498,7 @@ def test_who_follows_a_run_is_told_what_is_new(client: TestClient, services: Ser
             # An evaluation comes with a step of which something was reported before.
             reported = [ReportedRow(2 * i, i * 10, 0.0, {"a": float(i)}) for i in range(first, last + 1)]
             reported += [ReportedRow(2 * last + 1, last * 10, 0.0, {"rare": float(last)})]
-            MetricRepository(session).append_rows(run_id, reported)
+            MetricRepository(session).append({run_id: reported})
             run = session.get_one(tables.Run, run_id)
             run.attempt, run.step, run.last_seq = 1, last * 10, 2 * last + 1
             if compacted:
@@ -567,6 +567,6 @@ def test_numbers_are_rounded_as_they_would_be_written(values: list[float]) -> No
 def test_figures_have_the_seven_digits_that_are_kept(client: TestClient, services: Services) -> None:
     run_id = run_of(client)
     with services.database.write() as session:
-        MetricRepository(session).append_rows(run_id, [ReportedRow(1, 10, 0.0, {"x": 0.1})])
+        MetricRepository(session).append({run_id: [ReportedRow(1, 10, 0.0, {"x": 0.1})]})
 
     assert client.get(f"/api/runs/{run_id}/metrics").json()["series"][0]["values"] == [0.1]

@@ -55,7 +55,7 @@ def complete(services: Services, run: dict[str, Any], success: float, *, steps: 
         ReportedRow(3, 600_000, 0.0, {"eval/success_rate": 0.99, **measured.metrics()}),
     ]
     with services.database.write() as session:
-        MetricRepository(session).append_rows(run["id"], rows)
+        MetricRepository(session).append({run["id"]: rows})
         row = session.get_one(tables.Run, run["id"])
         row.state, row.step, row.attempt, row.started_at, row.finished_at = "completed", 600_000, 1, 1000.0, 1040.0
 
