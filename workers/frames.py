@@ -3,6 +3,7 @@
 import math
 import struct
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Literal, Self
 
 import numpy as np
@@ -71,16 +72,19 @@ class Frame:
         version, mode, movers, robots, rays, arena, step, sim_time, speed = _HEADER.unpack_from(data)
         if version != _VERSION or mode >= len(_MODES):
             raise FrameError(f"frame version {version}, mode {mode}: not known here")
-        sizes = (3 * robots, 2 * robots, rays * robots, robots, robots, 3 * movers)
-        if len(data) != _HEADER.size + 4 * sum(sizes) + robots:
+        # Where each part ends, in numbers.
+        ends = tuple(accumulate((3 * robots, 2 * robots, rays * robots, robots, robots, 3 * movers)))
+        if len(data) != _HEADER.size + 4 * ends[-1] + robots:
             raise FrameError("length does not match the header")
-        floats = np.frombuffer(data, "<f4", sum(sizes), _HEADER.size)
+        floats = np.frombuffer(data, "<f4", ends[-1], _HEADER.size)
         if not (np.isfinite(floats).all() and math.isfinite(sim_time) and math.isfinite(speed)):
             raise FrameError("a number is not finite")
-        outcomes = np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * sum(sizes))
+        outcomes = np.frombuffer(data, np.uint8, robots, _HEADER.size + 4 * ends[-1])
         if (outcomes > 3).any():
             raise FrameError("an outcome that nobody knows")
-        poses, targets, ranges, fields, rewards, discs = np.split(floats, np.cumsum(sizes)[:-1])
+        poses, targets, ranges, fields, rewards, discs = (
+            floats[first:end] for first, end in zip((0, *ends[:-1]), ends, strict=True)
+        )
         if (discs[2::3] <= 0.0).any():
             raise FrameError("a mover without a size")
         return cls(

@@ -56,7 +56,7 @@ class CheckpointService:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
-            RunRepository(session).get(run_id)
+            RunRepository(session).check(run_id)
             repository = CheckpointRepository(session)
             rows, total = repository.page(run_id, window, step)
             best = repository.best(run_id)
@@ -74,7 +74,7 @@ class CheckpointService:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
-            RunRepository(session).get(run_id)
+            RunRepository(session).check(run_id)
             steps = CheckpointRepository(session).steps(run_id)
         return CheckpointSteps(
             items=[CheckpointStep(id=each.id, step=each.step, success=each.success) for each in spread(steps, MOST_STEPS)],

@@ -18,8 +18,7 @@ from server.data_export.zips import zipped
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
 from server.file_names import slug
-from server.metrics.service import points_state
-from server.runs.repository import RunRepository
+from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 
 TableFormat = Literal["csv", "json"]
@@ -41,7 +40,7 @@ class DataExportService:
         """
         with self._database.read() as session:
             run = RunRepository(session).get(run_id)
-            return (run.experiment.name, *points_state(run))
+            return (run.experiment.name, *PointsState.of(run))
 
     def points_of_experiment(self, experiment_id: str) -> tuple[object, ...]:
         """What an experiment's file of points depends on, its name too.
@@ -51,7 +50,7 @@ class DataExportService:
         """
         with self._database.read() as session:
             experiment = ExperimentRepository(session).get(experiment_id)
-            return (experiment.name, *(points_state(run) for run in experiment.runs))
+            return (experiment.name, *(PointsState.of(run) for run in experiment.runs))
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
         """The data of one run.

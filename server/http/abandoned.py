@@ -5,6 +5,7 @@ begun, and what has begun ends at its next look (`stop_if_abandoned`): else answ
 others wait for, and the server from shutting down.
 """
 
+import asyncio
 import contextlib
 from collections.abc import MutableMapping
 from typing import Any
@@ -40,6 +41,7 @@ class AbandonedRequestsMiddleware:
             await self._app(scope, receive, send)
             return
         left = anyio.Event()
+        scope_of_answer = anyio.CancelScope()
         answering = heard = False
 
         async def watch() -> None:
@@ -48,7 +50,7 @@ class AbandonedRequestsMiddleware:
             left.set()
             # An answer that has begun ends by its own means: a stream has things to close.
             if not answering:
-                tasks.cancel_scope.cancel()
+                scope_of_answer.cancel()
 
         async def hear() -> Message:
             nonlocal heard
@@ -63,13 +65,9 @@ class AbandonedRequestsMiddleware:
             answering = True
             await send(message)
 
-        failure: Exception | None = None
-        async with anyio.create_task_group() as tasks:
-            tasks.start_soon(watch)
-            try:
+        watching = asyncio.create_task(watch())
+        try:
+            with scope_of_answer:
                 await self._app(scope, hear, answer)
-            except Exception as error:  # a task group would wrap it
-                failure = error
-            tasks.cancel_scope.cancel()
-        if failure is not None:
-            raise failure
+        finally:
+            watching.cancel()

@@ -44,6 +44,14 @@ class Points:
         return cls._ordered(np.asarray(steps, np.int64), np.asarray(times, np.float64), _finite_float32(numbers))
 
     @classmethod
+    def of_table(cls, steps: Sequence[int], times: Sequence[float], rows: Sequence[Sequence[float | None]]) -> list[Self]:
+        """As `of`, of several series that were reported together: a row for each step, a number for each series."""
+        # None becomes nan.
+        numbers = np.ascontiguousarray(_finite_float32(np.asarray(rows, np.float64)).T)
+        on_steps, at = np.asarray(steps, np.int64), np.asarray(times, np.float64)
+        return [cls._ordered(on_steps, at, values) for values in numbers]
+
+    @classmethod
     def joined(cls, parts: Sequence["Points"]) -> Self:
         """All points of the parts; where several hold one step, the last part counts."""
         if not parts:

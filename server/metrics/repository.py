@@ -1,10 +1,10 @@
 """Metrics in SQL: rows as they come, compacted into chunks, and the newest value of each series beside them."""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from sqlalchemy import Table, delete, func, insert, select
@@ -38,6 +38,14 @@ class ReportedRow:
     step: int
     wall_time: float
     values: Mapping[str, float]
+
+
+class WaitingRow(NamedTuple):
+    """Metrics of one step that wait for compaction."""
+
+    step: int
+    wall_time: float
+    values: Mapping[str, float | None]
 
 
 class MetricRepository:
@@ -235,7 +243,7 @@ class MetricRepository:
         parts: dict[str, list[Points]] = defaultdict(list)
         for chunk, points in self._axes.decoded(self._session.scalars(select(tables.MetricChunk).where(*beyond))):
             parts[chunk.name].append(points[int(np.searchsorted(points.steps, step)) :])
-        for name, points in _series([row for row in self._rows(run_id) if row.step >= step]).items():
+        for name, points in _series(self._rows(run_id, step)).items():
             if names is None or name in names:
                 parts[name].append(points)
         return {name: Points.joined(parts[name]) for name in sorted(parts)}
@@ -274,14 +282,17 @@ class MetricRepository:
         if is_long or len(points) > _LONG:
             self._summaries.write(run_id, name, known, points)
 
-    def _rows(self, run_id: str) -> Sequence[tables.MetricRow]:
-        return self._rows_of([run_id]).get(run_id, [])
+    def _rows(self, run_id: str, from_step: int | None = None) -> list[WaitingRow]:
+        return self._rows_of([run_id], from_step).get(run_id, [])
 
-    def _rows_of(self, run_ids: Collection[str]) -> dict[str, list[tables.MetricRow]]:
-        query = select(tables.MetricRow).where(tables.MetricRow.run_id.in_(run_ids)).order_by(tables.MetricRow.seq)
-        rows: dict[str, list[tables.MetricRow]] = defaultdict(list)
-        for row in self._session.scalars(query):
-            rows[row.run_id].append(row)
+    def _rows_of(self, run_ids: Collection[str], from_step: int | None = None) -> dict[str, list[WaitingRow]]:
+        row = tables.MetricRow
+        query = select(row.run_id, row.step, row.wall_time, row.values).where(row.run_id.in_(run_ids)).order_by(row.seq)
+        if from_step is not None:
+            query = query.where(row.step >= from_step)
+        rows: dict[str, list[WaitingRow]] = defaultdict(list)
+        for run_id, step, wall_time, values in self._session.execute(query):
+            rows[run_id].append(WaitingRow(step, wall_time, values))
         return rows
 
     def _count_rows(self, run_id: str) -> int:
@@ -365,13 +376,22 @@ def _last_finite(points: Points) -> tuple[int, float] | None:
     return (int(points.steps[finite[-1]]), float(points.values[finite[-1]])) if finite.size else None
 
 
-def _series(rows: Sequence[tables.MetricRow]) -> dict[str, Points]:
+def _series(rows: Sequence[WaitingRow]) -> dict[str, Points]:
     """Rows in order as one series a name."""
-    columns: dict[str, tuple[list[int], list[float], list[float | None]]] = defaultdict(lambda: ([], [], []))
+    # What a run reports together it mostly reports together again: such rows are one table of numbers.
+    alike: dict[tuple[str, ...], list[WaitingRow]] = defaultdict(list)
     for row in rows:
-        for name, value in row.values.items():
-            steps, times, values = columns[name]
-            steps.append(row.step)
-            times.append(row.wall_time)
-            values.append(value)
-    return {name: Points.of(*column) for name, column in columns.items()}
+        alike[tuple(row.values)].append(row)
+    series: dict[str, Points] = {}
+    for names, table in alike.items():
+        columns = Points.of_table(
+            [row.step for row in table], [row.wall_time for row in table], [list(row.values.values()) for row in table]
+        )
+        series.update(zip(names, columns, strict=True))
+    met = Counter(name for names in alike for name in names)
+    for name in (name for name, times in met.items() if times > 1):
+        among = [row for row in rows if name in row.values]
+        series[name] = Points.of(
+            [row.step for row in among], [row.wall_time for row in among], [row.values[name] for row in among]
+        )
+    return series

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from server.database import tables
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.schemas import Metrics, Series
-from server.runs.repository import RunRepository
+from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 
 # Powers of ten that a float64 holds exactly.
@@ -32,14 +31,14 @@ class MetricService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
-    def state(self, run_id: str) -> tuple[str, int, int, int]:
+    def state(self, run_id: str) -> PointsState:
         """What a run's curves depend on: as long as it is the same, so are they.
 
         Raises:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
-            return points_state(RunRepository(session).get(run_id))
+            return RunRepository(session).points_state(run_id)
 
     def of_run(self, run_id: str, names: Collection[str] | None, points: int, known: Known | None = None) -> bytes:
         """`Metrics` as JSON: the run's series, all or those named, each of at most `points` points, beyond what is known.
@@ -48,7 +47,7 @@ class MetricService:
             NotFoundError: there is no such run.
         """
         with self._services.database.read() as session:
-            run = RunRepository(session).get(run_id)
+            run = RunRepository(session).points_state(run_id)
 
             def read() -> bytes:
                 repository, since = MetricRepository(session), None
@@ -65,13 +64,7 @@ class MetricService:
                 )
                 return metrics.model_dump_json().encode()
 
-            return self._services.curves.get((*points_state(run), frozenset(names or ()), points, known), read)
-
-
-def points_state(run: tables.Run) -> tuple[str, int, int, int]:
-    """What a run's points depend on: as long as it is the same, so are they."""
-    # Reports move the last item's number; what cuts a run back moves its step, and its next attempt's number.
-    return (run.id, run.attempt, run.last_seq, run.step)
+            return self._services.curves.get((run, frozenset(names or ()), points, known), read)
 
 
 def _view(name: str, buckets: Buckets) -> Series:

@@ -31,7 +31,7 @@ def checkpoints_of(services: Services, run_id: str) -> list[Reference]:
         NotFoundError: there is no such run, or none of its checkpoints was measured.
     """
     with services.database.read() as session:
-        RunRepository(session).get(run_id)
+        RunRepository(session).check(run_id)
         steps = [step for step in CheckpointRepository(session).steps(run_id) if step.suite_hash is not None]
     if not steps:
         raise NotFoundError("No checkpoint of this run was evaluated yet: there is nothing to look back at.")

@@ -46,7 +46,7 @@ class LogService:
         lines: deque[LogLine] = deque(maxlen=limit)
         total = 0
         with self._services.database.read() as session:
-            RunRepository(session).get(run_id)
+            RunRepository(session).check(run_id)
             for line in _stream(session, run_id):
                 if wanted in line.text.casefold():
                     total += 1
@@ -60,7 +60,7 @@ class LogService:
             NotFoundError: at once, if there is no such run.
         """
         with self._services.database.read() as session:
-            RunRepository(session).get(run_id)
+            RunRepository(session).check(run_id)
             # Bounded, and read at once: whoever reads slowly keeps no transaction open.
             lines = [_as_text(line) for line in _stream(session, run_id)]
         return ("".join(lines[start : start + _BLOCK_LINES]).encode() for start in range(0, len(lines), _BLOCK_LINES))

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple, Self
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, contains_eager, joinedload
@@ -16,6 +17,23 @@ from workers.reporting import EventLevel
 _TURN = tables.Run.priority.desc(), tables.Run.queued_at, tables.Run.id
 """Which run of one person is claimed first."""
 _AT_ONCE = 50
+
+
+class PointsState(NamedTuple):
+    """As long as it is the same, so are the run's points.
+
+    Reports move the number of the last item; what cuts a run back moves its step, and its next attempt's number.
+    """
+
+    run_id: str
+    attempt: int
+    last_seq: int
+    step: int
+
+    @classmethod
+    def of(cls, run: tables.Run) -> Self:
+        """That of a run that is at hand."""
+        return cls(run.id, run.attempt, run.last_seq, run.step)
 
 
 class RunRepository:
@@ -41,6 +59,27 @@ class RunRepository:
         if for_update:
             query = query.with_for_update(of=tables.Run)
         return self._session.scalar(query)
+
+    def check(self, run_id: str) -> None:
+        """Refuse a run that is not there, without reading what it is.
+
+        Raises:
+            NotFoundError: there is none, or it lies in the trash.
+        """
+        self.points_state(run_id)
+
+    def points_state(self, run_id: str) -> PointsState:
+        """What a run's points depend on.
+
+        Raises:
+            NotFoundError: there is no such run, or it lies in the trash.
+        """
+        run, experiment = tables.Run, tables.Experiment
+        query = select(run.id, run.attempt, run.last_seq, run.step).join(experiment, experiment.id == run.experiment_id)
+        row = self._session.execute(query.where(run.id == run_id, experiment.deleted_at.is_(None))).one_or_none()
+        if row is None:
+            raise NotFoundError.of("run", run_id)
+        return PointsState(*row)
 
     def several(
         self, run_ids: Collection[str], *, for_update: bool = False, with_experiments: bool = False

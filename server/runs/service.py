@@ -45,7 +45,7 @@ class RunService:
         """
         with self._services.database.read() as session:
             repository = RunRepository(session)
-            repository.get(run_id)
+            repository.check(run_id)
             events = [
                 RunEvent(id=event.id, at=event.at, step=event.step, level=event.level, message=event.message)
                 for event in repository.events(run_id, window)

@@ -1,6 +1,7 @@
 """Workers that have been heard of, in SQL."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, delete, select, update
 from sqlalchemy.orm import Session
@@ -15,16 +16,30 @@ SILENCE_SECONDS = 3 * HEARTBEAT_SECONDS
 """A worker that was silent for longer is not counted on."""
 
 
+@dataclass(frozen=True, slots=True)
+class SeenWorker:
+    """What every page shows of a worker, without what it said of its machine and its week; as `tables.Worker` has it."""
+
+    name: str
+    queue: Queue
+    last_seen: float
+    drained_at: float | None
+    trouble: str | None
+    extensions: list[dict[str, str | None]] | None
+
+
 class WorkerRepository:
     """Reads and writes workers within the caller's transaction."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def seen_since(self, moment: float) -> Sequence[tables.Worker]:
+    def seen_since(self, moment: float) -> list[SeenWorker]:
         """The workers heard of since `moment` (seconds since the epoch), by name."""
-        query = select(tables.Worker).where(tables.Worker.last_seen >= moment).order_by(tables.Worker.name)
-        return self._session.scalars(query).all()
+        worker = tables.Worker
+        query = select(worker.name, worker.queue, worker.last_seen, worker.drained_at, worker.trouble, worker.extensions)
+        found = self._session.execute(query.where(worker.last_seen >= moment).order_by(worker.name))
+        return [SeenWorker(*row) for row in found]
 
     def seen(
         self,
@@ -88,7 +103,7 @@ class WorkerRepository:
         return self._session.scalars(query).all()
 
 
-def extensions_on(worker: tables.Worker) -> Extensions:
+def extensions_on(worker: tables.Worker | SeenWorker) -> Extensions:
     """What a worker said of its extensions; a row of an earlier version says nothing."""
     return tuple(ExtensionState.model_validate(found) for found in worker.extensions or ())
 

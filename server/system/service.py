@@ -1,16 +1,15 @@
 """The service at a glance."""
 
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 from sqlalchemy.orm import Session
 
 from server.audit.repository import AuditRepository
-from server.database import tables
 from server.errors import NotFoundError
 from server.runs.repository import RunRepository
 from server.services import Services
-from server.system.repository import WorkerRepository, extensions_on
+from server.system.repository import SeenWorker, WorkerRepository, extensions_on
 from server.system.schemas import Status, Version, WorkerStatus
 from server.version import commit, version
 from workers.protocol import found_extensions
@@ -24,7 +23,7 @@ def running_version() -> Version:
     return Version(version=version(), commit=commit())
 
 
-def workers_lately(session: Session) -> Sequence[tables.Worker]:
+def workers_lately(session: Session) -> list[SeenWorker]:
     """The workers that are there."""
     return WorkerRepository(session).seen_since(time.time() - _LATELY_SECONDS)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastapi.testclient import TestClient
+from sqlalchemy import func, select
 
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
@@ -81,8 +82,12 @@ class Reports:
 
     def metrics(self, run: dict[str, Any], name: str, points: dict[int, float]) -> None:
         """Report one series."""
-        rows = [ReportedRow(seq, step, 0.0, {name: value}) for seq, (step, value) in enumerate(points.items(), start=1)]
         with self.services.database.write() as session:
+            waiting = session.scalar(select(func.max(tables.MetricRow.seq)).where(tables.MetricRow.run_id == run["id"])) or 0
+            first = max(waiting, session.get_one(tables.Run, run["id"]).last_seq) + 1
+            rows = [
+                ReportedRow(seq, step, 0.0, {name: value}) for seq, (step, value) in enumerate(points.items(), start=first)
+            ]
             MetricRepository(session).append({run["id"]: rows})
 
     def cut(self, run: dict[str, Any], step: int) -> None:
