@@ -77,7 +77,7 @@ class Services:
         return {experiment_id: project_id for experiment_id, (project_id,) in found.items()}
 
 
-def _services(connection: HTTPConnection) -> Services:
+async def _services(connection: HTTPConnection) -> Services:
     services: Services = connection.app.state.services
     return services
 

@@ -31,7 +31,7 @@ MAX_RESULT_BYTES = 512 * 2**20
 """Of one recording or bundle."""
 
 
-def _service(services: ServicesDep) -> JobService:
+async def _service(services: ServicesDep) -> JobService:
     return JobService(services)
 
 
