@@ -93,9 +93,24 @@ class Manifest(Frozen):
         return float(getattr(self.training.algorithm, "gamma", USUAL_GAMMA))
 
 
+class Effort(Frozen):
+    """What led to a step of a training, over all of its attempts.
+
+    Time under way alone counts: a training that waits, is stopped or is lost, or whose machine sleeps, takes none meanwhile;
+    and what an attempt did beyond the checkpoint from which the next one resumed did not lead here.
+    """
+
+    wall_seconds: float = Field(0.0, ge=0.0, description="While a trainer was at it, from its start on.")
+    cpu_seconds: float = Field(
+        0.0, ge=0.0, description="Of the trainer's process, all threads together; work of a graphics card is not in it."
+    )
+    episodes: int = Field(0, ge=0, description="Attempts at a target that have ended.")
+
+
 class TrainingCounters(Frozen):
     """`state.json`: where a training stands, beside its arrays."""
 
     step: int = Field(ge=0)
     updates: int = Field(ge=0)
     evaluations: int = Field(ge=0)
+    effort: Effort | None = Field(None, description="Null in archives from before it was counted.")

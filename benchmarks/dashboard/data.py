@@ -22,6 +22,7 @@ from server.metrics.repository import MetricRepository
 from workers.config import TrainingConfig
 from workers.reporting import EpisodeResult, EvaluationResult
 from workers.reproduction.rows import ROWS
+from workers.training.effort import CPU, EPISODES, WALL
 
 # Series of a PPO run, those of the run's first charts and of the comparison among them.
 SERIES = (
@@ -64,7 +65,7 @@ class Sizes:
 
     Attributes:
         experiments: of five runs each, finished.
-        points: of each of the 20 series of their runs.
+        points: of each of the 20 series of their runs, and of what they count beside steps.
         long_experiments: of five long runs each, finished too: what is compared.
         long_points: of each of the 20 series of those.
         checkpoints: of the one run that has many.
@@ -190,10 +191,13 @@ class _Maker:
 
     def _write(self, session: Session, run_id: str, count: int) -> None:
         steps = np.arange(1, count + 1, dtype=np.int64) * _STEPS_A_POINT
-        times = time.time() + np.cumsum(self._random.gamma(20.0, _SECONDS_A_POINT / 20.0, count))
+        seconds = np.cumsum(self._random.gamma(20.0, _SECONDS_A_POINT / 20.0, count))
+        times = time.time() + seconds
         rare = slice(_EVALUATE_EVERY - 1, None, _EVALUATE_EVERY)
         series = {name: Points(steps, times, self._walk(count)) for name in SERIES}
         series |= {name: Points(steps[rare], times[rare], self._walk(count)[rare]) for name in EVALUATED}
+        counts = {WALL: seconds, CPU: 1.4 * seconds, EPISODES: np.cumsum(self._random.poisson(6.0, count))}
+        series |= {name: Points(steps, times, each.astype(np.float32)) for name, each in counts.items()}
         table = {"reward": 1.0, "episodes": 90.0, "success": 0.9, "collisions": 0.1, "steps": 110.0}
         last = slice(count - 1, count)
         series |= {

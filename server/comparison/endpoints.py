@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server.comparison.schemas import Comparison, Curves, Profiles
+from server.comparison.grid import Across
+from server.comparison.schemas import Comparison, Curves, Profiles, ReportedMetrics
 from server.comparison.service import ComparisonService
 from server.http.problems import INVALID, NOT_FOUND
 from server.security.permissions import view
@@ -22,7 +23,14 @@ Base = Annotated[
 ]
 EveryPair = Annotated[bool, Query(alias="pairs", description="Judge every pair, of 12 experiments at most.")]
 Metric = Annotated[str, Query(max_length=64, description="Of the metric.")]
-GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Steps of the grid at most.")]
+Horizontal = Annotated[
+    Across, Query(alias="x", description="What the grid is of: steps, time under way, CPU time, or episodes.")
+]
+LogarithmicX = Annotated[
+    bool,
+    Query(alias="log", description="For a logarithmic axis: a grid that is resampled grows by equal factors."),
+]
+GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Places of the grid at most.")]
 
 
 @router.get("", responses=INVALID | NOT_FOUND, dependencies=[view("experiment")])
@@ -55,6 +63,15 @@ def compare_curves(
             ge=0, le=2_500, description="Single runs at most, as many of each experiment; all without it. Means are of all."
         ),
     ] = None,
+    across: Horizontal = "steps",
+    logarithmic: LogarithmicX = False,
 ) -> Curves:
     """One metric of every run on one grid, and each experiment's mean and interval."""
-    return ComparisonService(services).curves(list(dict.fromkeys(experiment_ids)), name, points, lines)
+    ids = list(dict.fromkeys(experiment_ids))
+    return ComparisonService(services).curves(ids, name, points, lines, across, logarithmic=logarithmic)
+
+
+@router.get("/metrics", responses=NOT_FOUND, dependencies=[view("experiment")])
+def compare_metrics(experiment_ids: ExperimentIds, services: ServicesDep) -> ReportedMetrics:
+    """Which metrics the runs of the experiments have reported: what there are curves of."""
+    return ComparisonService(services).metrics(list(dict.fromkeys(experiment_ids)))

@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from server.comparison.grid import Across, Spacing
 from server.schemas import Estimate, Schema
 
 
@@ -106,8 +107,9 @@ class SeedCurve(Schema):
 class ExperimentCurves(Schema):
     """An experiment's runs on the common grid, and what they are together.
 
-    `low` and `high` are the 95 % interval of `mean` over seeds (Student's t, of rates on the scale of the logit); null where
-    fewer than two have a value.
+    `mean` is told where every run that has got to the last step has a value: over time, from when the slowest began to when
+    the quickest was done. `low` and `high` are its 95 % interval over seeds (Student's t, of rates on the scale of the
+    logit); null where fewer than two have a value.
     """
 
     id: str
@@ -117,14 +119,45 @@ class ExperimentCurves(Schema):
     low: list[float | None]
     high: list[float | None]
     count: list[int] = Field(description="Seeds with a value.")
+    unplaced: int = Field(
+        0, description="Runs that have the metric and are left out: what the grid is of was not counted when they trained."
+    )
 
 
 class Curves(Schema):
-    """One metric of several experiments on one grid of environment steps."""
+    """One metric of several experiments on one grid.
+
+    Each run is interpolated between its own points, and has no value before its first and after its last.
+    """
 
     name: str
-    steps: list[int]
+    across: Across = Field(
+        "steps",
+        description="What the grid is of: environment steps, seconds under way (without the time that a run waited, was "
+        "stopped or lost), seconds of its trainer's CPU time, or episodes that have ended.",
+    )
+    spacing: Spacing = Field(
+        "points",
+        description="How the grid lies: on the points of all runs together or, where those are too many, evenly over their "
+        "range, or by equal factors.",
+    )
+    steps: list[int] = Field(description="The grid; empty where it is not of steps.")
+    x: list[float] | None = Field(None, description="The grid; null where it is of steps.")
     experiments: list[ExperimentCurves]
+
+
+class ReportedMetric(Schema):
+    """A metric, and how many of the runs have reported it."""
+
+    name: str
+    runs: int
+
+
+class ReportedMetrics(Schema):
+    """What the runs of experiments have reported."""
+
+    runs: int = Field(description="Of all these experiments.")
+    metrics: list[ReportedMetric] = Field(description="By name; the first 500.")
 
 
 class Profile(Schema):

@@ -1,6 +1,6 @@
 """Experiments side by side: final figures, differences, and curves on a common grid."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -10,7 +10,17 @@ from sqlalchemy.orm import Session
 from server.checkpoints.repository import CheckpointRepository
 from server.comparison.differences import differences
 from server.comparison.figures import FinalFigures, final_figures
-from server.comparison.schemas import Comparison, Curves, ExperimentCurves, Profile, Profiles, SeedCurve
+from server.comparison.grid import COUNTED_BY, Across, Curve, all_under_way, common_grid, resample
+from server.comparison.schemas import (
+    Comparison,
+    Curves,
+    ExperimentCurves,
+    Profile,
+    Profiles,
+    ReportedMetric,
+    ReportedMetrics,
+    SeedCurve,
+)
 from server.comparison.verdicts import improvements, verdicts
 from server.database import tables
 from server.errors import InvalidRequestError
@@ -29,6 +39,9 @@ _EVALUATION = "eval/"
 
 MOST_IN_PAIRS = 12
 """Experiments whose every pair is judged: 66 pairs."""
+
+MOST_METRICS = 500
+"""Names of metrics that are told."""
 
 _THRESHOLDS = np.linspace(0.0, 1.0, 51)
 
@@ -81,32 +94,62 @@ class ComparisonService:
             _, figures = _final(session, experiment_ids)
         return Profiles(thresholds=_THRESHOLDS.tolist(), experiments=[_profile(one) for one in figures])
 
-    def curves(self, experiment_ids: Sequence[str], name: str, points: int, lines: int | None = None) -> Curves:
-        """One metric of all runs on one grid of at most `points` steps.
+    def metrics(self, experiment_ids: Sequence[str]) -> ReportedMetrics:
+        """What the runs of experiments have reported.
+
+        Raises:
+            NotFoundError: one of the experiments is missing.
+        """
+        with self._services.database.read() as session:
+            runs = [
+                run.id for experiment in ExperimentRepository(session).get_many(experiment_ids) for run in experiment.runs
+            ]
+            names = MetricRepository(session).names(runs, MOST_METRICS)
+        return ReportedMetrics(runs=len(runs), metrics=[ReportedMetric(name=name, runs=count) for name, count in names])
+
+    def curves(
+        self,
+        experiment_ids: Sequence[str],
+        name: str,
+        points: int,
+        lines: int | None = None,
+        across: Across = "steps",
+        *,
+        logarithmic: bool = False,
+    ) -> Curves:
+        """One metric of all runs on one grid of at most `points` places.
 
         Args:
             experiment_ids: what is compared, in order.
             name: of the metric.
             points: of the grid at most.
             lines: single seeds at most, of all experiments together; None for all. Means and intervals are over all of them.
+            across: what x is.
+            logarithmic: whether x is shown on a logarithmic axis.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
+        counter = COUNTED_BY.get(across)
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
             run_ids = [run.id for experiment in experiments for run in experiment.runs]
             # Finer than the grid: what is looked at is the grid's.
-            read = MetricRepository(session).curves(run_ids, [name], max(points, SUMMARY_WIDTH))
-            series = {run_id: read[run_id].get(name, Buckets.of(Points.joined([]))) for run_id in run_ids}
+            wanted = [name] if counter is None else [name, counter]
+            read = MetricRepository(session).curves(run_ids, wanted, max(points, SUMMARY_WIDTH))
             final = CheckpointRepository(session).final_evaluations(run_ids)
             episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
-        grid = common_grid(list(series.values()), points)
+        series = {run_id: _curve(read[run_id], name, counter) for run_id in run_ids}
+        grid = common_grid(list(series.values()), points, whole=across == "steps", logarithmic=logarithmic)
+        unplaced = {run_id for run_id in run_ids if name in read[run_id] and not series[run_id].x.size}
         shown = None if lines is None else lines // len(experiments)
         return Curves(
             name=name,
-            steps=grid.tolist(),
-            experiments=[_curves(experiment, series, grid, name, episodes, shown) for experiment in experiments],
+            across=across,
+            spacing=grid.spacing,
+            steps=grid.x.astype(np.int64).tolist() if counter is None else [],
+            x=None if counter is None else [float(f"{x:.7g}") for x in grid.x],
+            experiments=[_curves(experiment, series, grid.x, name, episodes, shown, unplaced) for experiment in experiments],
         )
 
 
@@ -143,35 +186,21 @@ def _profile(figures: FinalFigures) -> Profile:
     )
 
 
-def common_grid(series: Sequence[Buckets], limit: int) -> NDArray[np.int64]:
-    """The steps of all series together or, where those are more than `limit`, as many evenly spaced over their range."""
-    ordered = [points.steps for points in series if len(points)]
-    if not ordered:
-        return np.zeros(0, np.int64)
-    # Where one series alone has too many, the others need not be looked through.
-    if max(steps.size for steps in ordered) <= limit:
-        together = np.unique(np.concatenate(ordered))
-        if together.size <= limit:
-            return together
-    first, last = min(steps[0] for steps in ordered), max(steps[-1] for steps in ordered)
-    return np.unique(np.linspace(first, last, limit).round().astype(np.int64))
-
-
-def resample(points: Buckets, grid: NDArray[np.int64]) -> NDArray[np.float64]:
-    """The series at the grid's steps, linear in between; nan before its first finite point and after its last."""
-    finite = np.isfinite(points.mean)
-    if not finite.any():
-        return np.full(grid.size, np.nan)
-    return np.interp(grid, points.steps[finite], points.mean[finite], left=np.nan, right=np.nan)
+def _curve(read: Mapping[str, Buckets], name: str, counter: str | None) -> Curve:
+    """A run's curve of the metric; without points where the metric, or what counts its x, was never reported."""
+    nothing = Buckets.of(Points.joined([]))
+    points = read.get(name, nothing)
+    return Curve.over_steps(points) if counter is None else Curve.over(points, read.get(counter, nothing))
 
 
 def _curves(
     experiment: tables.Experiment,
-    series: dict[str, Buckets],
-    grid: NDArray[np.int64],
+    series: Mapping[str, Curve],
+    grid: NDArray[np.float64],
     name: str,
     episodes: Mapping[str, int],
     shown: int | None,
+    unplaced: Collection[str],
 ) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
@@ -180,6 +209,8 @@ def _curves(
         mean, low, high = means_band(values)
     else:
         mean, low, high = rates_band(values, driven if counted else None)
+    told = all_under_way([series[run.id] for run in experiment.runs], values)
+    mean, low, high = (np.where(told, each, np.nan) for each in (mean, low, high))
     return ExperimentCurves(
         id=experiment.id,
         name=experiment.name,
@@ -191,6 +222,7 @@ def _curves(
         low=json_numbers(low),
         high=json_numbers(high),
         count=np.isfinite(values).sum(axis=0).tolist(),
+        unplaced=sum(run.id in unplaced for run in experiment.runs),
     )
 
 

@@ -188,6 +188,16 @@ class MetricRepository:
                         parts[run_id][name].append(points)
         return {run_id: {name: Points.joined(series[name]) for name in sorted(series)} for run_id, series in parts.items()}
 
+    def names(self, run_ids: Collection[str], limit: int) -> list[tuple[str, int]]:
+        """The metrics of which runs have reported a number, at most `limit`, by name, each with how many of them have."""
+        reported: dict[str, int] = defaultdict(int)
+        for some in _portions(run_ids):
+            name = tables.LatestMetric.name
+            query = select(name, func.count()).where(tables.LatestMetric.run_id.in_(some)).group_by(name).order_by(name)
+            for each, count in self._session.execute(query.limit(limit)):
+                reported[each] += count
+        return sorted(reported.items())[:limit]
+
     def waiting(self, run_id: str) -> dict[str, Points]:
         """The points that wait to be compacted, by series."""
         return _series(self._rows(run_id))

@@ -38,8 +38,13 @@ def fill(directory: Path) -> str:
         other = measured(reports, "Long_sight & 99%", (990, 980, 970, 990, 980), steps=80)
         for experiment in (base, other):
             for run in experiment["runs"]:
-                reports.metrics(run, "eval/success_rate", {1_000: 0.5, 2_000: 0.75, 3_000: 0.9})
-                reports.metrics(run, "loss/value", {1_000: 10.0, 2_000: 1.0, 3_000: 0.1})
+                reports.rows(
+                    run,
+                    {
+                        step: {"eval/success_rate": success, "loss/value": loss, "time/wall_seconds": 3.6 * step}
+                        for step, success, loss in ((1_000, 0.5, 10.0), (2_000, 0.75, 1.0), (3_000, 0.9, 0.1))
+                    },
+                )
                 reports.state(run, "completed")
     return f"/compare?experiment={base['id']}&experiment={other['id']}"
 
@@ -126,3 +131,19 @@ def test_a_chart_leaves_as_numbers_and_as_pictures(compared: tuple[BrowserContex
     assert found[".svg"].startswith(b"<svg ")
     assert found[".png"].startswith(b"\x89PNG")
     assert len(found[".png"]) > 5_000
+
+
+def test_charts_over_time_under_way_are_in_the_address(compared: tuple[BrowserContext, str]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    axis = page.get_by_role("combobox", name="Horizontal axis")
+    axis.select_option("Wall time")
+    chart = page.get_by_role("figure", name="Success rate").first
+    # Three thousand steps of 3.6 s.
+    expect(chart).to_have_attribute("data-step", "10800")
+    expect(page.get_by_text("Means at the 3 times of all points, until the first seed is through").first).to_be_visible()
+    expect(axis.get_by_role("option", name="CPU time, not counted")).to_be_disabled()
+    page.reload()
+    expect(axis).to_have_value("wall")
+    expect(chart).to_have_attribute("data-step", "10800")

@@ -82,12 +82,14 @@ class Reports:
 
     def metrics(self, run: dict[str, Any], name: str, points: dict[int, float]) -> None:
         """Report one series."""
+        self.rows(run, {step: {name: value} for step, value in points.items()})
+
+    def rows(self, run: dict[str, Any], values: dict[int, dict[str, float]]) -> None:
+        """Report several series together, by step."""
         with self.services.database.write() as session:
             waiting = session.scalar(select(func.max(tables.MetricRow.seq)).where(tables.MetricRow.run_id == run["id"])) or 0
             first = max(waiting, session.get_one(tables.Run, run["id"]).last_seq) + 1
-            rows = [
-                ReportedRow(seq, step, 0.0, {name: value}) for seq, (step, value) in enumerate(points.items(), start=first)
-            ]
+            rows = [ReportedRow(seq, step, 0.0, each) for seq, (step, each) in enumerate(values.items(), start=first)]
             MetricRepository(session).append({run["id"]: rows})
 
     def cut(self, run: dict[str, Any], step: int) -> None:

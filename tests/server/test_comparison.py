@@ -1,7 +1,7 @@
 """Experiments side by side: figures with what stands behind them, differences, warnings, curves on one grid."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.comparison.differences import differences
-from server.comparison.service import common_grid, resample
+from server.comparison.grid import Curve, common_grid, resample
+from server.database import tables
+from server.metrics.axes import AxisRepository
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
+from server.metrics.repository import MetricRepository
 from tests.server.harness import Reports
 from workers.reporting import EvaluationResult
 from workers.statistics.seeds import success_rate
@@ -397,22 +400,128 @@ series = st.lists(
 ).map(sorted)
 
 
-@given(st.lists(series, min_size=1, max_size=4), st.integers(2, 30))
-def test_resampling_stays_within_each_curve(curves: list[list[tuple[int, float]]], limit: int) -> None:
+@given(st.lists(series, min_size=1, max_size=4), st.integers(2, 30), st.booleans(), st.booleans())
+def test_resampling_stays_within_each_curve(
+    curves: list[list[tuple[int, float]]], limit: int, whole: bool, logarithmic: bool
+) -> None:
     points = [Buckets.of(Points.of([p[0] for p in curve], [0.0] * len(curve), [p[1] for p in curve])) for curve in curves]
-    grid = common_grid(points, limit)
+    found = [Curve.over_steps(each) for each in points]
+    grid = common_grid(found, limit, whole=whole, logarithmic=logarithmic).x
 
     assert grid.size <= limit
     assert (np.diff(grid) > 0).all()
-    for curve in points:
+    assert not logarithmic or (grid > 0).all()
+    for curve in found:
         values = resample(curve, grid)
-        inside = (grid >= curve.steps[0]) & (grid <= curve.steps[-1])
+        inside = (grid >= curve.x[0]) & (grid <= curve.x[-1])
         assert (np.isfinite(values) == inside).all()
-        assert (values[inside] >= curve.mean.min() - 1e-3).all()
-        assert (values[inside] <= curve.mean.max() + 1e-3).all()
+        assert (values[inside] >= curve.y.min() - 1e-3).all()
+        assert (values[inside] <= curve.y.max() + 1e-3).all()
 
 
-@pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves", "/api/compare/profiles"])
+def counted(reports: Reports, run: dict[str, Any], name: str, counter: str, points: dict[int, tuple[float, float]]) -> None:
+    """Report a metric beside what was counted, as (count, value) by step."""
+    reports.rows(run, {step: {counter: count, name: value} for step, (count, value) in points.items()})
+
+
+@pytest.mark.parametrize(("second_ends", "mean_at_40_s"), [(200, 30.0), (300, None)], ids=["cut short", "done first"])
+def test_means_over_time_are_taken_where_each_seed_has_got_to(
+    client: TestClient, reports: Reports, second_ends: int, mean_at_40_s: float | None
+) -> None:
+    """By hand. Seed 0, which rested overnight after step 200, goes 10, 20, 40 s; seed 1 is quicker.
+
+    At 10 s seed 1 is a quarter of its way from 2 to 6, at 20 s three quarters; at 25 s seed 0 is a quarter of the way from
+    10 to 30. At 5 s seed 0 has not reported yet: there is no mean. At 40 s seed 1 has ended: where it was cut short, seed 0
+    goes on alone; where it had all its steps, the mean of both ends with it.
+    """
+    experiment = reports.experiment(seeds=(0, 1, 2))
+    first, second, old = experiment["runs"]
+    counted(reports, first, "train/return", "time/wall_seconds", {100: (10, 0.0), 200: (20, 10.0), 300: (40, 30.0)})
+    counted(reports, second, "train/return", "time/wall_seconds", {100: (5, 2.0), second_ends: (25, 6.0)})
+    reports.metrics(old, "train/return", {100: 1.0, 200: 9.0})
+
+    asked = {"experiment": experiment["id"], "name": "train/return", "x": "wall"}
+    curves = client.get("/api/compare/curves", params=asked).json()
+
+    assert (curves["across"], curves["spacing"], curves["steps"]) == ("wall", "points", [])
+    assert curves["x"] == [5.0, 10.0, 20.0, 25.0, 40.0]
+    (curve,) = curves["experiments"]
+    assert [seed["values"] for seed in curve["seeds"]] == [
+        [None, 0.0, 10.0, 15.0, 30.0],
+        [2.0, 3.0, 5.0, 6.0, None],
+        [None] * 5,
+    ]
+    assert curve["mean"] == [None, 1.5, 7.5, 10.5, mean_at_40_s]
+    assert curve["count"] == [1, 2, 2, 2, 1]
+    # Student's t of 10 and 5: an error of 2.5 times 12.7062.
+    assert curve["low"][2] == pytest.approx(7.5 - 2.5 * 12.7062, abs=1e-3)
+    assert (curve["low"][0], curve["high"][4]) == (None, None)
+    # Its trainer had not counted the time: nobody guesses it.
+    assert curve["unplaced"] == 1
+
+
+def test_many_points_over_time_are_looked_at_evenly_or_by_equal_factors(client: TestClient, reports: Reports) -> None:
+    run = (experiment := reports.experiment())["runs"][0]
+    counted(reports, run, "train/reward", "train/episodes", {step: (step - 1, step - 1.0) for step in range(1, 1_002)})
+    asked = {"experiment": experiment["id"], "name": "train/reward", "x": "episodes", "points": 4}
+
+    even = client.get("/api/compare/curves", params=asked).json()
+    assert (even["spacing"], even["x"]) == ("even", [0.0, 333.3333, 666.6667, 1_000.0])
+    assert even["experiments"][0]["mean"] == pytest.approx(even["x"])
+
+    # 0 has no place on a logarithmic axis: from 1 on, tenfold each time.
+    factors = client.get("/api/compare/curves", params=asked | {"log": True}).json()
+    assert (factors["spacing"], factors["x"]) == ("logarithmic", [1.0, 10.0, 100.0, 1_000.0])
+    assert factors["experiments"][0]["mean"] == pytest.approx(factors["x"])
+
+
+def test_over_cpu_time_only_two_series_are_read_and_the_long_ones_by_their_summaries(
+    client: TestClient, reports: Reports, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """20,000 points, 10 seconds for every thousand steps: what is drawn lies on that line, and no chunk is decoded."""
+    run = (experiment := reports.experiment())["runs"][0]
+    steps = np.arange(1, 20_001, dtype=np.int64) * 100
+    with reports.services.database.write() as session:
+        MetricRepository(session).add_series(
+            run["id"],
+            {
+                name: Points(steps, np.zeros(steps.size), (steps * factor).astype(np.float32))
+                for name, factor in (("time/cpu_seconds", 0.01), ("loss/value", 1.0), ("loss/policy", 2.0))
+            },
+        )
+    decoded: list[str] = []
+    decode = AxisRepository.decoded
+
+    def seen(self: AxisRepository, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, Points]]:
+        for chunk, points in decode(self, chunks):
+            decoded.append(chunk.name)
+            yield chunk, points
+
+    monkeypatch.setattr(AxisRepository, "decoded", seen)
+    asked = {"experiment": experiment["id"], "name": "loss/value", "x": "cpu", "points": 50}
+    curves = client.get("/api/compare/curves", params=asked).json()
+
+    assert decoded == []
+    assert (len(curves["x"]), curves["x"][-1]) == (50, 20_000.0)
+    values = curves["experiments"][0]["mean"]
+    # A point of a summary is the mean of its bucket, at the bucket's end: half a bucket of 16 points behind.
+    assert values == pytest.approx([100 * x for x in curves["x"]], abs=16 * 100)
+
+
+def test_what_the_runs_have_reported(client: TestClient, reports: Reports) -> None:
+    one, other = reports.experiment("one", seeds=(0, 1)), reports.experiment("other")
+    for run in one["runs"]:
+        reports.rows(run, {100: {"train/return": 1.0, "time/wall_seconds": 2.0}})
+    reports.metrics(other["runs"][0], "train/return", {100: 1.0})
+
+    told = client.get("/api/compare/metrics", params={"experiment": [one["id"], other["id"]]}).json()
+    assert told == {
+        "runs": 3,
+        "metrics": [{"name": "time/wall_seconds", "runs": 2}, {"name": "train/return", "runs": 3}],
+    }
+
+
+@pytest.mark.parametrize("path", ["/api/compare", "/api/compare/curves", "/api/compare/metrics", "/api/compare/profiles"])
 def test_what_cannot_be_compared(client: TestClient, reports: Reports, path: str) -> None:
     assert client.get(path).status_code == 422
     assert client.get(path, params={"experiment": [reports.experiment()["id"], "nobody"]}).status_code == 404

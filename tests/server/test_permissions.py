@@ -141,6 +141,7 @@ TABLE = {
         GET /api/compare/export
         GET /api/compare
         GET /api/compare/curves
+        GET /api/compare/metrics
         GET /api/compare/profiles
         GET /api/compare/table
         GET /api/compare/report

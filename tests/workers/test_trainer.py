@@ -35,6 +35,7 @@ METRICS = {
     *("train/reward", "loss/policy", "loss/value", "policy/kl", "policy/entropy", "policy/clip_fraction"),
     *("policy/std_linear", "policy/std_angular", "value/explained_variance", "optim/learning_rate"),
     *("time/steps_per_second", "time/simulation", "time/inference", "time/update", "time/reporting", "time/evaluation"),
+    *("time/wall_seconds", "time/cpu_seconds", "train/episodes"),
     *("train/linear_speed", "train/angular_speed", "train/spin", "policy/saturation", "observation/constant"),
 }
 ATTEMPT_METRICS = {  # only where an attempt ended
@@ -169,11 +170,15 @@ def test_stopped_and_resumed_equals_uninterrupted(whole: Recorder, tmp_path: Pat
 
     assert learned(first.rows + second.rows) == learned(whole.rows)
     interrupted, uninterrupted = (read_checkpoint(r.checkpoints[-1][1]) for r in (second, whole))
-    for mine, theirs in ((interrupted.weights, uninterrupted.weights), (interrupted.arrays, uninterrupted.arrays)):
-        assert mine.keys() == theirs.keys()
-        for name in mine:
-            np.testing.assert_array_equal(mine[name], theirs[name], err_msg=name)
-    assert interrupted.counters == uninterrupted.counters
+    for some, others in ((interrupted.weights, uninterrupted.weights), (interrupted.arrays, uninterrupted.arrays)):
+        assert some.keys() == others.keys()
+        for name in some:
+            np.testing.assert_array_equal(some[name], others[name], err_msg=name)
+    mine, theirs = interrupted.counters, uninterrupted.counters
+    assert mine.effort is not None
+    assert theirs.effort is not None
+    assert mine.effort.episodes == theirs.effort.episodes
+    assert mine.model_copy(update={"effort": None}) == theirs.model_copy(update={"effort": None})
 
 
 @pytest.mark.parametrize("algorithm", [DdpgConfig, Td3Config, SacConfig])

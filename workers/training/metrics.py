@@ -66,19 +66,21 @@ class TrainingMetrics:
         observations: NDArray[np.float32],
         actions: NDArray[np.float32],
         rewards: NDArray[np.float32],
-    ) -> None:
-        """Takes in one step of all robots: what they see now, and what they did before."""
+    ) -> int:
+        """Takes in one step of all robots: what they see now, and what they did before. Returns how many episodes ended."""
         self._behavior.step(observations, actions)
         self._steps += 1
         self._rewards += float(rewards.sum())
         for name, total in zip(env.reward_term_names, env.reward_terms.sum(axis=0).tolist(), strict=True):
             self._reward_terms[name] = self._reward_terms.get(name, 0.0) + total
         outcomes = env.outcomes
-        if outcomes.any():
-            ended = outcomes > 0
-            self._outcomes += np.bincount(outcomes, minlength=4)
-            self._attempt_rewards += float(env.attempt_rewards[ended].sum())
-            self._attempt_steps += float(env.attempt_steps[ended].sum())
+        if not outcomes.any():
+            return 0
+        ended = outcomes > 0
+        self._outcomes += np.bincount(outcomes, minlength=4)
+        self._attempt_rewards += float(env.attempt_rewards[ended].sum())
+        self._attempt_steps += float(env.attempt_steps[ended].sum())
+        return int(ended.sum())
 
     def update(self, diagnostics: Mapping[str, float]) -> None:
         """Takes in the diagnostics of one update; a report tells their mean."""

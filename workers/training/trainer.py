@@ -32,7 +32,7 @@ from workers.checkpoints import (
 from workers.config import TrainingConfig
 from workers.errors import ArchiveMismatchError, NoDeviceError, NonFiniteError
 from workers.live.viewing import TrainingViewer, Unwatched
-from workers.manifest import STATE_ARRAYS, EvaluationSummary, Manifest, Number, Observation, TrainingCounters
+from workers.manifest import STATE_ARRAYS, Effort, EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.misfit import misfit
 from workers.networks.inputs import inputs_of
 from workers.networks.layout import layout
@@ -40,6 +40,7 @@ from workers.policy import Policy, torch_policy
 from workers.reporting import EvaluationResult, Reporter
 from workers.start import StartFrom
 from workers.training.drives import drive
+from workers.training.effort import EffortMeter
 from workers.training.evaluation import evaluate, evaluation_metrics
 from workers.training.metrics import TrainingMetrics
 from workers.training.threads import ThreadCount
@@ -118,6 +119,7 @@ class Training:
     ) -> None:
         self.config, self.seed, self.reporter, self.directory, self.viewer = config, seed, reporter, directory, viewer
         self.report_interval = report_interval
+        self.effort = EffortMeter(Effort())
         refuse_too_large(config)
         self.suite = suite_for(config.task)
         self.observation_layout, self.inputs = observation_layout(config.task), inputs_of(config.task)
@@ -168,7 +170,7 @@ class Training:
             self.observations, rewards, terminations, truncations, _ = env.step(actions)
             stepped = clock()
             algorithm.record(self.observations, rewards, terminations, truncations, env.final_observations)
-            self.metrics.step(env, self.observations, actions, rewards)
+            self.effort.ended(self.metrics.step(env, self.observations, actions, rewards))
             self.step += algorithm.robots
             self.viewer.on_step(env, self.step)
             simulation += stepped - acted
@@ -246,7 +248,7 @@ class Training:
         arrival_distance = self.config.task.arrival_distance
         measured = {} if result is None else {**evaluation_metrics(result, arrival_distance), **self.drive()}
         values = self.metrics.flush()
-        values.update(measured)
+        values.update(measured | self.effort.metrics())
         with self.metrics.phase("reporting"):
             self.reporter.metrics(self.step, values)
         self.reported = self.step
@@ -302,6 +304,7 @@ class Training:
         self.step, self.updates, self.evaluations = counters.step, counters.updates, counters.evaluations
         self.reported = self.saved = counters.step
         self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots, self.actions)
+        self.effort.resume(counters.effort)
         self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
 
     def begin_with(self, start: StartFrom, archive: Path | None) -> None:
@@ -329,11 +332,14 @@ class Training:
         taken = " and ".join(("policy", *self.algorithm.begin_with(policy.weights, state)))
         self.reporter.event(0, "info", f"Starts from {title}: its {taken}.")
         result = self.evaluate()
-        self.reporter.metrics(0, evaluation_metrics(result, self.config.task.arrival_distance))
+        measured = evaluation_metrics(result, self.config.task.arrival_distance)
+        self.reporter.metrics(0, measured | self.effort.metrics())
         self.save(result)
 
     def _counters(self) -> TrainingCounters:
-        return TrainingCounters(step=self.step, updates=self.updates, evaluations=self.evaluations)
+        return TrainingCounters(
+            step=self.step, updates=self.updates, evaluations=self.evaluations, effort=self.effort.read()
+        )
 
     def _environment_arrays(self) -> dict[str, NDArray[np.generic]]:
         return {

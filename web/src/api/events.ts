@@ -49,7 +49,7 @@ export function concerns(change: Change, queryKey: readonly unknown[]): boolean 
   if (path === '/api/status' || path === '/api/queue' || path === '/api/workers')
     return change.kind !== 'metrics'
   if (path.startsWith('/api/experiments/{experiment_id}')) return ofExperiment
-  if (path === '/api/compare') {
+  if (path === '/api/compare' || path === '/api/compare/metrics') {
     return change.kind !== 'metrics' && ofCompared
   }
   if (path === '/api/compare/curves') return ofCompared

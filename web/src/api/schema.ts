@@ -608,6 +608,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/compare/metrics": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Metrics
+         * @description Which metrics the runs of the experiments have reported: what there are curves of.
+         */
+        get: operations["compare_metrics_api_compare_metrics_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/compare/profiles": {
         parameters: {
             query?: never;
@@ -4773,15 +4793,39 @@ export interface components {
         };
         /**
          * Curves
-         * @description One metric of several experiments on one grid of environment steps.
+         * @description One metric of several experiments on one grid.
+         *
+         *     Each run is interpolated between its own points, and has no value before its first and after its last.
          */
         Curves: {
+            /**
+             * Across
+             * @description What the grid is of: environment steps, seconds under way (without the time that a run waited, was stopped or lost), seconds of its trainer's CPU time, or episodes that have ended.
+             * @default steps
+             * @enum {string}
+             */
+            across: "steps" | "wall" | "cpu" | "episodes";
             /** Experiments */
             experiments: components["schemas"]["ExperimentCurves"][];
             /** Name */
             name: string;
-            /** Steps */
+            /**
+             * Spacing
+             * @description How the grid lies: on the points of all runs together or, where those are too many, evenly over their range, or by equal factors.
+             * @default points
+             * @enum {string}
+             */
+            spacing: "points" | "even" | "logarithmic";
+            /**
+             * Steps
+             * @description The grid; empty where it is not of steps.
+             */
             steps: number[];
+            /**
+             * X
+             * @description The grid; null where it is of steps.
+             */
+            x: number[] | null;
         };
         /**
          * DdpgConfig
@@ -5752,8 +5796,9 @@ export interface components {
          * ExperimentCurves
          * @description An experiment's runs on the common grid, and what they are together.
          *
-         *     `low` and `high` are the 95 % interval of `mean` over seeds (Student's t, of rates on the scale of the logit); null where
-         *     fewer than two have a value.
+         *     `mean` is told where every run that has got to the last step has a value: over time, from when the slowest began to when
+         *     the quickest was done. `low` and `high` are its 95 % interval over seeds (Student's t, of rates on the scale of the
+         *     logit); null where fewer than two have a value.
          */
         ExperimentCurves: {
             /**
@@ -5776,6 +5821,12 @@ export interface components {
              * @description Of the first ones, where no more lines were asked for.
              */
             seeds: components["schemas"]["SeedCurve"][];
+            /**
+             * Unplaced
+             * @description Runs that have the metric and are left out: what the grid is of was not counted when they trained.
+             * @default 0
+             */
+            unplaced: number;
         };
         /**
          * ExperimentLaunch
@@ -9734,6 +9785,32 @@ export interface components {
              * @description Of the work, 0 to 1.
              */
             share: number;
+        };
+        /**
+         * ReportedMetric
+         * @description A metric, and how many of the runs have reported it.
+         */
+        ReportedMetric: {
+            /** Name */
+            name: string;
+            /** Runs */
+            runs: number;
+        };
+        /**
+         * ReportedMetrics
+         * @description What the runs of experiments have reported.
+         */
+        ReportedMetrics: {
+            /**
+             * Metrics
+             * @description By name; the first 500.
+             */
+            metrics: components["schemas"]["ReportedMetric"][];
+            /**
+             * Runs
+             * @description Of all these experiments.
+             */
+            runs: number;
         };
         /**
          * Reproduction
@@ -14470,10 +14547,14 @@ export interface operations {
                 experiment: string[];
                 /** @description Single runs at most, as many of each experiment; all without it. Means are of all. */
                 lines?: number | null;
+                /** @description For a logarithmic axis: a grid that is resampled grows by equal factors. */
+                log?: boolean;
                 /** @description Of the metric. */
                 name?: string;
-                /** @description Steps of the grid at most. */
+                /** @description Places of the grid at most. */
                 points?: number;
+                /** @description What the grid is of: steps, time under way, CPU time, or episodes. */
+                x?: "steps" | "wall" | "cpu" | "episodes";
             };
             header?: never;
             path?: never;
@@ -14530,7 +14611,7 @@ export interface operations {
                 margin?: number;
                 /** @description Of the metric. */
                 name?: string;
-                /** @description Steps of the grid at most. */
+                /** @description Places of the grid at most. */
                 points?: number;
             };
             header?: never;
@@ -14549,6 +14630,56 @@ export interface operations {
                     "application/octet-stream": string;
                     "application/zip": string;
                     "text/csv": string;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    compare_metrics_api_compare_metrics_get: {
+        parameters: {
+            query: {
+                /** @description Ids of the experiments, in order. */
+                experiment: string[];
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReportedMetrics"];
                 };
             };
             /** @description No valid login */

@@ -5,7 +5,7 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
 import { useNear } from '../lib/near'
-import { roundTick } from './axis'
+import { type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
 import { lineColor } from './palette'
@@ -26,9 +26,7 @@ interface ChartProps {
   yRange?: readonly [number, number]
   logarithmic?: boolean
   height?: number
-  /** What x is, and how it is written. */
-  xTitle?: string
-  xFormat?: (value: number) => string
+  x?: Horizontal
   /** Where on x the cursor stands; null leaves it to whoever points. */
   at?: number | null
   /** A click's x. */
@@ -46,8 +44,7 @@ export function Chart({
   yRange,
   logarithmic = false,
   height = HEIGHT,
-  xTitle = 'Steps',
-  xFormat = count,
+  x = STEPS,
   at = null,
   onSeek,
 }: ChartProps) {
@@ -90,12 +87,7 @@ export function Chart({
     const made = new uPlot(
       {
         // A strip among others says below what x is, where it reads its values.
-        ...appearance(
-          dark,
-          format,
-          height < STRIP ? undefined : xTitle,
-          xFormat === count ? compact : xFormat,
-        ),
+        ...appearance(dark, format, x, height >= STRIP),
         ...seriesOf(lines.current, dark),
         width: element.clientWidth,
         height,
@@ -154,6 +146,8 @@ export function Chart({
       element,
     )
     plot.current = made
+    // What it was zoomed to has gone with the plot before it.
+    setZoomed(false)
     const observer = new ResizeObserver(() => made.setSize({ width: element.clientWidth, height }))
     observer.observe(element)
     return () => {
@@ -161,7 +155,7 @@ export function Chart({
       made.destroy()
       plot.current = null
     }
-  }, [near, structure, dark, low, high, logarithmic, height, format, xTitle, xFormat])
+  }, [near, structure, dark, low, high, logarithmic, height, format, x])
 
   const range = linked?.range ?? null
   const inside = useRef(false)
@@ -208,7 +202,7 @@ export function Chart({
       if (cell) cell.textContent = value === null ? '–' : format(value)
     })
     const step = where.current
-    if (step) step.textContent = index === null ? '' : `${xTitle} ${xFormat(data.x[index] ?? 0)}`
+    if (step) step.textContent = index === null ? '' : `${x.title} ${x.format(data.x[index] ?? 0)}`
   }
 
   return (
@@ -315,11 +309,13 @@ function withAlpha(hex: string, alpha: number): string {
 function appearance(
   dark: boolean,
   format: (value: number) => string,
-  xTitle: string | undefined,
-  xFormat: (value: number) => string,
+  x: Horizontal,
+  titled: boolean,
 ): Pick<uPlot.Options, 'axes' | 'padding'> {
   const ink = dark ? '#97a1a9' : '#5d6870'
   const grid = { stroke: dark ? '#252b31' : '#eceff0', width: 1 }
+  // What is counted is short on the axis, and whole below it.
+  const written = x.format === count ? compact : x.format
   const axis: uPlot.Axis = { stroke: ink, font: AXIS_FONT, grid, ticks: { show: false } }
   return {
     padding: [10, 12, 0, 0],
@@ -328,12 +324,13 @@ function appearance(
         ...axis,
         size: 26,
         gap: 6,
-        ...(xTitle === undefined ? {} : { label: xTitle }),
+        ...(titled ? { label: x.title } : {}),
+        ...(x.rounds ? { incrs: [...x.rounds] } : {}),
         labelFont: AXIS_FONT,
         labelSize: 16,
         labelGap: 0,
         grid: { show: false },
-        values: (_, ticks) => ticks.map((tick: number | null) => (tick === null ? '' : xFormat(tick))),
+        values: (_, ticks) => ticks.map((tick: number | null) => (tick === null ? '' : written(tick))),
         space: 64,
       },
       {

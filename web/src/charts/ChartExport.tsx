@@ -10,7 +10,7 @@ interface ChartExportProps extends PictureOptions {
 }
 
 export function ChartExport({ data, ...options }: ChartExportProps) {
-  const { title, xTitle } = options
+  const { title, x } = options
   const name = `mapless-${title.toLowerCase().replace(/[^a-z0-9]+/g, '-')}`
   return (
     <Menu position="bottom-end">
@@ -20,7 +20,7 @@ export function ChartExport({ data, ...options }: ChartExportProps) {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={() => saveText(`${name}.csv`, 'text/csv', csvOf(data, xTitle))}>
+        <Menu.Item onClick={() => saveText(`${name}.csv`, 'text/csv', csvOf(data, x))}>
           Numbers (CSV)
         </Menu.Item>
         <Menu.Item onClick={() => saveText(`${name}.svg`, 'image/svg+xml', svgOf(data, options))}>

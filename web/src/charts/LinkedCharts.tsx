@@ -13,9 +13,20 @@ interface Linked {
 
 const Context = createContext<Linked | null>(null)
 
-export function LinkedCharts({ children }: { children: ReactNode }) {
+interface LinkedChartsProps {
+  /** What their x is: with another one they show all of it again. */
+  of?: string
+  children: ReactNode
+}
+
+export function LinkedCharts({ of, children }: LinkedChartsProps) {
   const key = useId()
   const [range, zoomTo] = useState<XRange | null>(null)
+  const [shown, setShown] = useState(of)
+  if (shown !== of) {
+    setShown(of)
+    zoomTo(null)
+  }
   const linked = useMemo(() => ({ key, range, zoomTo }), [key, range])
   return <Context.Provider value={linked}>{children}</Context.Provider>
 }

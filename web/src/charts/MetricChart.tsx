@@ -1,7 +1,8 @@
 /** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
 import { Checkbox, Group, Slider, Title } from '@mantine/core'
 import { type ReactNode, useMemo, useState } from 'react'
-import { compact, count } from '../lib/format'
+import { compact } from '../lib/format'
+import { type Horizontal, STEPS } from './axis'
 import { Chart } from './Chart'
 import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
@@ -20,9 +21,10 @@ interface MetricChartProps {
   /** Whether a logarithmic axis is offered. */
   scalable?: boolean
   height?: number
-  /** What x is, and how it is written; steps of the environment without them. */
-  xTitle?: string
-  xFormat?: (value: number) => string
+  /** Steps of the environment without it. */
+  x?: Horizontal
+  /** A line below: what has to be known to read it. */
+  foot?: string | null
   /** What stands in place of the curve while it has no point. */
   empty?: ReactNode
 }
@@ -34,10 +36,10 @@ export function MetricChart({
   smoothable = false,
   scalable = false,
   height = 220,
+  foot = null,
   empty = 'No value yet',
   format = compact,
-  xTitle = 'Steps',
-  xFormat = count,
+  x = STEPS,
   ...rest
 }: MetricChartProps) {
   const [strength, setStrength] = useState(0)
@@ -81,8 +83,7 @@ export function MetricChart({
               data={shown}
               title={note ? `${title}, ${note}` : title}
               format={format}
-              xTitle={xTitle}
-              xFormat={xFormat}
+              x={x}
               yRange={rest.yRange}
               logarithmic={logarithmic && loggable}
             />
@@ -100,11 +101,11 @@ export function MetricChart({
           logarithmic={logarithmic && loggable}
           height={height}
           format={format}
-          xTitle={xTitle}
-          xFormat={xFormat}
+          x={x}
           {...rest}
         />
       )}
+      {foot && <p className={classes.foot}>{foot}</p>}
     </div>
   )
 }

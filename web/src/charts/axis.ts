@@ -1,10 +1,24 @@
-/** Axes of charts that are drawn point by point: where a value lies, and which ticks there are. */
+/** Axes of charts: what x is and, where they are drawn point by point, where a value lies and which ticks there are. */
+import { count } from '../lib/format'
 
 export interface Axis {
   /** Where a value lies, 0 to 1. */
   place: (value: unknown) => number
   ticks: readonly { at: number; label: string }[]
 }
+
+/** What x is, and how it is written. */
+export interface Horizontal {
+  /** Of the axis. */
+  title: string
+  format: (value: number) => string
+  /** Of its column among numbers, where that has to say more. */
+  column?: string
+  /** What may lie between two ticks, ascending; without them any round number. */
+  rounds?: readonly number[]
+}
+
+export const STEPS: Horizontal = { title: 'Steps', format: count }
 
 /** Beyond this many, ticks would run into one another. */
 const TICKS = 5
@@ -41,11 +55,11 @@ export function choices(values: readonly unknown[], label: (value: unknown) => s
   }
 }
 
-/** Round numbers from `low` to `high`, a few of them. */
-export function rounds(low: number, high: number): number[] {
+/** Round numbers from `low` to `high`, a few of them, as far apart as one of `steps` if there are some. */
+export function rounds(low: number, high: number, steps: readonly number[] = []): number[] {
   const rough = (high - low) / TICKS
   const power = 10 ** Math.floor(Math.log10(rough))
-  const step = (ROUND.find((one) => one * power >= rough) ?? 10) * power
+  const step = steps.find((one) => one >= rough) ?? (ROUND.find((one) => one * power >= rough) ?? 10) * power
   const first = Math.ceil(low / step - 1e-9)
   const last = Math.floor(high / step + 1e-9)
   return Array.from({ length: last - first + 1 }, (_, index) =>

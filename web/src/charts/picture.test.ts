@@ -1,9 +1,10 @@
 import { expect, test } from 'vitest'
+import { ACROSS } from './across'
 import { csvOf, heightOf, svgOf } from './picture'
 import type { ChartData } from './series'
 
 const text = (value: number) => String(value)
-const look = { title: 'Success <rate>', xTitle: 'Steps', xFormat: text, format: text }
+const look = { title: 'Success <rate>', x: { title: 'Steps', format: text }, format: text }
 
 const data: ChartData = {
   x: [0, 100],
@@ -14,7 +15,7 @@ const data: ChartData = {
 }
 
 test('a chart as CSV: a column for each line and the ends of its band, and no cell a formula', () => {
-  expect(csvOf(data, 'Steps')).toBe(
+  expect(csvOf(data, look.x)).toBe(
     '"Steps","a:0","\'=One, 2 seeds","\'=One, 2 seeds, low","\'=One, 2 seeds, high"\r\n0,0.5,0,0,0.5\r\n100,,1,0.5,1\r\n',
   )
 })
@@ -30,6 +31,13 @@ test('a chart as SVG: lines, bands, a single point as a dot, axes and legend', (
   expect(svg).toContain('=One, 2 seeds</text>')
   expect(new DOMParser().parseFromString(svg, 'image/svg+xml').querySelector('parsererror')).toBeNull()
   expect(svg).toContain(`height="${heightOf(data)}"`)
+})
+
+test('over time the numbers are seconds, and the picture has hours', () => {
+  const overNoon = { ...data, x: [0, 7_200] }
+  expect(csvOf(overNoon, ACROSS.wall)).toMatch(/^"Time under way, seconds",.*\r\n0,.*\r\n7200,/)
+  const svg = svgOf(overNoon, { ...look, x: ACROSS.wall })
+  for (const tick of ['0 s', '30 min', '1 h', '1 h 30 min', '2 h']) expect(svg).toContain(`>${tick}</text>`)
 })
 
 test('a logarithmic axis has powers of ten', () => {

@@ -1,4 +1,5 @@
 /** A chart as it leaves the page: SVG that needs nothing else, and the numbers as CSV. */
+import { type Horizontal, rounds } from './axis'
 import { lineColor } from './palette'
 import type { ChartData, Line, Values } from './series'
 
@@ -9,12 +10,10 @@ const RIGHT = 16
 const TOP = 36
 const BOTTOM = 48
 const ROW = 18
-const TICKS = 5
 
 export interface PictureOptions {
   title: string
-  xTitle: string
-  xFormat: (value: number) => string
+  x: Horizontal
   format: (value: number) => string
   yRange?: readonly [number, number] | undefined
   logarithmic?: boolean
@@ -22,7 +21,7 @@ export interface PictureOptions {
 
 /** The chart in its light colours, with title, axes and legend; as high as `heightOf` says. */
 export function svgOf(data: ChartData, options: PictureOptions): string {
-  const { title, xTitle, xFormat, format, yRange, logarithmic = false } = options
+  const { title, x, format, yRange, logarithmic = false } = options
   const bend = logarithmic ? Math.log10 : (value: number) => value
   const seen = data.lines.flatMap((line) => [line.values, line.band?.low ?? [], line.band?.high ?? []].flat())
   const values = seen.filter((value): value is number => value !== null && (!logarithmic || value > 0))
@@ -45,11 +44,11 @@ export function svgOf(data: ChartData, options: PictureOptions): string {
       (tick) =>
         `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(format(tick))}</text>`,
     ),
-    ...ticks(data.x[0] ?? 0, data.x.at(-1) ?? 0).map(
+    ...ticks(data.x[0] ?? 0, data.x.at(-1) ?? 0, x.rounds).map(
       (tick) =>
-        `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(xFormat(tick))}</text>`,
+        `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(x.format(tick))}</text>`,
     ),
-    `<text x="${(LEFT + WIDTH - RIGHT) / 2}" y="${HEIGHT - BOTTOM + 38}" text-anchor="middle" ${ink}>${escaped(xTitle)}</text>`,
+    `<text x="${(LEFT + WIDTH - RIGHT) / 2}" y="${HEIGHT - BOTTOM + 38}" text-anchor="middle" ${ink}>${escaped(x.title)}</text>`,
     ...data.lines.map((line) => curve(data.x, line, across, up)),
     ...legend.map((line, row) => {
       const top = HEIGHT + ROW * row
@@ -65,7 +64,7 @@ export function heightOf(data: ChartData): number {
 }
 
 /** A row for each x: every line, and the ends of its band. */
-export function csvOf(data: ChartData, xTitle: string): string {
+export function csvOf(data: ChartData, { title, column = title }: Horizontal): string {
   const columns: { head: string; values: Values }[] = data.lines.flatMap((line) => {
     const head = line.label ?? line.key
     const own = [{ head, values: line.values }]
@@ -77,8 +76,8 @@ export function csvOf(data: ChartData, xTitle: string): string {
         ]
       : own
   })
-  const rows = data.x.map((x, index) => [x, ...columns.map(({ values }) => values[index] ?? '')].join(','))
-  return `${[[xTitle, ...columns.map(({ head }) => head)].map(cell).join(','), ...rows].join('\r\n')}\r\n`
+  const rows = data.x.map((at, index) => [at, ...columns.map(({ values }) => values[index] ?? '')].join(','))
+  return `${[[column, ...columns.map(({ head }) => head)].map(cell).join(','), ...rows].join('\r\n')}\r\n`
 }
 
 function curve(
@@ -121,15 +120,8 @@ function padded(values: readonly number[]): [number, number] {
 }
 
 /** Round numbers from low to high, about five. */
-function ticks(low: number, high: number): number[] {
-  if (high <= low) return [low]
-  const rough = (high - low) / TICKS
-  const power = 10 ** Math.floor(Math.log10(rough))
-  const step = [1, 2, 2.5, 5, 10].map((factor) => factor * power).find((each) => each >= rough) ?? rough
-  const found: number[] = []
-  for (let index = Math.ceil(low / step - 1e-9); index * step <= high + step * 1e-9; index++)
-    found.push(Number((index * step).toPrecision(12)))
-  return found
+function ticks(low: number, high: number, steps?: readonly number[]): number[] {
+  return high <= low ? [low] : rounds(low, high, steps)
 }
 
 const fixed = (value: number) => value.toFixed(1)

@@ -73,7 +73,7 @@ export function chartOfCurves(
     }
     return [...thin, mean]
   })
-  return { x: lines.length > 0 ? curves.steps : [], lines }
+  return { x: lines.length > 0 ? (curves.x ?? curves.steps) : [], lines }
 }
 
 /** Performance profiles: the mean over seeds of each training with its interval; x is the score. */

@@ -15,7 +15,10 @@ import table from './ExperimentTable.module.css'
 import { Panel } from './ui'
 import ui from './ui.module.css'
 
-const score = (value: number) => significant(value, 2)
+const SCORE = {
+  title: 'Score: path efficiency of an arrival, else 0',
+  format: (value: number) => significant(value, 2),
+}
 
 interface ComparisonDistributionsProps {
   comparison: Comparison
@@ -41,8 +44,7 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
           data={chart}
           format={percent}
           yRange={[0, 1.02]}
-          xTitle="Score: path efficiency of an arrival, else 0"
-          xFormat={score}
+          x={SCORE}
           empty={error && !data ? 'Could not be loaded' : data ? 'Nothing evaluated yet' : ''}
         />
         <div className={classes.column}>

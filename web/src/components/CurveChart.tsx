@@ -2,9 +2,12 @@
 import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo } from 'react'
 import { $api } from '../api/client'
+import type { Curves } from '../api/types'
+import { ACROSS, type Across, isTime } from '../charts/across'
 import { MetricChart } from '../charts/MetricChart'
 import { chartOfCurves } from '../charts/shape'
-import { compact, percent } from '../lib/format'
+import type { ChartView } from '../charts/view'
+import { compact, percent, plural } from '../lib/format'
 
 const POINTS = 400
 /** Single seeds, of all experiments together: more lines are a blur, and slow. */
@@ -31,18 +34,20 @@ export const COMPARED = [
   { name: 'eval/steps', title: 'Steps to the target', note: 'evaluation', format: compact },
 ] as const
 
-export function CurveChart({
-  metric,
-  experiments,
-}: {
+interface CurveChartProps {
   metric: (typeof COMPARED)[number]
   experiments: readonly string[]
-}) {
+  view: ChartView
+}
+
+export function CurveChart({ metric, experiments, view }: CurveChartProps) {
   const { name, ...look } = metric
+  const { across } = view
+  const query = { experiment: [...experiments], name, points: POINTS, lines: LINES }
   const { data, error } = $api.useQuery(
     'get',
     '/api/compare/curves',
-    { params: { query: { experiment: [...experiments], name, points: POINTS, lines: LINES } } },
+    { params: { query: across === 'steps' ? query : { ...query, x: across } } },
     { placeholderData: keepPreviousData },
   )
   const chart = useMemo(() => (data ? chartOfCurves(data) : { x: [], lines: [] }), [data])
@@ -50,7 +55,47 @@ export function CurveChart({
     <MetricChart
       {...look}
       data={chart}
-      empty={error && !data ? 'Could not be loaded' : data ? 'No value yet' : ''}
+      x={ACROSS[data?.across ?? across]}
+      foot={data ? gridOf(data) : null}
+      empty={error && !data ? 'Could not be loaded' : data ? (leftOut(data) ?? 'No value yet') : ''}
     />
   )
+}
+
+/** On what the means are taken, where that is not simply every step that was reported; null where it is. */
+function gridOf(curves: Curves): string | null {
+  const { across, spacing, steps, x } = curves
+  const places = (x ?? steps).length
+  if (places === 0 || (across === 'steps' && spacing === 'points')) return null
+  const grid = GRIDS[spacing](plural(places, isTime(across) ? 'time' : across === 'steps' ? 'step' : 'count'))
+  const ends = across === 'steps' ? 'a seed' : 'until the first seed is through; each'
+  return [`${grid}, ${ends} interpolated between its own points`, leftOut(curves)].filter(Boolean).join('. ')
+}
+
+const GRIDS: Record<Curves['spacing'], (places: string) => string> = {
+  points: (places) => `Means at the ${places} of all points`,
+  even: (places) => `Means at ${places} evenly spaced`,
+  logarithmic: (places) => `Means at ${places} spaced by equal factors`,
+}
+
+/** Runs of which it is not known where they lie; null where there is none. */
+function leftOut({ across, experiments }: Curves): string | null {
+  const runs = experiments.reduce((sum, { unplaced }) => sum + unplaced, 0)
+  if (runs === 0) return null
+  return `${plural(runs, 'run')} left out: ${ACROSS[across].label} was not counted when ${runs === 1 ? 'it' : 'they'} trained`
+}
+
+/** What x may be of charts of these experiments, as far as it is told. */
+export function useKnownAcross(experiments: readonly string[]): (across: Across) => boolean {
+  const { data } = $api.useQuery(
+    'get',
+    '/api/compare/metrics',
+    { params: { query: { experiment: [...experiments] } } },
+    { placeholderData: keepPreviousData },
+  )
+  return (across) => {
+    const { counter } = ACROSS[across]
+    const reported = data?.metrics ?? []
+    return counter === undefined || reported.length === 0 || reported.some(({ name }) => name === counter)
+  }
 }

@@ -103,3 +103,40 @@ test('with none chosen there is a list to choose from', async () => {
   expect(router.state.location.search).toBe('?experiment=exp1')
   expect(await screen.findByTestId('figures')).toBeInTheDocument()
 })
+
+test('curves over time under way: in the address, on a grid that is told, and who is left out', async () => {
+  const overTime = {
+    ...curves,
+    across: 'wall',
+    spacing: 'even',
+    steps: [],
+    x: [0, 3_600, 7_200],
+    experiments: curves.experiments.map((one, index) => ({ ...one, unplaced: index })),
+  }
+  const server = startServer({
+    ...routes,
+    'GET /api/compare/curves': (request) =>
+      new URL(request.url).searchParams.get('x') === 'wall' ? overTime : curves,
+    'GET /api/compare/metrics': {
+      runs: 3,
+      metrics: [
+        { name: 'time/wall_seconds', runs: 2 },
+        { name: 'train/return', runs: 3 },
+      ],
+    },
+  })
+  const { router, user } = open('/compare?experiment=exp1&experiment=exp2')
+  const axis = await screen.findByRole('combobox', { name: 'Horizontal axis' })
+  expect(await within(axis).findByRole('option', { name: 'CPU time, not counted' })).toBeDisabled()
+  await user.selectOptions(axis, 'Wall time')
+  expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2&x=wall')
+  await waitFor(() => expect(server.asked.some((path) => path.includes('x=wall'))).toBe(true))
+  const [foot] = await screen.findAllByText(
+    /^Means at 3 times evenly spaced, until the first seed is through; each/,
+  )
+  expect(foot).toHaveTextContent('1 run left out: Wall time was not counted when it trained')
+
+  await user.selectOptions(axis, 'Steps')
+  expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
+  expect(screen.queryByText(/evenly spaced/)).not.toBeInTheDocument()
+})

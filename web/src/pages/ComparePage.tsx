@@ -7,10 +7,12 @@ import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
+import { useChartView } from '../charts/view'
+import { ChartControls } from '../components/ChartControls'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
 import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts'
-import { COMPARED, CurveChart } from '../components/CurveChart'
+import { COMPARED, CurveChart, useKnownAcross } from '../components/CurveChart'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
 import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
@@ -143,6 +145,8 @@ interface ChosenProps {
 function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
   const held = base === EVERY_PAIR ? { pairs: true } : base === chosen[0] ? {} : { base }
   const query = comparisonQuery(chosen, margin, held)
+  const [view, setView] = useChartView()
+  const isKnown = useKnownAcross(chosen)
   const { data, error, refetch } = $api.useQuery(
     'get',
     '/api/compare',
@@ -201,15 +205,18 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
           <Panel
             title="Curves"
             actions={
-              <Text size="xs" c="dimmed">
-                thin: single seeds · bold: their mean · band: 95 % interval over seeds
-              </Text>
+              <Group gap="md">
+                <Text size="xs" c="dimmed">
+                  thin: single seeds · bold: their mean · band: 95 % interval over seeds
+                </Text>
+                <ChartControls view={view} onView={setView} isKnown={isKnown} />
+              </Group>
             }
           >
-            <LinkedCharts>
+            <LinkedCharts of={view.across}>
               <div className={charts.grid}>
                 {COMPARED.map((metric) => (
-                  <CurveChart key={metric.name} metric={metric} experiments={chosen} />
+                  <CurveChart key={metric.name} metric={metric} experiments={chosen} view={view} />
                 ))}
               </div>
             </LinkedCharts>

@@ -5,10 +5,13 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Experiment } from '../api/types'
+import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
+import { useChartView } from '../charts/view'
 import { Below } from '../components/Below'
+import { ChartControls } from '../components/ChartControls'
 import { Configuration } from '../components/Configuration'
-import { COMPARED, CurveChart } from '../components/CurveChart'
+import { COMPARED, CurveChart, useKnownAcross } from '../components/CurveChart'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { ExperimentLineage } from '../components/Lineage'
@@ -163,13 +166,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         </Panel>
         <Below height={1_400}>
           <ExperimentLineage experimentId={experiment.id} />
-          <Panel title="Curves">
-            <div className={charts.grid}>
-              {COMPARED.map((metric) => (
-                <CurveChart key={metric.name} metric={metric} experiments={[experiment.id]} />
-              ))}
-            </div>
-          </Panel>
+          <Curves experimentId={experiment.id} />
           <Panel title="Configuration">
             <Configuration training={experiment.training} />
           </Panel>
@@ -177,5 +174,21 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         </Below>
       </Stack>
     </Page>
+  )
+}
+
+function Curves({ experimentId }: { experimentId: string }) {
+  const [view, setView] = useChartView()
+  const isKnown = useKnownAcross([experimentId])
+  return (
+    <Panel title="Curves" actions={<ChartControls view={view} onView={setView} isKnown={isKnown} />}>
+      <LinkedCharts of={view.across}>
+        <div className={charts.grid}>
+          {COMPARED.map((metric) => (
+            <CurveChart key={metric.name} metric={metric} experiments={[experimentId]} view={view} />
+          ))}
+        </div>
+      </LinkedCharts>
+    </Panel>
   )
 }

@@ -570,3 +570,40 @@ test('a run that is not there', async () => {
   open('/runs/gone')
   expect(await screen.findByText('There is no such run')).toBeInTheDocument()
 })
+
+test('a link to curves over episodes shows them, and what the trainer did not count is said', async () => {
+  const series = (name: string, values: number[]) => ({
+    name,
+    steps: [4096, 8192],
+    values,
+    min: null,
+    max: null,
+  })
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/metrics': {
+      series: [series('train/episodes', [12, 40]), series('train/success_rate', [0.1, 0.4])],
+      attempt: 1,
+      since: null,
+    },
+  })
+  const { user } = open('/runs/run1?x=episodes')
+  const main = within(await screen.findByTestId('main-curves'))
+  await waitFor(() =>
+    expect(main.getByRole('figure', { name: 'Success rate' })).toHaveAttribute('data-step', '40'),
+  )
+  const axis = main.getByRole('combobox', { name: 'Horizontal axis' })
+  expect(axis).toHaveValue('episodes')
+  expect(within(axis).getByRole('option', { name: 'Wall time, not counted' })).toBeDisabled()
+  await user.selectOptions(axis, 'Steps')
+  expect(main.getByRole('figure', { name: 'Success rate' })).toHaveAttribute('data-step', '8192')
+})
+
+test('a run from before time was counted says so in place of its curves', async () => {
+  startServer(routes)
+  open('/runs/run1?x=wall')
+  const main = within(await screen.findByTestId('main-curves'))
+  expect(
+    (await main.findAllByText('Wall time was not counted when this run trained')).length,
+  ).toBeGreaterThan(0)
+})

@@ -7,12 +7,16 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Checkpoint, CheckpointPage, RunDetail, Series } from '../api/types'
+import { ACROSS, type Across, isCounted, placed } from '../charts/across'
 import { useCurves } from '../charts/following'
+import { LinkedCharts } from '../charts/LinkedCharts'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
 import { chartOf } from '../charts/shape'
+import { useChartView } from '../charts/view'
 import { Below } from '../components/Below'
+import { ChartControls } from '../components/ChartControls'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
@@ -101,9 +105,25 @@ function LoadedRun({ run }: { run: RunDetail }) {
     setWatched(checkpoint.step)
     view.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
   }
-  const series = metrics.data?.series ?? []
+  const [looks, setLooks] = useChartView()
+  const reported = metrics.data?.series ?? NO_SERIES
+  const series = useMemo(() => placed(reported, looks.across), [reported, looks.across])
   const waiting =
-    run.state === 'queued' ? 'Curves start with the training' : metrics.isPending ? '' : 'No value yet'
+    run.state === 'queued'
+      ? 'Curves start with the training'
+      : metrics.isPending
+        ? ''
+        : series === null && reported.length > 0
+          ? `${ACROSS[looks.across].label} was not counted when this run trained`
+          : 'No value yet'
+  const drawn = { series: series ?? NO_SERIES, across: looks.across, empty: waiting }
+  const controls = (
+    <ChartControls
+      view={looks}
+      onView={setLooks}
+      isKnown={(across) => reported.length === 0 || isCounted(reported, across)}
+    />
+  )
 
   return (
     <Page
@@ -126,103 +146,106 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       actions={<RunActions run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />}
     >
-      <Stack gap="md">
-        <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
-        {run.error && (
-          <Notice bad title={run.state === 'failed' ? 'This run failed' : 'What happened'}>
-            <Text size="sm" className={classes.error}>
-              {run.error}
-            </Text>
-          </Notice>
-        )}
-        <WaitsForExtensions extensions={run.waits_for} />
-        <UnreadableSettings names={run.unreadable} lacking={run.lacking} />
-        <div className={classes.stage}>
-          <Panel flush>
-            <div ref={view} className={classes.episodes} />
-            <RunLiveView
-              key={run.id}
-              runId={run.id}
-              state={run.state}
-              kept={checkpoints.data && checkpoints.data.total > 0}
-              covered={lapse !== null || (episode !== null && chosen?.evaluation != null)}
-              checkpoint={shown}
-            />
-            {way.length > 0 && (
-              <LearningSlider
-                steps={way}
-                chosen={shown}
-                onChoose={setWatched}
-                own={!isActive(run.state) ? 'The best policy of the run' : 'What the run does now'}
-                onLapse={way.some(({ success }) => success !== null) ? () => setLapse(1) : undefined}
-              />
-            )}
-          </Panel>
-          <Panel data-testid="main-curves">
-            <VisuallyHidden component="h2">Main curves</VisuallyHidden>
-            <Stack gap="md">
-              {MAIN_CHARTS.map((spec) => (
-                <SpecChart key={spec.title} spec={spec} series={series} height={214} empty={waiting} />
-              ))}
-            </Stack>
-          </Panel>
-        </div>
-        <Below height={1_600} now={episode !== null || step !== null}>
-          <Diagnoses runId={run.id} state={run.state} />
-          <Panel title="Curves">
-            <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
-              <Tabs.List mb="md" className={classes.tabs}>
-                {SECTIONS.map(({ title }) => (
-                  <Tabs.Tab key={title} value={title}>
-                    {title}
-                  </Tabs.Tab>
-                ))}
-              </Tabs.List>
-              {SECTIONS.map(({ title, charts }) => (
-                <Tabs.Panel key={title} value={title}>
-                  <div className={grid.grid}>
-                    {charts.map((spec) => (
-                      <SpecChart key={spec.title} spec={spec} series={series} height={180} empty={waiting} />
-                    ))}
-                  </div>
-                </Tabs.Panel>
-              ))}
-            </Tabs>
-          </Panel>
-          <Panel title="Checkpoints" flush>
-            {checkpoints.data ? (
-              <>
-                <CheckpointTable
-                  checkpoints={bestFirst(checkpoints.data)}
-                  chosen={chosen}
-                  onChoose={choose}
-                  onWatch={watch}
-                />
-                <Pager
-                  page={page}
-                  size={CHECKPOINTS_A_PAGE}
-                  total={checkpoints.data.total}
-                  label="Pages of checkpoints"
-                  onChange={setPage}
-                />
-              </>
-            ) : checkpoints.error ? (
-              <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
-            ) : (
-              <Skeleton height={120} m="md" w="auto" />
-            )}
-          </Panel>
-          <RunLineage runId={run.id} />
-          {chosen?.evaluation && (
-            <div ref={episodes} className={classes.episodes}>
-              <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>
-                <CheckpointEpisodes key={chosen.id} checkpoint={chosen} />
-              </Panel>
-            </div>
+      <LinkedCharts of={looks.across}>
+        <Stack gap="md">
+          <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
+          {run.error && (
+            <Notice bad title={run.state === 'failed' ? 'This run failed' : 'What happened'}>
+              <Text size="sm" className={classes.error}>
+                {run.error}
+              </Text>
+            </Notice>
           )}
-          <RunLog runId={run.id} state={run.state} />
-        </Below>
-      </Stack>
+          <WaitsForExtensions extensions={run.waits_for} />
+          <UnreadableSettings names={run.unreadable} lacking={run.lacking} />
+          <div className={classes.stage}>
+            <Panel flush>
+              <div ref={view} className={classes.episodes} />
+              <RunLiveView
+                key={run.id}
+                runId={run.id}
+                state={run.state}
+                kept={checkpoints.data && checkpoints.data.total > 0}
+                covered={lapse !== null || (episode !== null && chosen?.evaluation != null)}
+                checkpoint={shown}
+              />
+              {way.length > 0 && (
+                <LearningSlider
+                  steps={way}
+                  chosen={shown}
+                  onChoose={setWatched}
+                  own={!isActive(run.state) ? 'The best policy of the run' : 'What the run does now'}
+                  onLapse={way.some(({ success }) => success !== null) ? () => setLapse(1) : undefined}
+                />
+              )}
+            </Panel>
+            <Panel data-testid="main-curves">
+              <VisuallyHidden component="h2">Main curves</VisuallyHidden>
+              <Stack gap="md">
+                {controls}
+                {MAIN_CHARTS.map((spec) => (
+                  <SpecChart key={spec.title} spec={spec} height={214} {...drawn} />
+                ))}
+              </Stack>
+            </Panel>
+          </div>
+          <Below height={1_600} now={episode !== null || step !== null}>
+            <Diagnoses runId={run.id} state={run.state} />
+            <Panel title="Curves" actions={controls}>
+              <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
+                <Tabs.List mb="md" className={classes.tabs}>
+                  {SECTIONS.map(({ title }) => (
+                    <Tabs.Tab key={title} value={title}>
+                      {title}
+                    </Tabs.Tab>
+                  ))}
+                </Tabs.List>
+                {SECTIONS.map(({ title, charts }) => (
+                  <Tabs.Panel key={title} value={title}>
+                    <div className={grid.grid}>
+                      {charts.map((spec) => (
+                        <SpecChart key={spec.title} spec={spec} height={180} {...drawn} />
+                      ))}
+                    </div>
+                  </Tabs.Panel>
+                ))}
+              </Tabs>
+            </Panel>
+            <Panel title="Checkpoints" flush>
+              {checkpoints.data ? (
+                <>
+                  <CheckpointTable
+                    checkpoints={bestFirst(checkpoints.data)}
+                    chosen={chosen}
+                    onChoose={choose}
+                    onWatch={watch}
+                  />
+                  <Pager
+                    page={page}
+                    size={CHECKPOINTS_A_PAGE}
+                    total={checkpoints.data.total}
+                    label="Pages of checkpoints"
+                    onChange={setPage}
+                  />
+                </>
+              ) : checkpoints.error ? (
+                <QueryError error={checkpoints.error} what="checkpoints" retry={checkpoints.refetch} />
+              ) : (
+                <Skeleton height={120} m="md" w="auto" />
+              )}
+            </Panel>
+            <RunLineage runId={run.id} />
+            {chosen?.evaluation && (
+              <div ref={episodes} className={classes.episodes}>
+                <Panel title={`Episodes of step ${count(chosen.step)} on ${chosen.evaluation.suite}`} flush>
+                  <CheckpointEpisodes key={chosen.id} checkpoint={chosen} />
+                </Panel>
+              </div>
+            )}
+            <RunLog runId={run.id} state={run.state} />
+          </Below>
+        </Stack>
+      </LinkedCharts>
       {lapse !== null && <LapseDialog runId={run.id} onClose={() => setLapse(null)} />}
     </Page>
   )
@@ -250,17 +273,20 @@ function useChosen(
   return wanted?.evaluation ? wanted : (shown?.best ?? undefined)
 }
 
+const NO_SERIES: readonly Series[] = []
+
 interface SpecChartProps {
   spec: ChartSpec
   series: readonly Series[]
+  across: Across
   height: number
   empty: string
 }
 
-function SpecChart({ spec, series, height, empty }: SpecChartProps) {
+function SpecChart({ spec, series, across, height, empty }: SpecChartProps) {
   const data = useMemo(() => chartOf(spec, series), [spec, series])
   const { metrics: _, ...look } = spec
-  return <MetricChart {...look} data={data} height={height} empty={empty} />
+  return <MetricChart {...look} data={data} x={ACROSS[across]} height={height} empty={empty} />
 }
 
 interface OfRun {

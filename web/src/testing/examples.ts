@@ -336,7 +336,10 @@ export const field: FieldMatrix = {
 
 export const curves: Curves = {
   name: 'eval/success_rate',
+  across: 'steps',
+  spacing: 'points',
   steps: [0, 100, 200],
+  x: null,
   experiments: [
     {
       id: 'exp1',
@@ -349,6 +352,7 @@ export const curves: Curves = {
       low: [0.1, 0.5, null],
       high: [0.3, 0.7, null],
       count: [2, 2, 1],
+      unplaced: 0,
     },
     {
       id: 'exp2',
@@ -358,6 +362,7 @@ export const curves: Curves = {
       low: [null, null, null],
       high: [null, null, null],
       count: [1, 1, 1],
+      unplaced: 0,
     },
   ],
 }

@@ -57,8 +57,7 @@ export function ReplayCharts({ query, time, onSeek }: ReplayChartsProps) {
               data={data}
               label={TITLES[chart]}
               height={HEIGHT}
-              xTitle="Seconds"
-              xFormat={seconds}
+              x={SECONDS}
               format={threeDigits}
               at={pointing ? null : time}
               onSeek={onSeek}
@@ -70,5 +69,5 @@ export function ReplayCharts({ query, time, onSeek }: ReplayChartsProps) {
   )
 }
 
-const seconds = (value: number) => value.toFixed(1)
+const SECONDS = { title: 'Seconds', format: (value: number) => value.toFixed(1) }
 const threeDigits = (value: number) => significant(value, 3)

@@ -1,0 +1,36 @@
+/** How all charts of a page are looked at: what x is. */
+import { Group, NativeSelect, Text } from '@mantine/core'
+import { ACROSS, type Across } from '../charts/across'
+import type { ChartView } from '../charts/view'
+
+interface ChartControlsProps {
+  view: ChartView
+  onView: (change: Partial<ChartView>) => void
+  /** Whether what x would be is known of any of the runs. */
+  isKnown: (across: Across) => boolean
+}
+
+export function ChartControls({ view, onView, isKnown }: ChartControlsProps) {
+  const options = (Object.keys(ACROSS) as Across[]).map((value) => {
+    const known = isKnown(value)
+    return {
+      value,
+      label: known ? ACROSS[value].label : `${ACROSS[value].label}, not counted`,
+      disabled: !known,
+    }
+  })
+  return (
+    <Group gap="xs" wrap="nowrap">
+      <Text size="xs" c="dimmed" aria-hidden>
+        Horizontal axis
+      </Text>
+      <NativeSelect
+        size="xs"
+        aria-label="Horizontal axis"
+        value={view.across}
+        data={options}
+        onChange={(event) => onView({ across: event.currentTarget.value as Across })}
+      />
+    </Group>
+  )
+}
