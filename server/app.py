@@ -17,6 +17,8 @@ from server.audit import endpoints as audit
 from server.checkpoints import endpoints as checkpoints
 from server.checkpoints.archives import keep_swept
 from server.comparison import endpoints as comparison
+from server.curve_thinning import endpoints as curve_thinning
+from server.curve_thinning.sweep import keep_curves_thinned
 from server.data_export import endpoints as data_export
 from server.database.engine import Database
 from server.database.migrate import upgrade
@@ -119,6 +121,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     suites.router,
     uploads.router,
     storage.router,
+    curve_thinning.router,
     monitoring.router,
 )
 
@@ -136,6 +139,7 @@ BACKGROUND: tuple[Background, ...] = (
     keep_indexed,
     keep_emptied,
     keep_thinned,
+    keep_curves_thinned,
     keep_studying,
     keep_alerting,
 )

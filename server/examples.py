@@ -75,6 +75,7 @@ BODIES: dict[str, Any] = {
     },
     "POST /api/uploads": {"name": "From elsewhere", "content": _ONNX, "task": {"arena": {"name": "complex"}}},
     "PUT /api/experiments/{experiment_id}/thinning": {"rule": {"last": 5, "every": 10, "best": True}},
+    "PUT /api/experiments/{experiment_id}/curve-thinning": {"rule": {"points": 1_000, "after_days": 30}},
 }
 """The body of each request, by method and path."""
 
@@ -89,6 +90,7 @@ ANSWERS: dict[str, Any] = {
             {"name": "eval/success_rate", "steps": [16_384], "values": [0.62], "min": None, "max": None},
         ],
         "attempt": 1,
+        "thinned": None,
         "since": None,
     },
     "GET /api/runs/{run_id}/events": [

@@ -57,6 +57,8 @@ class Services:
     pulse: Pulse = field(default_factory=Pulse)
     # Of the sweep that removes what rules have taken.
     storage_wake: Wake = field(default_factory=Wake)
+    # Of the sweep that thins curves.
+    curves_wake: Wake = field(default_factory=Wake)
     login_limiter: GuessLimiter = field(init=False)
     gate: Gate = field(init=False)
     provider: Provider | None = field(init=False)
@@ -77,7 +79,7 @@ class Services:
         return {experiment_id: project_id for experiment_id, (project_id,) in found.items()}
 
 
-async def _services(connection: HTTPConnection) -> Services:
+def _services(connection: HTTPConnection) -> Services:
     services: Services = connection.app.state.services
     return services
 

@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from server.curve_thinning.rule import CurveRule
 from server.people.oidc.settings import OidcSettings, check_right, is_safe_url
 from server.runs.limits import Limits
 from server.storage.rule import KeepRule
@@ -148,6 +149,12 @@ class Settings(BaseSettings):
         None,
         description='Which checkpoints of each run stay, where an experiment has no rule of its own, as JSON: `{"last": 3, '
         '"every": 10, "best": true}` keeps the newest 3, one in 10 and the best; all if not given.',
+    )
+    thin_curves: CurveRule | None = Field(
+        None,
+        description="How fine curves of runs stay that ended long ago, where an experiment has no rule of its own, as JSON: "
+        '`{"points": 1000, "after_days": 30}` leaves 1000 points of each metric, each with the smallest, mean and largest '
+        "value of those that it stands for; all if not given.",
     )
     min_free_disk_bytes: int = Field(
         2**30, ge=0, description="Free on each disk: with less, `mapless doctor` and the page *Storage* say so."

@@ -24,7 +24,7 @@ from sim.config import ArenaConfig, ArenaName
 router = APIRouter(prefix="/api/arenas", tags=["arenas"])
 
 
-async def _service(services: ServicesDep) -> ArenaService:
+def _service(services: ServicesDep) -> ArenaService:
     return ArenaService(services)
 
 

@@ -19,7 +19,7 @@ router = APIRouter(tags=["checkpoints"])
 _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}}
 
 
-async def _service(services: ServicesDep) -> CheckpointService:
+def _service(services: ServicesDep) -> CheckpointService:
     return CheckpointService(services)
 
 

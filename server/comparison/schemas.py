@@ -102,6 +102,7 @@ class SeedCurve(Schema):
 
     seed: int
     values: list[float | None]
+    thinned: bool = Field(False, description="Curves of this run were thinned: of neighbouring points their means are left.")
 
 
 class ExperimentCurves(Schema):

@@ -30,12 +30,10 @@ from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
+from server.metrics.thinning import EVALUATIONS
 from server.services import Services
 from workers.statistics.improvement import performance_profile
 from workers.statistics.seeds import means_band, rates_band
-
-# Of metrics that every evaluation counts over its suite's episodes.
-_EVALUATION = "eval/"
 
 MOST_IN_PAIRS = 12
 """Experiments whose every pair is judged: 66 pairs."""
@@ -204,7 +202,7 @@ def _curves(
 ) -> ExperimentCurves:
     values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
     driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
-    counted = name.startswith(_EVALUATION) and driven[np.isfinite(values).any(axis=1)].all()
+    counted = name.startswith(EVALUATIONS) and driven[np.isfinite(values).any(axis=1)].all()
     if not is_rate(name):
         mean, low, high = means_band(values)
     else:
@@ -215,7 +213,11 @@ def _curves(
         id=experiment.id,
         name=experiment.name,
         seeds=[
-            SeedCurve(seed=run.seed, values=json_numbers(row))
+            SeedCurve(
+                seed=run.seed,
+                values=json_numbers(row),
+                thinned=run.thinned_at is not None and not name.startswith(EVALUATIONS),
+            )
             for run, row in zip(experiment.runs[:shown], values[:shown], strict=True)
         ],
         mean=json_numbers(mean),
@@ -229,6 +231,12 @@ def _curves(
 def _warnings(experiments: Sequence[tables.Experiment], compared: Sequence[FinalFigures]) -> list[str]:
     warnings = []
     for experiment, figures in zip(experiments, compared, strict=True):
+        thinned = sum(run.thinned_at is not None for run in experiment.runs)
+        if thinned:
+            warnings.append(
+                f"Curves of {thinned} of {len(experiment.runs)} runs of {experiment.name} were thinned to means of "
+                "neighbouring points. Its figures are not touched by that."
+            )
         if figures.seeds == 0:
             warnings.append(f"{experiment.name} has not been evaluated yet.")
             continue

@@ -30,9 +30,11 @@ def mean_rows(curves: Curves) -> Iterator[bytes]:
 
 
 def seed_rows(curves: Curves) -> Iterator[bytes]:
-    """A row for each run and step."""
-    yield csv_rows([("experiment", "name", "seed", "metric", "step", "value")])
+    """A row for each run and step; whether its points were thinned stands behind it where any were."""
+    wide = any(of_seed.thinned for one in curves.experiments for of_seed in one.seeds)
+    yield csv_rows([("experiment", "name", "seed", "metric", "step", "value", *(["thinned"] if wide else []))])
     for one in curves.experiments:
         for of_seed in one.seeds:
+            said = (str(of_seed.thinned).lower(),) if wide else ()
             columns = zip(curves.steps, of_seed.values, strict=True)
-            yield csv_rows([(one.id, one.name, of_seed.seed, curves.name, *row) for row in columns])
+            yield csv_rows([(one.id, one.name, of_seed.seed, curves.name, *row, *said) for row in columns])

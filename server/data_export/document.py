@@ -8,6 +8,7 @@ from server.checkpoints.repository import CheckpointRepository, decode_episodes
 from server.data_export.schemas import ExportedEvaluation, ExportedExperiment, ExportedRun
 from server.database import tables
 from server.database.engine import Database
+from server.metrics.views import thinned_view
 from server.runs.repository import RunRepository
 
 
@@ -53,6 +54,7 @@ def _run(session: Session, run_id: str) -> ExportedRun:
         created_at=run.created_at,
         started_at=run.started_at,
         finished_at=run.finished_at,
+        thinned=thinned_view(run),
         final_evaluation=None
         if evaluation is None
         else ExportedEvaluation(

@@ -1,11 +1,13 @@
-"""TensorBoard's event files, written without TensorBoard: scalars only, a few thousand records at a time.
+"""TensorBoard's event files, written without TensorBoard: scalars a few thousand records at a time, and one text.
 
 A record is the length of an `Event` (8 bytes, little-endian), the masked CRC-32C of these, the event, and its own.
 Of the protocol buffers only this is needed:
 
     Event: wall_time = 1 (double), step = 2 (int64), file_version = 3 (string), summary = 5 (Summary)
     Summary: value = 1 (Value)
-    Value: tag = 1 (string), simple_value = 2 (float)
+    Value: tag = 1 (string), simple_value = 2 (float); of a text: tensor = 8 (TensorProto), metadata = 9 (SummaryMetadata)
+    TensorProto: dtype = 1 (7 for strings), string_val = 8 (bytes)
+    SummaryMetadata: plugin_data = 1, of which plugin_name = 1 (string); data_class = 4 (2 for tensors)
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,6 +20,8 @@ from server.metrics.points import Points
 # A field's number and how it is written, as protocol buffers have it before each field.
 _WALL_TIME, _STEP, _FILE_VERSION, _SUMMARY = b"\x09", b"\x10", b"\x1a", b"\x2a"
 _VALUE, _TAG, _SIMPLE_VALUE = b"\x0a", b"\x0a", b"\x15"
+_TENSOR, _METADATA, _STRING_DTYPE, _STRING, _TENSOR_CLASS = b"\x42", b"\x4a", b"\x08\x07", b"\x42", b"\x20\x02"
+_NOTE = b"mapless/thinned"
 # From this version on steps may go back between series.
 _VERSION = b"brain.Event:2"
 _MAX_STEP_BYTES = 9
@@ -25,14 +29,20 @@ _MAX_STEP_BYTES = 9
 Bytes = NDArray[np.uint8]
 
 
-def event_file(began: float, series: Iterable[tuple[str, Points]]) -> Iterator[bytes]:
+def event_file(began: float, series: Iterable[tuple[str, Points]], note: str | None = None) -> Iterator[bytes]:
     """The points as an event file, block by block; what was not finite is nan.
 
     Args:
         began: when the run did, in seconds since the epoch.
         series: pieces of series by name, steps not negative.
+        note: a text for who looks at them.
     """
     yield _records([_WALL_TIME, _doubles(np.array([began])), _FILE_VERSION, _sized(_VERSION)], 1)
+    if note is not None:
+        plugin = b"\x0a" + _sized(b"\x0a" + _sized(b"text")) + _TENSOR_CLASS
+        tensor = _STRING_DTYPE + _STRING + _sized(note.encode())
+        value = _TAG + _sized(_NOTE) + _TENSOR + _sized(tensor) + _METADATA + _sized(plugin)
+        yield _records([_WALL_TIME, _doubles(np.array([began])), _SUMMARY, _sized(_VALUE + _sized(value))], 1)
     for name, points in series:
         tag = _TAG + _sized(name.encode())
         value = _VALUE + _varint(len(tag) + 5) + tag + _SIMPLE_VALUE

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from server.comparison.schemas import Comparison, Curves
 from server.database.tables import RunState
+from server.metrics.schemas import Thinned
 from server.schemas import Schema
 from workers.reporting import EpisodeResult
 
@@ -33,6 +34,7 @@ class ExportedRun(Schema):
     created_at: float
     started_at: float | None
     finished_at: float | None
+    thinned: Thinned | None = Field(None, description="What was done to its curves; null where every point is kept.")
     final_evaluation: ExportedEvaluation | None = Field(description="Of its last evaluated checkpoint.")
 
 

@@ -12,8 +12,8 @@ from server.data_export.document import document, exported
 from server.data_export.event_file import event_file
 from server.data_export.files import OutgoingFile
 from server.data_export.schemas import ExportedComparison, ExportedExperiment
-from server.data_export.series import read_series
-from server.data_export.table import HEADING, point_rows
+from server.data_export.series import read_run, said_of, with_edges
+from server.data_export.table import HEADING, WIDE_HEADING, point_rows
 from server.data_export.zips import zipped
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
@@ -115,12 +115,15 @@ class DataExportService:
         return OutgoingFile(f"{stem}.csv", "text/csv; charset=utf-8", self._table(runs))
 
     def _events(self, run_id: str, began: float) -> Iterator[bytes]:
-        return event_file(began, read_series(self._database, run_id))
+        series = read_run(self._database, run_id)
+        return event_file(began, with_edges(series), said_of(series))
 
     def _table(self, runs: dict[str, int]) -> Iterator[bytes]:
-        yield HEADING
+        with self._database.read() as session:
+            wide = RunRepository(session).any_thinned(list(runs))
+        yield WIDE_HEADING if wide else HEADING
         for run_id, seed in runs.items():
-            yield from point_rows(run_id, seed, read_series(self._database, run_id))
+            yield from point_rows(run_id, seed, read_run(self._database, run_id), wide=wide)
 
 
 def _note(session: Session, experiment: tables.Experiment, details: str, target: str | None = None) -> None:

@@ -87,6 +87,8 @@ class Experiment(Base):
     going_bytes: Mapped[int] = mapped_column(BigInteger, default=0, server_default="0")
     # Which of its checkpoints stay (`server.storage.rule`); null for what the installation's settings say.
     keep_rule: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    # How fine the curves of its runs stay; null for what the installation's settings say.
+    curve_rule: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
     runs: Mapped[list["Run"]] = relationship(
         back_populates="experiment", cascade="all, delete-orphan", passive_deletes=True, order_by="Run.seed"
@@ -196,7 +198,11 @@ class Run(Base):
     """
 
     __tablename__ = "runs"
-    __table_args__ = (Index("runs_by_state", "state"), Index("runs_by_end", "finished_at"))
+    __table_args__ = (
+        Index("runs_by_state", "state"),
+        Index("runs_by_end", "finished_at"),
+        Index("runs_by_thinning", "thins_at"),
+    )
 
     id: Mapped[str] = mapped_column(String(16), primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiments.id", ondelete="CASCADE"), index=True)
@@ -227,6 +233,14 @@ class Run(Base):
     final_suite: Mapped[str | None] = mapped_column(String(64))
     final_arrivals: Mapped[int | None] = mapped_column(Integer)
     final_episodes: Mapped[int | None] = mapped_column(Integer)
+    # When its curves are thinned, because a rule says so; null while they stay as they are.
+    thins_at: Mapped[float | None] = mapped_column(Float)
+    # No curve of it that could be thinned has more points; null where nobody has looked since it ended.
+    thin_enough: Mapped[int | None] = mapped_column(Integer)
+    # When they were thinned last; from how many points to how many, all series of `ThinnedSeries` together.
+    thinned_at: Mapped[float | None] = mapped_column(Float)
+    thinned_from: Mapped[int | None] = mapped_column(BigInteger)
+    thinned_to: Mapped[int | None] = mapped_column(BigInteger)
 
     experiment: Mapped[Experiment] = relationship(back_populates="runs")
 
@@ -327,6 +341,22 @@ class MetricSummary(Base):
     buckets: Mapped[int] = mapped_column(Integer)
     last_step: Mapped[int] = mapped_column(BigInteger)
     newest: Mapped[float | None] = mapped_column(Float)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ThinnedSeries(Base):
+    """What is left of a series' first points, up to `last_step`: `Buckets`, of which the chunks hold the means.
+
+    `points` counts what they stand for, `buckets` how many they are.
+    """
+
+    __tablename__ = "thinned_series"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    points: Mapped[int] = mapped_column(BigInteger)
+    buckets: Mapped[int] = mapped_column(Integer)
+    last_step: Mapped[int] = mapped_column(BigInteger)
     data: Mapped[bytes] = mapped_column(LargeBinary)
 
 

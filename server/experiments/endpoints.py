@@ -24,7 +24,7 @@ from workers.presets import PRESETS
 router = APIRouter(tags=["experiments"])
 
 
-async def _service(services: ServicesDep) -> ExperimentService:
+def _service(services: ServicesDep) -> ExperimentService:
     return ExperimentService(services)
 
 

@@ -59,7 +59,7 @@ class Kept:
         return headers
 
 
-async def _kept(
+def _kept(
     response: Response,
     tags: Annotated[
         str | None, Header(alias="If-None-Match", max_length=1_000, description="Tags of answers that one has.")

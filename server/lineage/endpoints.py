@@ -15,7 +15,7 @@ from server.services import ServicesDep
 router = APIRouter(tags=["lineage"])
 
 
-async def _service(services: ServicesDep) -> LineageService:
+def _service(services: ServicesDep) -> LineageService:
     return LineageService(services)
 
 

@@ -14,8 +14,10 @@ MAX_BUCKETS = 2_048
 # Widths that a summary is good enough for.
 SUMMARY_WIDTH = MAX_BUCKETS // 2
 _LEVEL = 3
-# Bytes of one bucket: step int64, points and finite points int32 each, smallest, mean and largest value float32.
-_BYTES = 28
+BUCKET_BYTES = 28
+"""Of one bucket before it is compressed: step int64, points and finite points int32 each, min, mean and max float32."""
+
+_NONE = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +43,7 @@ class Buckets:
     def __len__(self) -> int:
         return self.steps.size
 
-    def __getitem__(self, part: slice) -> "Buckets":
+    def __getitem__(self, part: slice | NDArray[np.intp]) -> "Buckets":
         return Buckets(
             self.steps[part], self.sizes[part], self.finite[part], self.low[part], self.mean[part], self.high[part]
         )
@@ -74,17 +76,25 @@ class Buckets:
         groups = (np.cumsum(self.sizes) - self.sizes) // width
         return self._grouped(np.flatnonzero(np.diff(groups, prepend=-1)))
 
-    def cut(self, limit: int) -> "Buckets":
-        """At most `limit` (at least 2) of them, as even in points as can be; the newest stands alone.
+    def cut(self, limit: int, stops: NDArray[np.int64] = _NONE) -> "Buckets":
+        """At most `limit` of them, as even in points as can be; the newest stands alone.
 
         Buckets keep what a person looks for and a selection of points would lose: the extremes as a band, the trend as the
         mean.
+
+        Args:
+            limit: at least 2, and two more for each stop.
+            stops: steps at which a bucket ends, the one up to it standing alone too.
         """
         if len(self) <= limit:
             return self
         begins = np.cumsum(self.sizes) - self.sizes
-        wanted = np.linspace(0, begins[-1], limit, dtype=np.int64)
-        return self._grouped(np.unique(np.searchsorted(begins, wanted)))
+        after = np.searchsorted(self.steps, stops, side="right")
+        alone = np.unique(np.concatenate([after - 1, after]))
+        # The first and the last bucket begin where they do anyway.
+        alone = alone[(alone > 0) & (alone < len(self) - 1)]
+        wanted = np.linspace(0, begins[-1], limit - alone.size, dtype=np.int64)
+        return self._grouped(np.union1d(alone, np.searchsorted(begins, wanted)))
 
     def _grouped(self, starts: NDArray[np.intp]) -> "Buckets":
         if not starts.size:
@@ -115,7 +125,7 @@ class Buckets:
             ValueError: `data` holds fewer.
         """
         raw = zlib.decompress(data)
-        kept, rest = divmod(len(raw), _BYTES)
+        kept, rest = divmod(len(raw), BUCKET_BYTES)
         if rest or kept < count:
             raise ValueError(f"{len(raw)} bytes are not {count} buckets")
         sizes, finite = (np.frombuffer(raw, "<i4", kept, at * kept).astype(np.int64) for at in (8, 12))

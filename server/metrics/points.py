@@ -34,7 +34,7 @@ class Points:
     def __len__(self) -> int:
         return self.steps.size
 
-    def __getitem__(self, part: slice) -> "Points":
+    def __getitem__(self, part: slice | NDArray[np.bool_]) -> "Points":
         return Points(self.steps[part], self.times[part], self.values[part])
 
     @classmethod

@@ -4,6 +4,7 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -17,6 +18,7 @@ from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.latest import set_latest
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized, summary_of
+from server.metrics.thinning import Thinned, ThinningRepository, joined, thinned_row
 
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
 COMPACT_AFTER = 500
@@ -55,6 +57,7 @@ class MetricRepository:
         self._session = session
         self._summaries = SummaryRepository(session)
         self._axes = AxisRepository(session)
+        self._thinning = ThinningRepository(session)
 
     def append(self, rows: Mapping[str, Sequence[ReportedRow]]) -> None:
         """Add rows that came in order, by run; those that are there already, as rows or in chunks, must not be among them.
@@ -102,6 +105,17 @@ class MetricRepository:
         newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
         self._set_latest(run_id, newest)
 
+    def thin(self, run_id: str, series: Sequence[Thinned]) -> None:
+        """Put what is left of these series in place of their points; none of those may wait as rows."""
+        names = [each.name for each in series]
+        for table in (tables.MetricChunk, tables.MetricSummary):
+            self._session.execute(delete(table).where(table.run_id == run_id, table.name.in_(names)))
+        for each in series:
+            self._add_chunks(run_id, each.name, each.points)
+        self._session.flush()
+        self._axes.drop_unused(run_id)
+        self._thinning.write(run_id, series)
+
     def add_packed(self, run_id: str, packed: "PackedSeries") -> None:
         """Add the series of a run that has none yet: nothing is left to compute while the database is held."""
         self._session.add_all(packed.rows)
@@ -127,6 +141,7 @@ class MetricRepository:
         self._session.flush()
         self._axes.drop_unused(run_id)
         self._summaries.cut(run_id, step)
+        self._thinning.forget_beyond(run_id, step)
         beyond = [tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step]
         lost = set(self._session.scalars(select(tables.LatestMetric.name).where(*beyond)))
         self._session.execute(delete(tables.LatestMetric).where(*beyond))
@@ -228,6 +243,7 @@ class MetricRepository:
         """
         summaries = self._summaries.of(run_ids, names) if limit <= SUMMARY_WIDTH else []
         known = {(summary.run_id, summary.name): summary for summary in summaries}
+        thinned = self._thinning.of(run_ids, names)
         read = self._read(run_ids, names, beyond_summaries=bool(known))
         curves: dict[str, dict[str, Buckets]] = {}
         for run_id, series in read.items():
@@ -235,7 +251,7 @@ class MetricRepository:
             for name in sorted({*series, *(name for run, name in known if run == run_id)}):
                 points, summary = series.get(name, Points.joined([])), known.get((run_id, name))
                 if summary is None:
-                    buckets = Buckets.of(points)
+                    buckets = joined(thinned.get((run_id, name)), points)
                 else:
                     after = int(np.searchsorted(points.steps, summary.last_step, side="right"))
                     buckets = Buckets.joined([summarized(summary), Buckets.of(points[after:])])
@@ -284,13 +300,13 @@ class MetricRepository:
         chunks = select(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.name == name)
         if known is not None:
             chunks = chunks.where(tables.MetricChunk.last_step > known.last_step)
+        before = summarized(known) if known is not None else self._thinning.of([run_id], [name]).get((run_id, name))
         self._session.flush()
         found = self._session.scalars(chunks.order_by(tables.MetricChunk.first_step))
         points = Points.joined([points for _, points in self._axes.decoded(found)])
-        if known is not None:
-            points = points[int(np.searchsorted(points.steps, known.last_step, side="right")) :]
-        if is_long or len(points) > _LONG:
-            self._summaries.write(run_id, name, known, points)
+        buckets = joined(before, points)
+        if is_long or len(buckets) > _LONG:
+            self._summaries.write(run_id, name, buckets)
 
     def _rows(self, run_id: str, from_step: int | None = None) -> list[WaitingRow]:
         return self._rows_of([run_id], from_step).get(run_id, [])
@@ -340,9 +356,17 @@ class PackedSeries:
     newest: Mapping[str, tuple[int, float]]
 
     @classmethod
-    def of(cls, run_id: str, series: Mapping[str, Points]) -> "PackedSeries":
-        """Packs series: the long part of bringing in a run, without a transaction."""
-        rows: list[tables.Base] = []
+    def of(
+        cls, run_id: str, series: Mapping[str, Points], thinned: Mapping[str, Buckets] = MappingProxyType({})
+    ) -> "PackedSeries":
+        """Packs series: the long part of bringing in a run, without a transaction.
+
+        Args:
+            run_id: of the run.
+            series: by name.
+            thinned: the buckets of those whose first points are means of these.
+        """
+        rows: list[tables.Base] = [thinned_row(run_id, name, buckets) for name, buckets in thinned.items()]
         axes: dict[str, tables.MetricAxis] = {}
         for name, points in series.items():
             for part in _chunked(points):
@@ -351,7 +375,7 @@ class PackedSeries:
                     axes[axis] = tables.MetricAxis(run_id=run_id, id=axis, data=part.encode_axis())
                 rows.append(_chunk(run_id, name, part, axis))
             if len(points) > _LONG:
-                rows.append(summary_of(run_id, name, Buckets.of(points)))
+                rows.append(summary_of(run_id, name, joined(thinned.get(name), points)))
         newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
         return cls([*axes.values(), *rows], newest)
 

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from sqlalchemy.orm import Session
 
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.schemas import Metrics, Series
+from server.metrics.thinning import ThinningRepository
+from server.metrics.views import thinned_view
 from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 
@@ -52,19 +55,29 @@ class MetricService:
             def read() -> bytes:
                 repository, since = MetricRepository(session), None
                 fresh: Mapping[str, Points] | None = None
-                # What a damaged checkpoint took back is beyond the run's step.
-                if known is not None and known.attempt == run.attempt and known.step <= run.step:
+                if known is not None and _goes_on(session, run, known):
                     fresh = repository.since(run_id, names, known.step)
                 if known is not None and fresh is not None:
                     series, since = {name: Buckets.of(each).cut(points) for name, each in fresh.items()}, known.step
                 else:
                     series = repository.curves([run_id], names, points)[run_id]
                 metrics = Metrics(
-                    series=[_view(name, buckets) for name, buckets in series.items()], attempt=run.attempt, since=since
+                    series=[_view(name, buckets) for name, buckets in series.items()],
+                    attempt=run.attempt,
+                    thinned=thinned_view(run),
+                    since=since,
                 )
                 return metrics.model_dump_json().encode()
 
             return self._services.curves.get((run, frozenset(names or ()), points, known), read)
+
+
+def _goes_on(session: Session, run: PointsState, known: Known) -> bool:
+    """Whether what is new can be put behind what is known."""
+    # What a damaged checkpoint took back is beyond the run's step.
+    if known.attempt != run.attempt or known.step > run.step:
+        return False
+    return run.thinned_at is None or known.step >= ThinningRepository(session).reach(run.run_id)
 
 
 def _view(name: str, buckets: Buckets) -> Series:

@@ -24,10 +24,8 @@ class SummaryRepository:
             query = query.where(tables.MetricSummary.name.in_(names))
         return list(self._session.scalars(query))
 
-    def write(self, run_id: str, name: str, known: tables.MetricSummary | None, points: Points) -> None:
-        """Add points that follow on what is `known`; all of the series' where nothing is."""
-        before = [summarized(known)] if known is not None else []
-        buckets = Buckets.joined([*before, Buckets.of(points)])
+    def write(self, run_id: str, name: str, buckets: Buckets) -> None:
+        """Write down what a series looks like, of which these are all the buckets."""
         self._session.merge(summary_of(run_id, name, buckets))
 
     def cut(self, run_id: str, step: int) -> None:

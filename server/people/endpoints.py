@@ -47,19 +47,19 @@ _NO_CONTENT = status.HTTP_204_NO_CONTENT
 Browser = Annotated[str, Header(alias="User-Agent", include_in_schema=False)]
 
 
-async def _accounts(services: ServicesDep) -> AccountService:
+def _accounts(services: ServicesDep) -> AccountService:
     return AccountService(services)
 
 
-async def _people(services: ServicesDep) -> PeopleService:
+def _people(services: ServicesDep) -> PeopleService:
     return PeopleService(services)
 
 
-async def _invitations(services: ServicesDep) -> InvitationService:
+def _invitations(services: ServicesDep) -> InvitationService:
     return InvitationService(services)
 
 
-async def _sign_in(services: ServicesDep) -> SignInService:
+def _sign_in(services: ServicesDep) -> SignInService:
     return SignInService(services)
 
 

@@ -4,12 +4,14 @@ A checkpoint's archive goes into the store first, announced as every upload is, 
 its end is swept away; the run's last word (`end`) registers everything in one transaction.
 """
 
+import time
 import zlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from server.audit.repository import AuditRepository
@@ -20,6 +22,7 @@ from server.errors import ConflictError, CorruptUploadError, InvalidRequestError
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
 from server.files import StoredFile
+from server.metrics.buckets import BUCKET_BYTES, MAX_BUCKETS, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository, PackedSeries
 from server.project_archives.others import take_arena, take_evaluation, take_policy
@@ -77,6 +80,7 @@ class _Run:
     files: dict[str, StoredFile] = field(default_factory=dict)
     evaluations: dict[str, ArchivedEvaluation] = field(default_factory=dict)
     series: dict[str, list[Points]] = field(default_factory=dict)
+    thinned: dict[str, Buckets] = field(default_factory=dict)
     points: int = 0
     printed: list[ArchivedLog] = field(default_factory=list)
     printed_bytes: int = 0
@@ -220,6 +224,8 @@ class ProjectArrival:
             run.evaluations[stem] = _read(ArchivedEvaluation, await incoming.whole(_MAX_DOCUMENT))
         elif kind == "points":
             await self._lane.run(_add_points, run, await incoming.whole(_MAX_DOCUMENT))
+        elif kind == "thinned":
+            await self._lane.run(_add_thinned, run, await incoming.whole(_MAX_DOCUMENT))
         elif kind == "log":
             _add_log(run, await incoming.whole(_MAX_DOCUMENT))
         else:
@@ -279,7 +285,8 @@ class ProjectArrival:
             raise ConflictError(f"The archive of checkpoint {min(missing)} is missing.")
         # Packed before the database is held: a long run takes seconds of it.
         series = {name: Points.joined(pieces) for name, pieces in arrived.series.items()}
-        packed = PackedSeries.of(archived.id, series)
+        _check_thinned(arrived.thinned, series)
+        packed = PackedSeries.of(archived.id, series, arrived.thinned)
         with self._services.database.write() as session:
             experiment = session.get(tables.Experiment, wanted.id)
             _check_same(experiment, wanted, self._project_id)
@@ -290,7 +297,7 @@ class ProjectArrival:
                 experiment = _experiment(wanted, self._project_id, study)
                 ExperimentRepository(session).add(experiment)
                 session.add_all(tables.ExperimentTag(experiment_id=wanted.id, tag=tag) for tag in dict.fromkeys(wanted.tags))
-            session.add(_run(wanted.id, archived))
+            session.add(_run(wanted.id, archived, arrived.thinned))
             session.flush()
             session.add_all(
                 tables.RunEvent(run_id=archived.id, at=event.at, step=event.step, level=event.level, message=event.message)
@@ -351,7 +358,7 @@ def _experiment(wanted: ArchivedExperiment, project_id: str, study: tables.Study
     )
 
 
-def _run(experiment_id: str, archived: ArchivedRun) -> tables.Run:
+def _run(experiment_id: str, archived: ArchivedRun, thinned: Mapping[str, Buckets]) -> tables.Run:
     return tables.Run(
         id=archived.id,
         experiment_id=experiment_id,
@@ -366,29 +373,67 @@ def _run(experiment_id: str, archived: ArchivedRun) -> tables.Run:
         queued_at=archived.created_at,
         started_at=archived.started_at,
         finished_at=archived.finished_at,
+        thinned_at=(archived.thinned_at or time.time()) if thinned else None,
+        thinned_from=sum(int(each.sizes.sum()) for each in thinned.values()) if thinned else None,
+        thinned_to=sum(len(each) for each in thinned.values()) if thinned else None,
     )
 
 
-def _add_points(run: _Run, content: bytes) -> None:
+def _unpacked(run: _Run, content: bytes, size: int) -> tuple[ArchivedPoints, bytes]:
+    """What stands before points or buckets, and these as they are packed, of `size` bytes each: no more than it promises."""
     line, _, data = content.partition(b"\n")
     head = _read(ArchivedPoints, line)
     run.points += head.count
     if run.points > _MAX_POINTS:
         raise CorruptUploadError(f"a run may have {_MAX_POINTS:,} points")
-    size = _POINT_BYTES * head.count
     reader = zlib.decompressobj()
     try:
-        # No more is unpacked than was promised, whatever lies in there.
-        if len(reader.decompress(data, size + 1)) != size or not reader.eof:
+        if len(reader.decompress(data, size * head.count + 1)) != size * head.count or not reader.eof:
             raise CorruptUploadError(f"it does not hold {head.count} points")
-        points = Points.decode(data, head.count)
     except zlib.error as error:
         raise CorruptUploadError(str(error)) from error
+    return head, data
+
+
+def _add_points(run: _Run, content: bytes) -> None:
+    head, data = _unpacked(run, content, _POINT_BYTES)
+    points = Points.decode(data, head.count)
     if int(points.steps.min()) < 0 or not bool((abs(points.times) <= 1e11).all()):
         raise CorruptUploadError("steps or times are no such")
     run.series.setdefault(head.name, []).append(
         Points.of(points.steps.tolist(), points.times.tolist(), points.values.tolist())
     )
+
+
+def _add_thinned(run: _Run, content: bytes) -> None:
+    head, data = _unpacked(run, content, BUCKET_BYTES)
+    buckets = Buckets.decode(data, head.count)
+    empty = buckets.finite == 0
+    with np.errstate(invalid="ignore"):
+        ordered = (buckets.low <= buckets.mean) & (buckets.mean <= buckets.high)
+    sound = (
+        head.count <= MAX_BUCKETS
+        and head.name not in run.thinned
+        and buckets.steps[0] >= 0
+        and (np.diff(buckets.steps) > 0).all()
+        and (buckets.sizes >= 1).all()
+        and ((buckets.finite >= 0) & (buckets.finite <= buckets.sizes)).all()
+        and np.where(empty, np.isnan(buckets.low) & np.isnan(buckets.mean) & np.isnan(buckets.high), ordered).all()
+    )
+    if not sound:
+        raise CorruptUploadError("it holds no buckets of a thinned series")
+    run.thinned[head.name] = buckets
+
+
+def _check_thinned(thinned: Mapping[str, Buckets], series: Mapping[str, Points]) -> None:
+    """Whether there is a mean to each bucket.
+
+    Raises:
+        ConflictError: there is not.
+    """
+    for name, buckets in thinned.items():
+        if name not in series or not np.isin(buckets.steps, series[name].steps).all():
+            raise ConflictError(f"Points of {name}, which was thinned, are missing.")
 
 
 def _add_log(run: _Run, content: bytes) -> None:

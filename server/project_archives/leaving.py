@@ -7,7 +7,7 @@ from pydantic import BaseModel
 from server.audit.repository import AuditRepository
 from server.checkpoints.repository import CheckpointRepository, evaluation_result
 from server.data_export.files import OutgoingFile
-from server.data_export.series import read_series
+from server.data_export.series import read_run
 from server.database import tables
 from server.errors import NotFoundError
 from server.file_names import slug
@@ -127,7 +127,12 @@ def _run(services: Services, folder: str, run_id: str) -> Iterator[bytes]:
         printed = list(LogRepository(session).chunks(run_id))
     for number, (attempt, first, lines) in enumerate(printed):
         yield from _document(f"{folder}/{number}.log", ArchivedLog(attempt=attempt, first=first, lines=lines))
-    for number, (name, points) in enumerate(read_series(services.database, run_id)):
+    series = read_run(services.database, run_id)
+    for number, (name, buckets) in enumerate(series.thinned.items()):
+        head = ArchivedPoints(name=name, count=len(buckets)).model_dump_json().encode() + b"\n"
+        content = head + buckets.encode()
+        yield from tar.member(f"{folder}/{number}.thinned", len(content), [content])
+    for number, (name, points) in enumerate(series.pieces):
         head = ArchivedPoints(name=name, count=len(points)).model_dump_json().encode() + b"\n"
         content = head + points.encode()
         yield from tar.member(f"{folder}/{number}.points", len(content), [content])
@@ -175,6 +180,7 @@ def _archived(run: tables.Run, events: Sequence[tables.RunEvent], checkpoints: S
         created_at=run.created_at,
         started_at=run.started_at,
         finished_at=run.finished_at,
+        thinned_at=run.thinned_at,
         events=[ArchivedEvent(at=event.at, step=event.step, level=event.level, message=event.message) for event in events],
         checkpoints=[
             ArchivedCheckpoint(id=each.id, step=each.step, created_at=each.created_at, size=each.size, sha256=each.sha256)

@@ -10,6 +10,7 @@ EXPERIMENT/RUN/run.json           ArchivedRun
 EXPERIMENT/RUN/CHECKPOINT.zip     the archive of a checkpoint
 EXPERIMENT/RUN/CHECKPOINT.json    its evaluation, where it has one
 EXPERIMENT/RUN/NUMBER.points      a line of JSON (ArchivedPoints), then the points as the database keeps them
+EXPERIMENT/RUN/NUMBER.thinned     a line of JSON (ArchivedPoints), then the buckets of a series of which points are means
 EXPERIMENT/RUN/NUMBER.log         lines that its trainer printed (ArchivedLog)
 EXPERIMENT/RUN/end                behind all of a run
 evaluations/EVALUATION.json       ArchivedAskedEvaluation
@@ -37,9 +38,12 @@ Step = Annotated[int, Field(ge=0, lt=2**62)]
 
 
 class ArchiveManifest(Schema):
-    """What an archive is. Those of the first format have neither studies nor logs, of the second nothing of `Kind`."""
+    """What an archive is.
 
-    format: Literal[1, 2, 3] = 3
+    Those of the first format have neither studies nor logs, of the second nothing of `Kind`, of the third no thinned curves.
+    """
+
+    format: Literal[1, 2, 3, 4] = 4
     version: ShortLine
     project: ShortLine
 
@@ -135,6 +139,7 @@ class ArchivedRun(Schema):
     created_at: Time
     started_at: Time | None
     finished_at: Time | None
+    thinned_at: Time | None = None
     events: list[ArchivedEvent] = Field(max_length=100_000)
     checkpoints: list[ArchivedCheckpoint] = Field(max_length=100_000)
 
@@ -147,7 +152,7 @@ class ArchivedEvaluation(Schema):
 
 
 class ArchivedPoints(Schema):
-    """A piece of one series."""
+    """A piece of one series, or the buckets of one."""
 
     name: Annotated[ShortLine, StringConstraints(max_length=64)]
     count: int = Field(ge=1, le=2**18)

@@ -15,7 +15,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/reproduction", tags=["reproduction"])
 
 
-async def _service(services: ServicesDep) -> ReproductionService:
+def _service(services: ServicesDep) -> ReproductionService:
     return ReproductionService(services)
 
 

@@ -14,7 +14,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 
-async def _service(services: ServicesDep) -> RunService:
+def _service(services: ServicesDep) -> RunService:
     return RunService(services)
 
 

@@ -22,18 +22,22 @@ _AT_ONCE = 50
 class PointsState(NamedTuple):
     """As long as it is the same, so are the run's points.
 
-    Reports move the number of the last item; what cuts a run back moves its step, and its next attempt's number.
+    Reports move the number of the last item; what cuts a run back moves its step, and its next attempt's number; what thins
+    them says when.
     """
 
     run_id: str
     attempt: int
     last_seq: int
     step: int
+    thinned_at: float | None
+    thinned_from: int | None
+    thinned_to: int | None
 
     @classmethod
     def of(cls, run: tables.Run) -> Self:
         """That of a run that is at hand."""
-        return cls(run.id, run.attempt, run.last_seq, run.step)
+        return cls(run.id, run.attempt, run.last_seq, run.step, run.thinned_at, run.thinned_from, run.thinned_to)
 
 
 class RunRepository:
@@ -75,7 +79,8 @@ class RunRepository:
             NotFoundError: there is no such run, or it lies in the trash.
         """
         run, experiment = tables.Run, tables.Experiment
-        query = select(run.id, run.attempt, run.last_seq, run.step).join(experiment, experiment.id == run.experiment_id)
+        columns = (run.id, run.attempt, run.last_seq, run.step, run.thinned_at, run.thinned_from, run.thinned_to)
+        query = select(*columns).join(experiment, experiment.id == run.experiment_id)
         row = self._session.execute(query.where(run.id == run_id, experiment.deleted_at.is_(None))).one_or_none()
         if row is None:
             raise NotFoundError.of("run", run_id)
@@ -94,6 +99,11 @@ class RunRepository:
         if for_update:
             query = query.with_for_update(of=tables.Run)
         return {run.id: run for run in self._session.scalars(query)}
+
+    def any_thinned(self, run_ids: Collection[str]) -> bool:
+        """Whether curves of one of these runs were thinned."""
+        query = select(tables.Run.id).where(tables.Run.id.in_(run_ids), tables.Run.thinned_at.is_not(None)).limit(1)
+        return self._session.scalar(query) is not None
 
     def latest_metrics(self, run_ids: Collection[str], names: Collection[str]) -> dict[str, dict[str, float]]:
         """The newest value of each of `names`, by run and name; what a run never reported is absent."""

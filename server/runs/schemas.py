@@ -3,6 +3,7 @@
 from pydantic import Field
 
 from server.database.tables import RunState
+from server.metrics.schemas import Thinned
 from server.schemas import LACKING, UNREADABLE, Schema
 from sim.extending.discovery import UsedExtension
 from workers.config import TrainingConfig
@@ -28,6 +29,8 @@ class Run(Schema):
     created_at: float
     started_at: float | None
     finished_at: float | None
+    thins_at: float | None = Field(None, description="When its curves are thinned by a rule; null where none says so.")
+    thinned: Thinned | None = Field(None, description="What was done to its curves; null where every point is kept.")
 
 
 class RunDetail(Run):

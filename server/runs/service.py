@@ -123,4 +123,5 @@ def resume_run(session: Session, run: tables.Run) -> None:
     run.losses, run.lost_by = 0, None
     run.finished_at = None
     run.queued_at = time.time()
+    run.thins_at = run.thin_enough = None
     RunRepository(session).add_event(run.id, "info", "Resume requested.", run.step)

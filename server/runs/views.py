@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from server.database import tables
 from server.experiments.stored import read_training
+from server.metrics.views import thinned_view
 from server.runs.schemas import Run, RunDetail
 from workers.config import TrainingConfig
 
@@ -34,6 +35,8 @@ def run_view(run: tables.Run, training: TrainingConfig, latest: Mapping[str, flo
         created_at=run.created_at,
         started_at=run.started_at,
         finished_at=run.finished_at,
+        thins_at=run.thins_at,
+        thinned=thinned_view(run),
     )
 
 

@@ -98,8 +98,4 @@ def principal_of(connection: HTTPConnection) -> Principal:
     return principal
 
 
-async def _principal(connection: HTTPConnection) -> Principal:
-    return principal_of(connection)
-
-
-PrincipalDep = Annotated[Principal, Depends(_principal)]
+PrincipalDep = Annotated[Principal, Depends(principal_of)]

@@ -47,6 +47,7 @@ class StorageRepository:
         parts = (
             (tables.MetricChunk.run_id, tables.MetricChunk.points),
             (tables.MetricAxis.run_id, tables.MetricAxis.data),
+            (tables.ThinnedSeries.run_id, tables.ThinnedSeries.data),
         )
         for of_run, content in parts:
             query = (

@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from server.curve_thinning.rule import CURVES_STAY, CurveRule
 from server.schemas import Page, Schema
 from server.storage.rule import KeepRule
 
@@ -21,6 +22,8 @@ class StoredExperiment(Schema):
     going_bytes: int
     rule: KeepRule = Field(description="That it goes by.")
     own_rule: bool = Field(description="The rule is its own, not the installation's.")
+    curve_rule: CurveRule = Field(CURVES_STAY, description="That its curves go by.")
+    own_curve_rule: bool = Field(False, description="That rule is its own, not the installation's.")
 
 
 class Storage(Page[StoredExperiment]):

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from server.audit.repository import AuditRepository
 from server.checkpoints.archives import LooseArchives, remove_archives
 from server.checkpoints.repository import CheckpointRepository
+from server.curve_thinning.repository import rule_of
 from server.database import tables
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
@@ -203,6 +204,8 @@ class StorageService:
             going_bytes=experiment.going_bytes,
             rule=self._rule(experiment),
             own_rule=experiment.keep_rule is not None,
+            curve_rule=rule_of(experiment, self._services.settings.thin_curves),
+            own_curve_rule=experiment.curve_rule is not None,
         )
 
     def _publish(self, experiment_id: str) -> None:

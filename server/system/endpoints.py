@@ -15,7 +15,7 @@ from server.system.schemas import DrainRequest, Readiness, Status, Version
 router = APIRouter(tags=["system"])
 
 
-async def _readiness(request: Request) -> ReadinessProbe:
+def _readiness(request: Request) -> ReadinessProbe:
     probe: ReadinessProbe = request.app.state.readiness
     return probe
 

@@ -35,18 +35,18 @@ router = APIRouter(tags=["workbench"])
 _MAX_COLUMNS = 40
 
 
-async def _service(services: ServicesDep) -> WorkbenchService:
+def _service(services: ServicesDep) -> WorkbenchService:
     return WorkbenchService(services)
 
 
 WorkbenchServiceDep = Annotated[WorkbenchService, Depends(_service)]
 
 
-async def _actions(services: ServicesDep) -> ActionService:
+def _actions(services: ServicesDep) -> ActionService:
     return ActionService(services)
 
 
-async def _views(services: ServicesDep) -> ViewService:
+def _views(services: ServicesDep) -> ViewService:
     return ViewService(services)
 
 

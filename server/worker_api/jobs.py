@@ -31,7 +31,7 @@ MAX_RESULT_BYTES = 512 * 2**20
 """Of one recording or bundle."""
 
 
-async def _service(services: ServicesDep) -> JobService:
+def _service(services: ServicesDep) -> JobService:
     return JobService(services)
 
 

@@ -91,6 +91,7 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
         ("/evaluations", "[data-testid=evaluation]", ""),
         ("/leaderboards", "[data-testid=entry]", ""),
         ("/reproduction", "[data-testid=claim]", ""),
+        ("/storage", "[data-testid=stored]", "Clean up Long 0"),
         ("/account", "h1", ""),
         ("/projects", "h1", ""),
         ("/projects/default", "h1", ""),

@@ -325,8 +325,8 @@ def test_curves_stand_on_one_grid(client: TestClient, reports: Reports) -> None:
     assert (curves["name"], curves["steps"]) == ("eval/success_rate", [100, 200, 300, 400])
     first, second = curves["experiments"]
     assert first["seeds"] == [
-        {"seed": 0, "values": [0.0, 0.5, 1.0, None]},
-        {"seed": 1, "values": [0.5, 0.75, None, None]},
+        {"seed": 0, "values": [0.0, 0.5, 1.0, None], "thinned": False},
+        {"seed": 1, "values": [0.5, 0.75, None, None], "thinned": False},
     ]
     assert first["mean"] == [0.25, 0.625, 1.0, None]
     assert first["count"] == [2, 2, 1, 0]

@@ -487,7 +487,7 @@ def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None
         "max": [1.0, 1.25],
     }
     nothing = client.get(f"/api/runs/{run_id}/metrics", params={"names": "nothing"}).json()
-    assert nothing == {"series": [], "attempt": 0, "since": None}
+    assert nothing == {"series": [], "attempt": 0, "thinned": None, "since": None}
 
 
 def test_who_follows_a_run_is_told_what_is_new(client: TestClient, services: Services) -> None:

@@ -103,6 +103,7 @@ TABLE = {
         GET /api/experiments/{experiment_id}
         GET /api/experiments/{experiment_id}/marks
         GET /api/experiments/{experiment_id}/thinning
+        GET /api/experiments/{experiment_id}/curve-thinning
         GET /api/runs/{run_id}
         GET /api/runs/{run_id}/events
         GET /api/runs/{run_id}/log
@@ -159,6 +160,8 @@ TABLE = {
         DELETE /api/experiments/{experiment_id}
         PUT /api/experiments/{experiment_id}/thinning
         POST /api/experiments/{experiment_id}/thinning/free
+        PUT /api/experiments/{experiment_id}/curve-thinning
+        POST /api/experiments/{experiment_id}/curve-thinning/now
         POST /api/experiments/{experiment_id}/stop
         POST /api/experiments/{experiment_id}/resume
         PUT /api/experiments/{experiment_id}/notes

@@ -6,9 +6,11 @@ import hashlib
 import io
 import json
 import tarfile
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +21,12 @@ from fastapi.testclient import TestClient
 import mapless_client
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
+from server.curve_thinning.rule import CurveRule
+from server.curve_thinning.service import CurveThinningService
 from server.database import tables
 from server.files import StoredFile
 from server.ids import new_id
+from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.run_log.repository import LogRepository
@@ -304,14 +309,94 @@ def test_what_is_damaged_or_anothers_is_refused_beside_the_runs(
     assert {each["outcome"] for each in answer["others"]} == {"refused"}
 
 
-def test_an_archive_of_the_second_format_is_read(
-    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path
+@pytest.mark.parametrize("number", [2, 3])
+def test_an_archive_of_an_older_format_is_read(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path, number: int
 ) -> None:
     here, there = servers
-    archive = rewritten(
-        here.client.export_project("default", tmp_path), lambda _, content: content.replace(b'"format":3', b'"format":2')
-    )
+
+    def older(name: str, content: bytes) -> bytes:
+        if name == "manifest.json":
+            assert b'"format":4' in content
+            return content.replace(b'"format":4', b'"format":%d' % number)
+        return content.replace(b'"thinned_at":null,', b"")
+
+    archive = rewritten(here.client.export_project("default", tmp_path), older)
     assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]
+
+
+@pytest.fixture
+def thinned(servers: tuple[Server, Server], trained: dict[str, Any]) -> dict[str, Any]:
+    """The first run's curves were thinned."""
+    here, _ = servers
+    run_id = trained["runs"][0]["id"]
+    here.reports.state(trained["runs"][0], "completed", finished_at=1.0)
+    with here.services.database.write() as session:
+        session.get_one(tables.StudyTrial, ("s", 0)).state = "complete"
+    service = CurveThinningService(here.services)
+    service.change(trained["id"], CurveRule(points=100, after_days=0.0))
+    service.mark_some(time.time(), 10)
+    service.thin_some(time.time() + 8 * 86_400.0)
+    shown: dict[str, Any] = here.http.get(f"/api/runs/{run_id}").json()
+    assert shown["thinned"]["points"] == 9_000
+    return shown
+
+
+@pytest.mark.parametrize(
+    "servers",
+    [
+        "neither",
+        pytest.param("here", marks=pytest.mark.services),
+        pytest.param("there", marks=pytest.mark.services),
+    ],
+    indirect=True,
+)
+def test_thinned_curves_come_over_with_their_mark(
+    servers: tuple[Server, Server], trained: dict[str, Any], thinned: dict[str, Any], tmp_path: Path
+) -> None:
+    here, there = servers
+    archive = here.client.export_project("default", tmp_path)
+    assert [run.outcome for run in there.client.import_project(archive, "default").runs] == ["imported"] * 2
+
+    path = f"/api/runs/{thinned['id']}"
+    assert there.http.get(path).json()["thinned"] == thinned["thinned"]
+    for points in (100_000, 1_000, 30):
+        mine, theirs = (each.http.get(f"{path}/metrics?points={points}").json() for each in servers)
+        assert theirs == mine
+    # And it goes on from there: its buckets end where its checkpoint does.
+    there.reports.cut(thinned, 2_000)
+    there.reports.state(thinned, "stopped", step=2_000)
+    (loss, back) = there.http.get(f"{path}/metrics?points=1000").json()["series"]
+    assert (loss["steps"][-1], back["steps"][-1]) == (10, 2_000)
+    assert there.http.get(path).json()["thinned"]["points"] == 2_000
+
+
+def test_buckets_that_are_none_are_refused(servers: tuple[Server, Server], thinned: dict[str, Any], tmp_path: Path) -> None:
+    here, there = servers
+    archive = here.client.export_project("default", tmp_path)
+
+    def refused(change: Callable[[Buckets], Buckets], *, without_points: bool = False) -> str:
+        def changed(name: str, content: bytes) -> bytes | None:
+            if name.endswith(".thinned"):
+                head, _, data = content.partition(b"\n")
+                count = json.loads(head)["count"]
+                return head + b"\n" + change(Buckets.decode(data, count)).encode()
+            return None if without_points and name.endswith(".points") else content
+
+        answer = send(there, rewritten(archive, changed)).json()
+        (run,) = [run for run in answer["runs"] if run["id"] == thinned["id"] and run["outcome"] == "refused"]
+        with there.services.database.read() as session:
+            assert session.get(tables.Run, thinned["id"]) is None
+        why: str = run["why"]
+        return why
+
+    assert "is damaged" in refused(lambda all_: all_[:-1])
+    assert "no buckets" in refused(lambda all_: replace(all_, sizes=-all_.sizes))
+    assert "no buckets" in refused(lambda all_: replace(all_, finite=all_.sizes + 1))
+    assert "no buckets" in refused(lambda all_: replace(all_, low=all_.high + 1.0))
+    assert "no buckets" in refused(lambda all_: replace(all_, steps=all_.steps[::-1].copy()))
+    assert "are missing" in refused(lambda all_: replace(all_, steps=all_.steps + 1_000_000))
+    assert "are missing" in refused(lambda all_: all_, without_points=True)
 
 
 def rewritten(archive: Path, change: Callable[[str, bytes], bytes | None]) -> bytes:
@@ -420,7 +505,7 @@ def test_an_archive_of_the_first_format_is_read(
         if name.endswith("experiment.json"):
             told = json.loads(content)
             return json.dumps({key: told[key] for key in told.keys() - {"campaign", "campaign_row", "study_id"}}).encode()
-        return content.replace(b'"format":3', b'"format":1') if name == "manifest.json" else content
+        return content.replace(b'"format":4', b'"format":1') if name == "manifest.json" else content
 
     archive = rewritten(here.client.export_project("default", tmp_path), before)
     assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]

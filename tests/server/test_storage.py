@@ -262,8 +262,8 @@ def test_on_each_database(settings: Settings, database_url: str) -> None:
     storage = StorageService(services)
     page = storage.page(OWNER, Window(10, 0))
     assert [(one.id, one.checkpoints) for one in page.items] == [("1experiments", 4), ("2experiments", 1)]
-    # A byte of the curve and one of its steps, and what the filled rows have.
-    assert (page.items[0].checkpoint_bytes, page.items[0].curve_bytes) == (3 * 2**40 + 1, 2)
+    # A byte of the curve, one of its steps and one of what was thinned, as the filled rows have them.
+    assert (page.items[0].checkpoint_bytes, page.items[0].curve_bytes) == (3 * 2**40 + 1, 3)
 
     taken = storage.change("1experiments", KeepRule(last=1, best=False))
     assert (taken.going, taken.going_bytes, [one.id for one in taken.spared]) == (2, 2 * 2**40, ["1checkpoints"])

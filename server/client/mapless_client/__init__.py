@@ -48,6 +48,7 @@ from mapless_client.models import (
     RunState,
     SeedMean,
     Study,
+    Thinned,
     Trial,
 )
 
@@ -87,6 +88,7 @@ __all__ = [
     "RunState",
     "SeedMean",
     "Study",
+    "Thinned",
     "Trial",
     "UnauthorizedError",
     "UnreachableError",

@@ -106,8 +106,19 @@ class Study(Model):
     judgement: Judgement | None
 
 
+class Thinned(Model):
+    """What was done to the curves of a run that ended long ago: of `points` points `kept` buckets are left, `since` then."""
+
+    since: float
+    points: int
+    kept: int
+
+
 class Run(Model):
-    """One seed's training. `step` counts environment steps; `error` says why it failed."""
+    """One seed's training. `step` counts environment steps; `error` says why it failed.
+
+    `thinned` is None where every point of its curves is kept; a server of before does not tell.
+    """
 
     id: str
     experiment_id: str
@@ -125,6 +136,7 @@ class Run(Model):
     created_at: float
     started_at: float | None
     finished_at: float | None
+    thinned: Thinned | None = None
 
     @property
     def ended(self) -> bool:

@@ -893,6 +893,50 @@ export interface paths {
         patch: operations["change_experiment_api_experiments__experiment_id__patch"];
         trace?: never;
     };
+    "/api/experiments/{experiment_id}/curve-thinning": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Preview Curve Thinning
+         * @description What a rule would do to the curves of an experiment's runs, and how much that frees; nothing is changed.
+         */
+        get: operations["preview_curve_thinning_api_experiments__experiment_id__curve_thinning_get"];
+        /**
+         * Change Curve Rule
+         * @description Give an experiment a rule for curves: it is applied after some days, unless another one comes before.
+         */
+        put: operations["change_curve_rule_api_experiments__experiment_id__curve_thinning_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/curve-thinning/now": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Thin Curves Now
+         * @description Thin now what the rule takes, not after its days: it begins at once, and pages hear of it as it goes on.
+         */
+        post: operations["thin_curves_now_api_experiments__experiment_id__curve_thinning_now_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/experiments/{experiment_id}/export": {
         parameters: {
             query?: never;
@@ -4792,6 +4836,48 @@ export interface components {
             units: number;
         };
         /**
+         * CurveRule
+         * @description How fine the curves of a run stay once it has ended; as they are, where `points` is null.
+         */
+        "CurveRule-Input": {
+            /**
+             * After Days
+             * @description Days after the run's end from which on this holds.
+             * @default 30
+             */
+            after_days: number;
+            /**
+             * Points
+             * @description So many of each metric at most, each with the smallest, mean and largest value of those that it stands for; null for all, and then nothing is thinned.
+             */
+            points?: number | null;
+        };
+        /**
+         * CurveRule
+         * @description How fine the curves of a run stay once it has ended; as they are, where `points` is null.
+         */
+        "CurveRule-Output": {
+            /**
+             * After Days
+             * @description Days after the run's end from which on this holds.
+             * @default 30
+             */
+            after_days: number;
+            /**
+             * Points
+             * @description So many of each metric at most, each with the smallest, mean and largest value of those that it stands for; null for all, and then nothing is thinned.
+             */
+            points: number | null;
+        };
+        /**
+         * CurveRuleChange
+         * @description Another rule for an experiment.
+         */
+        CurveRuleChange: {
+            /** @description Null for the installation's. */
+            rule: components["schemas"]["CurveRule-Input"] | null;
+        };
+        /**
          * Curves
          * @description One metric of several experiments on one grid.
          *
@@ -4826,6 +4912,53 @@ export interface components {
              * @description The grid; null where it is of steps.
              */
             x: number[] | null;
+        };
+        /**
+         * CurveThinning
+         * @description What a rule does to the curves of an experiment's runs. Evaluations and a curve's newest point stay in any case.
+         */
+        CurveThinning: {
+            /**
+             * Frees
+             * @description Bytes of the database, about.
+             */
+            frees: number;
+            /**
+             * Kept
+             * @description That are left of them at most.
+             */
+            kept: number;
+            /**
+             * Later
+             * @description Runs that have not ended so long ago, or at all.
+             */
+            later: number;
+            /**
+             * Marked
+             * @description Runs that are thinned by the rule that holds now, unless another one comes before.
+             */
+            marked: number;
+            /**
+             * Points
+             * @description Of those metrics.
+             */
+            points: number;
+            rule: components["schemas"]["CurveRule-Output"];
+            /**
+             * Runs
+             * @description That ended long enough ago and have a metric of more points than the rule leaves.
+             */
+            runs: number;
+            /**
+             * Spared
+             * @description Why no run of it is thinned, whatever a rule says.
+             */
+            spared: string | null;
+            /**
+             * Thins At
+             * @description When the first of them is; null where none is.
+             */
+            thins_at: number | null;
         };
         /**
          * DdpgConfig
@@ -7484,6 +7617,8 @@ export interface components {
              * @description From which step on; null where the series are whole, whatever was asked for: what is known is old then.
              */
             since: number | null;
+            /** @description Null where every point is kept. */
+            thinned: components["schemas"]["Thinned"] | null;
         };
         /**
          * MlpNetwork
@@ -10173,6 +10308,13 @@ export interface components {
              * @description Newest value of train/success_rate.
              */
             success_rate: number | null;
+            /** @description What was done to its curves; null where every point is kept. */
+            thinned: components["schemas"]["Thinned"] | null;
+            /**
+             * Thins At
+             * @description When its curves are thinned by a rule; null where none says so.
+             */
+            thins_at: number | null;
             /** Total Steps */
             total_steps: number;
             /**
@@ -10245,6 +10387,13 @@ export interface components {
              * @description Newest value of train/success_rate.
              */
             success_rate: number | null;
+            /** @description What was done to its curves; null where every point is kept. */
+            thinned: components["schemas"]["Thinned"] | null;
+            /**
+             * Thins At
+             * @description When its curves are thinned by a rule; null where none says so.
+             */
+            thins_at: number | null;
             /** Total Steps */
             total_steps: number;
             training: components["schemas"]["TrainingConfig-Output"];
@@ -10597,6 +10746,12 @@ export interface components {
         SeedCurve: {
             /** Seed */
             seed: number;
+            /**
+             * Thinned
+             * @description Curves of this run were thinned: of neighbouring points their means are left.
+             * @default false
+             */
+            thinned: boolean;
             /** Values */
             values: (number | null)[];
         };
@@ -11220,6 +11375,13 @@ export interface components {
              */
             curve_bytes: number;
             /**
+             * @description That its curves go by.
+             * @default {
+             *       "after_days": 30
+             *     }
+             */
+            curve_rule: components["schemas"]["CurveRule-Output"];
+            /**
              * Going
              * @description Checkpoints that go, and can be kept until then.
              */
@@ -11235,6 +11397,12 @@ export interface components {
             in_trash: boolean;
             /** Name */
             name: string;
+            /**
+             * Own Curve Rule
+             * @description That rule is its own, not the installation's.
+             * @default false
+             */
+            own_curve_rule: boolean;
             /**
              * Own Rule
              * @description The rule is its own, not the installation's.
@@ -11876,6 +12044,30 @@ export interface components {
              * @default 10000
              */
             warmup_steps: number;
+        };
+        /**
+         * Thinned
+         * @description What was done to the curves of a run that ended long ago: neighbouring points were put together.
+         *
+         *     What is left of each bucket of neighbours is its smallest value, its mean and its largest. Evaluations stay, and so do a
+         *     curve's newest point and whatever a run that is resumed adds.
+         */
+        Thinned: {
+            /**
+             * Kept
+             * @description Buckets in their place.
+             */
+            kept: number;
+            /**
+             * Points
+             * @description That there were of the metrics that had too many, all together.
+             */
+            points: number;
+            /**
+             * Since
+             * @description When it was done last.
+             */
+            since: number;
         };
         /**
          * Thinning
@@ -15668,6 +15860,170 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    preview_curve_thinning_api_experiments__experiment_id__curve_thinning_get: {
+        parameters: {
+            query?: {
+                /** @description Days after a run's end from which on. */
+                after_days?: number;
+                /** @description So many of each metric at most; all if not given. */
+                points?: number | null;
+            };
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CurveThinning"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    change_curve_rule_api_experiments__experiment_id__curve_thinning_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "rule": {
+                 *         "points": 1000,
+                 *         "after_days": 30
+                 *       }
+                 *     }
+                 */
+                "application/json": components["schemas"]["CurveRuleChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CurveThinning"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    thin_curves_now_api_experiments__experiment_id__curve_thinning_now_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CurveThinning"];
                 };
             };
             /** @description No valid login */
@@ -19875,6 +20231,7 @@ export interface operations {
                      *         }
                      *       ],
                      *       "attempt": 1,
+                     *       "thinned": null,
                      *       "since": null
                      *     }
                      */

@@ -9,7 +9,12 @@ const series = (name: string, steps: number[], values: number[], band?: [number[
   min: band?.[0] ?? null,
   max: band?.[1] ?? null,
 })
-const answer = (since: number | null, ...all: Series[]): Metrics => ({ series: all, attempt: 1, since })
+const answer = (since: number | null, ...all: Series[]): Metrics => ({
+  series: all,
+  attempt: 1,
+  thinned: null,
+  since,
+})
 
 test('what is known gives way from the step on that the news begins with', () => {
   const known = answer(null, series('a', [10, 20, 30], [1, 2, 3]), series('rare', [20], [9]))

@@ -607,3 +607,19 @@ test('a run from before time was counted says so in place of its curves', async 
     (await main.findAllByText('Wall time was not counted when this run trained')).length,
   ).toBeGreaterThan(0)
 })
+
+test('a run whose curves were thinned says so beside its charts, and so does one that will be', async () => {
+  const ended = { ...runDetail, state: 'completed', steps_per_second: null, seconds_left: null }
+  startServer({
+    ...routes,
+    'GET /api/runs/run1': { ...ended, thinned: { since: NOW - 100, points: 4_300_000, kept: 43_000 } },
+  })
+  const { unmount } = open('/runs/run1')
+  expect(await screen.findByTestId('thinned')).toHaveTextContent(
+    /^Curves were thinned on .*: of 4.300.000 points 43.000 means of neighbours are left/,
+  )
+  unmount()
+  startServer({ ...routes, 'GET /api/runs/run1': { ...ended, thins_at: NOW + 9e4 } })
+  open('/runs/run1')
+  expect(await screen.findByTestId('thinned')).toHaveTextContent(/^A rule thins these curves on/)
+})

@@ -30,6 +30,7 @@ import { Pager } from '../components/Pager'
 import { RunLog } from '../components/RunLog'
 import { LapseDialog } from '../components/replay/LapseDialog'
 import { canResume, canStop, isActive } from '../components/states'
+import { thinnedInWords } from '../components/storage/rules'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { useArenaTitle } from '../components/useArenaTitle'
@@ -186,6 +187,11 @@ function LoadedRun({ run }: { run: RunDetail }) {
                 {MAIN_CHARTS.map((spec) => (
                   <SpecChart key={spec.title} spec={spec} height={214} {...drawn} />
                 ))}
+                {thinnedInWords(run) && (
+                  <Text size="sm" c="dimmed" data-testid="thinned">
+                    {thinnedInWords(run)}
+                  </Text>
+                )}
               </Stack>
             </Panel>
           </div>

@@ -7,7 +7,7 @@ import type { StoredExperiment } from '../api/types'
 import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { RuleDialog } from '../components/storage/RuleDialog'
-import { ruleInWords } from '../components/storage/rules'
+import { curveRuleInWords, ruleInWords } from '../components/storage/rules'
 import { Notice, Page, Panel } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { count, fileSize, plural } from '../lib/format'
@@ -96,6 +96,12 @@ export function StoragePage() {
                     of the installation
                   </Text>
                 )}
+                {curveRuleInWords(one.curve_rule) !== null && (
+                  <Text size="xs">
+                    {curveRuleInWords(one.curve_rule)}
+                    {!one.own_curve_rule && ', of the installation'}
+                  </Text>
+                )}
               </Table.Td>
               <Table.Td>
                 <Group justify="flex-end">
@@ -103,7 +109,7 @@ export function StoragePage() {
                     size="compact-sm"
                     variant="default"
                     disabled={one.in_trash}
-                    aria-label={`Rule of ${one.name}`}
+                    aria-label={`Clean up ${one.name}`}
                     onClick={() => choose(one)}
                   >
                     Clean up

@@ -52,6 +52,8 @@ export const run: Run = {
   created_at: NOW - 60,
   started_at: NOW - 50,
   finished_at: null,
+  thins_at: null,
+  thinned: null,
 }
 
 const network = { name: 'mlp' as const, hidden_sizes: [64, 64], activation: 'relu' as const }
@@ -345,8 +347,8 @@ export const curves: Curves = {
       id: 'exp1',
       name: 'Corridor',
       seeds: [
-        { seed: 0, values: [0.1, 0.5, 0.9] },
-        { seed: 1, values: [0.3, 0.7, null] },
+        { seed: 0, thinned: false, values: [0.1, 0.5, 0.9] },
+        { seed: 1, thinned: false, values: [0.3, 0.7, null] },
       ],
       mean: [0.2, 0.6, 0.9],
       low: [0.1, 0.5, null],
@@ -357,7 +359,7 @@ export const curves: Curves = {
     {
       id: 'exp2',
       name: 'Alone',
-      seeds: [{ seed: 0, values: [0.4, 0.5, 0.6] }],
+      seeds: [{ seed: 0, thinned: false, values: [0.4, 0.5, 0.6] }],
       mean: [0.4, 0.5, 0.6],
       low: [null, null, null],
       high: [null, null, null],

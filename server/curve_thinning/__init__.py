@@ -1,0 +1,1 @@
+"""Curves of runs that ended long ago give way to fewer points, where a rule says so."""
