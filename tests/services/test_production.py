@@ -5,30 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import redis
 
 from tests.conftest import require_service
 from tests.services.stack import ROLLOUT, Service, assert_one_unbroken_curve, until
 from workers.runtime.app import create_app
 
-# Databases of a Redis on its standard port that tests may have; the first one that is empty is taken.
-REDIS_DATABASES = range(15, 8, -1)
 RABBITMQ_URL = "amqp://guest:guest@127.0.0.1:5672//"
-
-
-@pytest.fixture
-def redis_url() -> Iterator[str]:
-    """URL of an empty Redis database that is emptied again after the test."""
-    require_service("Redis", "127.0.0.1", 6379)
-    for number in REDIS_DATABASES:
-        client = redis.Redis(port=6379, db=number)
-        if client.dbsize() == 0:
-            yield f"redis://127.0.0.1:6379/{number}"
-            client.flushdb()
-            client.close()
-            return
-        client.close()
-    pytest.fail("no Redis database from 9 to 15 is empty: empty one of them")
 
 
 @pytest.fixture
