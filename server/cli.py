@@ -171,6 +171,20 @@ def move(
         take_over(source, target, typer.echo, while_running=while_running)
 
 
+@app.command()
+def move_checkpoints(
+    source: Annotated[str, typer.Argument(metavar="FROM", help="Folder or URL of the store to read: data/checkpoints")],
+    target: Annotated[str, typer.Argument(metavar="TO", help="Of the one to fill: s3://mapless/checkpoints")],
+    data_dir: DataDir = None,
+) -> None:
+    """Copy every checkpoint from one store to another, and compare them, while the service runs."""
+    settings = _settings(data_dir=data_dir)
+    from server.keeping.move_checkpoints import move_checkpoints as take_over
+
+    with _refusals():
+        take_over(settings, source, target, typer.echo)
+
+
 @app.command(context_settings=_PASSED_ON, add_help_option=False)
 def train(context: typer.Context) -> None:
     """Train without the service, with a progress bar."""

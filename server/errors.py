@@ -21,6 +21,7 @@ ServiceError (a sim.errors.MaplessError)   500
 ├── BusyError                       503  as much of this kind of work waits as may
 ├── JobTimeoutError                 503  what was asked for took a worker too long
 ├── (server.people.oidc.refusals.ProviderUnusableError)
+├── (server.files.StoreAwayError)        an object store can't be reached, or refuses
 └── NoWorkerError                   503  no worker is there to do it
 """
 

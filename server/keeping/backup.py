@@ -11,18 +11,18 @@ import shutil
 import time
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
 
 from pydantic import BaseModel, ConfigDict
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection
 
 from server.checkpoints.hold import held
 from server.database.engine import Database
 from server.database.migrate import revision
 from server.errors import ConflictError, NotFoundError
 from server.files import FileStore
+from server.keeping.archives import NamedArchive, named_archives
 from server.keeping.copying import check_revision
 from server.keeping.rows import Kind, Shape, Sum, line_of, read_rows, shapes
 from server.keeping.snapshot import exists, size, snapshot
@@ -103,7 +103,7 @@ def back_up(settings: Settings, path: Path, say: Callable[[str], None]) -> Manif
         with held(settings.data_dir), snapshot(database, path.parent) as connection:
             found = check_revision(revision(database), "The database")
             described = shapes(connection)
-            wanted = _archives(connection, described)
+            wanted = named_archives(connection, described)
             _check_room(path.parent, size(database) + sum(one.size for one in wanted))
             with zipfile.ZipFile(torn, "x", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
                 manifest = _write(_Writer(archive), settings, found, connection, described, files, wanted)
@@ -150,15 +150,6 @@ class _Writer:
         self._archive.writestr(MANIFEST, manifest.model_dump_json(indent=1))
 
 
-@dataclass(frozen=True)
-class _Archive:
-    """An archive that the backup needs; `sha256` is None of one that no checkpoint names (any more)."""
-
-    id: str
-    size: int
-    sha256: str | None
-
-
 def _write(
     writer: _Writer,
     settings: Settings,
@@ -166,7 +157,7 @@ def _write(
     connection: Connection,
     described: Sequence[Shape],
     files: FileStore,
-    wanted: Sequence[_Archive],
+    wanted: Sequence[NamedArchive],
 ) -> Manifest:
     made_at = time.time()
     tables = {shape.name: _add_table(writer, connection, shape) for shape in described}
@@ -197,7 +188,7 @@ def _add_table(writer: _Writer, connection: Connection, shape: Shape) -> TablePa
     return TablePart(columns=shape.columns, rows=found.rows)
 
 
-def _add_archive(writer: _Writer, files: FileStore, wanted: _Archive) -> bool:
+def _add_archive(writer: _Writer, files: FileStore, wanted: NamedArchive) -> bool:
     """Whether it was whole; looked at first, for what is in a zip stays there."""
     try:
         with files.open(wanted.id) as file:
@@ -208,17 +199,6 @@ def _add_archive(writer: _Writer, files: FileStore, wanted: _Archive) -> bool:
     except NotFoundError:
         return False
     return True
-
-
-def _archives(connection: Connection, described: Sequence[Shape]) -> list[_Archive]:
-    """In the words of the first migrations, which all later ones have."""
-    rows = connection.execute(text("SELECT id, size, sha256 FROM checkpoints ORDER BY id"))
-    archives = [_Archive(*row) for row in rows]
-    if any(shape.name == "loose_archives" for shape in described):
-        # A training may begin with one whose checkpoint is gone.
-        loose = connection.execute(text("SELECT id FROM loose_archives WHERE NOT doomed ORDER BY id"))
-        archives += [_Archive(identifier, 0, None) for (identifier,) in loose]
-    return archives
 
 
 def _blocks(file: IO[bytes]) -> Iterator[bytes]:

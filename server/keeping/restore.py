@@ -4,7 +4,8 @@ import asyncio
 import re
 import time
 import zipfile
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -14,8 +15,9 @@ from server.database import tables
 from server.database.engine import Database
 from server.database.migrate import head, revision, tear_down
 from server.database.rebuilding import rebuilding
-from server.errors import ConflictError, CorruptUploadError, NotFoundError
+from server.errors import ConflictError, CorruptUploadError
 from server.files import FileStore
+from server.keeping.archives import bring, sum_in
 from server.keeping.backup import ARCHIVES, ARENAS, MANIFEST, TABLES, TOKENS, Manifest
 from server.keeping.copying import check_revision, fill, holds
 from server.keeping.rows import Row, Shape, row_of
@@ -90,8 +92,11 @@ def _restore(
     try:
         found = _check_target(database, replace=replace)
         missing = _missing_archives(files, manifest, replace=replace)
+        brought: list[str] = []
         try:
-            asyncio.run(_bring_archives(files, archive, manifest, missing))
+            asyncio.run(_bring_archives(files, archive, manifest, missing, brought))
+            # Of a restore that was killed.
+            files.clear_torn([_id(name) for name in manifest.parts if name.startswith(ARCHIVES)])
             _bring_files(settings, archive, manifest, replace=replace)
             with rebuilding(database) as connection:
                 before = _archives(connection) if found == head() else set()
@@ -107,8 +112,10 @@ def _restore(
                 _go_on_from_here(connection, manifest, before)
         except BaseException:
             # No database names them: nobody would ever remove them.
-            for identifier in missing:
-                files.delete(identifier)
+            for identifier in brought:
+                # What has gone wrong first is what is told.
+                with suppress(OSError):
+                    files.delete(identifier)
             raise
     finally:
         database.dispose()
@@ -116,6 +123,7 @@ def _restore(
         f"Restored {sum(one.rows for one in read.values())} rows and {len(missing)} checkpoints, as they were on "
         f"{time.strftime('%Y-%m-%d %H:%M:%S', time.gmtime(manifest.made_at))} UTC."
     )
+    _say_what_was_there(files, manifest, len(missing), say)
     if manifest.damaged:
         say(f"Marked as damaged, for the backup had no archive: checkpoints {', '.join(manifest.damaged)}.")
 
@@ -133,30 +141,33 @@ def _check_target(database: Database, *, replace: bool) -> str | None:
     return found
 
 
-def _missing_archives(files: FileStore, manifest: Manifest, *, replace: bool) -> list[str]:
-    """The ids of archives that have to be brought into the store; as it is after a restore that broke off, they need not."""
-    missing = []
+def _missing_archives(files: FileStore, manifest: Manifest, *, replace: bool) -> dict[str, bool]:
+    """The ids of archives that have to be brought into the store, and whether another one lies there under that id.
+
+    Those that are as they should be, after a restore that broke off, need not be brought.
+    """
+    missing = {}
     for name, part in manifest.parts.items():
         if not name.startswith(ARCHIVES):
             continue
         identifier = _id(name)
-        try:
-            with files.open(identifier) as file:
-                if sha256_of(file) == part.sha256:
-                    continue
-        except NotFoundError:
-            pass
-        else:
-            if not replace:
-                raise ConflictError(f"The store has another archive {identifier}: with --replace it is given up.")
-        missing.append(identifier)
+        there = sum_in(files, identifier)
+        if there == part.sha256:
+            continue
+        if there is not None and not replace:
+            raise ConflictError(f"The store has another archive {identifier}: with --replace it is given up.")
+        missing[identifier] = there is not None
     return missing
 
 
-async def _bring_archives(files: FileStore, archive: zipfile.ZipFile, manifest: Manifest, missing: list[str]) -> None:
-    for identifier in missing:
+async def _bring_archives(
+    files: FileStore, archive: zipfile.ZipFile, manifest: Manifest, missing: dict[str, bool], brought: list[str]
+) -> None:
+    for identifier, replaces in missing.items():
         name = f"{ARCHIVES}{identifier}.zip"
-        await files.write(identifier, _blocks(archive, name), manifest.parts[name].sha256)
+        if not replaces:
+            brought.append(identifier)
+        await bring(files, identifier, _blocks(archive, name), manifest.parts[name].sha256)
 
 
 def _bring_files(settings: Settings, archive: zipfile.ZipFile, manifest: Manifest, *, replace: bool) -> None:
@@ -199,7 +210,16 @@ def _archives(connection: Connection) -> set[str]:
     return found | set(connection.scalars(select(tables.LooseArchive.id)))
 
 
-async def _blocks(archive: zipfile.ZipFile, name: str) -> AsyncIterator[bytes]:
+def _say_what_was_there(files: FileStore, manifest: Manifest, brought: int, say: Callable[[str], None]) -> None:
+    named = {_id(name) for name in manifest.parts if name.startswith(ARCHIVES)}
+    if len(named) > brought:
+        say(f"{len(named) - brought} more checkpoints lay in the store already, as the backup has them.")
+    others = len(files.ids() - named)
+    if others:
+        say(f"{others} other archives lie in the store, which the backup does not name: left as they are.")
+
+
+def _blocks(archive: zipfile.ZipFile, name: str) -> Iterator[bytes]:
     with archive.open(name) as file:
         while block := file.read(_BLOCK):
             yield block

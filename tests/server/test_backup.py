@@ -3,12 +3,10 @@
 import asyncio
 import hashlib
 import json
-import threading
 import time
 import zipfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from sqlalchemy import func, select, text, update
@@ -17,7 +15,6 @@ from typer.testing import CliRunner
 from server.app import create_services
 from server.checkpoints.archives import GRACE_SECONDS, sweep_archives
 from server.checkpoints.hold import held
-from server.checkpoints.repository import CheckpointRepository
 from server.cli import app
 from server.database import tables
 from server.database.engine import Database
@@ -25,62 +22,16 @@ from server.database.migrate import bring, head, known_revisions, revision
 from server.database.rebuilding import rebuilding
 from server.errors import ConflictError, CorruptUploadError
 from server.experiments.service import ExperimentService
-from server.files import FileStore
 from server.keeping import restore as restoring
 from server.keeping.backup import back_up
 from server.keeping.restore import restore
 from server.services import Services
 from server.settings import Settings
-from sim.config import ArenaFile
 from tests.server.filling import fill, rows
+from tests.server.installations import Writer, blocks, everything, installation, keep, quiet, store
 from tests.server.test_serving import environment, serving
-from workers.config import TrainingConfig
 
 LATER = GRACE_SECONDS + 1
-
-
-def quiet(_said: str) -> None:
-    return
-
-
-async def blocks(name: str) -> AsyncIterator[bytes]:
-    yield f"the archive {name} ".encode() * 5_000
-
-
-def store(settings: Settings) -> FileStore:
-    return FileStore(settings.resolved_files_url, 10**9)
-
-
-def keep(settings: Settings, *names: str) -> None:
-    """Archives in the store, as the rows of checkpoints of these names say."""
-    database = Database(settings.resolved_database_url)
-    for name in names:
-        file = asyncio.run(store(settings).write(name, blocks(name)))
-        with database.write() as session:
-            values = {"id": name, "size": file.size, "sha256": file.sha256}
-            session.execute(text("UPDATE checkpoints SET size = :size, sha256 = :sha256 WHERE id = :id"), values)
-    database.dispose()
-
-
-def everything(settings: Settings) -> dict[str, Any]:
-    """All rows and all files of an installation."""
-    database = Database(settings.resolved_database_url)
-    found = rows(database)
-    database.dispose()
-    kept = {path.name: path.read_bytes() for path in (*settings.arenas_dir.glob("*"), *settings.data_dir.glob("*token"))}
-    files = store(settings)
-    return {"rows": found, "files": kept | {name: b"".join(files.read(name)) for name in files.ids()}}
-
-
-def installation(place: Path, database_url: str) -> Settings:
-    """Two rows in every table, two checkpoints and an arena."""
-    settings = Settings.model_validate({"data_dir": place, "database_url": database_url})
-    services = create_services(settings)
-    fill(services.database)
-    services.arenas.add(ArenaFile(name="room", width=6.0, height=6.0))
-    services.database.dispose()
-    keep(settings, "1checkpoints", "2checkpoints")
-    return settings
 
 
 @pytest.fixture
@@ -133,63 +84,6 @@ def test_postgresql_is_brought_back_to_what_it_was(postgres_url: str, tmp_path: 
         restore(settings, tmp_path / "of-postgresql.backup", quiet)
     restore(settings, tmp_path / "of-postgresql.backup", quiet, replace=True)
     assert everything(settings) == before
-
-
-class Writer:
-    """Reports to an installation as its server would, all the time: numbers, and checkpoints that come and go.
-
-    A run's row says how many numbers there are; both are written in one transaction.
-    """
-
-    def __init__(self, settings: Settings) -> None:
-        self.services = create_services(settings)
-        with self.services.database.write() as session:
-            training = TrainingConfig().model_dump(mode="json")
-            session.add(tables.Experiment(id="kept", name="kept", training=training))
-            session.flush()
-            session.add(tables.Run(id="kept", experiment_id="kept", seed=0, state="completed"))
-        self.checkpoint("kept", "kept0")
-        self._end = threading.Event()
-        self.written = 0
-        self._thread = threading.Thread(target=self._write)
-
-    def checkpoint(self, run_id: str, name: str) -> None:
-        file = asyncio.run(self.services.files.write(name, blocks(name)))
-        with self.services.database.write() as session:
-            CheckpointRepository(session).add(run_id, 1, file, None)
-
-    def _write(self) -> None:
-        training = TrainingConfig().model_dump(mode="json")
-        experiments = ExperimentService(self.services)
-        while not self._end.is_set():
-            self.written += 1
-            number = self.written
-            with self.services.database.write() as session:
-                session.add(tables.MetricRow(run_id="kept", seq=number, step=number, wall_time=0.5, values={"a": 0.1}))
-                session.get_one(tables.Run, "kept").last_seq = number
-                session.add(tables.Experiment(id=f"e{number}", name="goes", training=training))
-                session.flush()
-                session.add(tables.Run(id=f"r{number}", experiment_id=f"e{number}", seed=0, state="completed"))
-            self.checkpoint(f"r{number}", f"c{number}")
-            if number > 3:
-                experiments.delete(f"e{number - 3}")
-                experiments.remove(f"e{number - 3}")
-
-    def __enter__(self) -> "Writer":
-        self._thread.start()
-        return self
-
-    def wait_for(self, number: int) -> None:
-        deadline = time.monotonic() + 60
-        while self.written < number:
-            assert self._thread.is_alive()
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-
-    def __exit__(self, *_: object) -> None:
-        self._end.set()
-        self._thread.join()
-        self.services.database.dispose()
 
 
 def test_while_others_write_it_is_one_state_with_every_archive_of_it(

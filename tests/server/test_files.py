@@ -12,7 +12,7 @@ import pytest
 from starlette.concurrency import run_in_threadpool
 
 from server.errors import CorruptUploadError, NotFoundError, TooLargeError
-from server.files import FileStore, StoredFile, UnusableStoreError
+from server.files import FileStore, StoreAwayError, StoredFile, UnusableStoreError
 from server.ids import new_id
 
 
@@ -130,3 +130,35 @@ def test_a_store_that_takes_its_time_keeps_nobody_from_reading(tmp_path: Path, m
         assert len(await asyncio.gather(*writing)) == 60
 
     asyncio.run(uploads())
+
+
+def test_what_is_left_of_uploads_by_a_killed_process_is_removed_by_name(store: FileStore) -> None:
+    write(store, "abc", b"weights")
+    for name in ("abc", "def", "other"):
+        store._filesystem.pipe_file(f"{store._root}/{name}.zip.part", b"wei")
+
+    store.clear_torn(["abc", "def", "ghi"])
+
+    assert sorted(path.rpartition("/")[2] for path in store._list()) == ["abc.zip", "other.zip.part"]
+
+
+def test_what_a_store_of_another_kind_raises_is_told_with_the_stores_name() -> None:
+    class Away:
+        """As botocore has them: no OSError."""
+
+        def __getattr__(self, _name: str) -> object:
+            def fail(*_: object, **__: object) -> None:
+                raise RuntimeError("nobody there")
+
+            return fail
+
+    store = FileStore(url := f"memory://{new_id()}", max_bytes=1_000)
+    write(store, "abc", b"weights")
+    file = store.open("abc")
+    store._filesystem = Away()
+    file._file = Away()  # type: ignore[attr-defined]
+    for ask in (store.ping, store.probe, store.ids, lambda: store.open("abc"), lambda: store.delete("abc"), file.read):
+        with pytest.raises(StoreAwayError, match=f"{url} can't be used: nobody there"):
+            ask()
+    with pytest.raises(StoreAwayError, match="nobody there"):
+        write(store, "def", b"weights")
