@@ -33,6 +33,7 @@ from server.field import endpoints as field
 from server.files import FileStore
 from server.http import pages
 from server.http.abandoned import AbandonedRequestsMiddleware
+from server.http.prefix import PathPrefixMiddleware
 from server.http.problems import UNAUTHORIZED, install_error_handlers
 from server.http.slow_clients import SlowClientMiddleware
 from server.jobs import endpoints as jobs
@@ -186,7 +187,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.services = services
     app.state.readiness = ReadinessProbe(services)
     services.instruments.registry.register(StateCollector(services))
-    pages.mount_pages(app, services.settings.web_dist)
+    pages.mount_pages(app, services.settings.web_dist, services.settings.path_prefix)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
     app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
@@ -203,6 +204,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(SlowClientMiddleware, seconds=services.settings.request_seconds)
     app.add_middleware(ClientAddressMiddleware, trusted_proxies=services.settings.trusted_proxies)
     app.add_middleware(RunLogsMiddleware)
+    if services.settings.path_prefix:
+        app.add_middleware(PathPrefixMiddleware, public_url=services.settings.resolved_public_url)
     return app
 
 

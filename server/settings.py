@@ -1,6 +1,7 @@
 """What the service is told from outside: environment variables with the prefix MAPLESS_."""
 
 import ipaddress
+import re
 from pathlib import Path
 from typing import Literal, Self
 from urllib.parse import urlsplit
@@ -19,6 +20,10 @@ PROJECT_ROOT = Path(__file__).resolve().parent.parent
 
 # A token that an attacker on the network may guess at needs at least this many characters.
 _MIN_NETWORK_TOKEN = 16
+
+# What the pages may be below; a first name that is the server's own would hide it from programs that leave the prefix out.
+_PREFIX = re.compile(r"(/[\w.~-]*[\w~-][\w.~-]*)*", re.ASCII)
+_OWN_PATHS = frozenset({"api", "live", "replays", "assets", "healthz", "readyz", "metrics"})
 
 
 def is_loopback(host: str) -> bool:
@@ -116,7 +121,9 @@ class Settings(BaseSettings):
         description="Replays, exports and evaluations side by side in the workers of `mapless up`; 2 if not given.",
     )
     public_url: str | None = Field(
-        None, description="How people reach the pages, for links in alerts; the server's own URL if not given."
+        None,
+        description="How people reach the pages, for links in alerts and invitations; the server's own URL if not given. "
+        "With a path (https://lab.example/mapless) the pages are below it.",
     )
     alerts_private_addresses: bool = Field(
         False, description="Whether webhooks may go to addresses of this machine and of private networks."
@@ -188,6 +195,21 @@ class Settings(BaseSettings):
             except ValueError as error:
                 raise ValueError(f"{proxy!r} is neither an address nor a network (10.0.0.5, 172.16.0.0/12)") from error
         return proxies
+
+    @field_validator("public_url")
+    @classmethod
+    def _leads_to_pages(cls, url: str | None) -> str | None:
+        if url is None:
+            return None
+        parts = urlsplit(url)
+        if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
+            raise ValueError(f"{url!r} is no address of pages, as https://lab.example or https://lab.example/mapless")
+        path = parts.path.rstrip("/")
+        if not _PREFIX.fullmatch(path):
+            raise ValueError(f"{path!r} is no path for pages: letters, digits, '-', '_', '.' and '~' between single slashes")
+        if path.partition("/")[2].partition("/")[0] in _OWN_PATHS:
+            raise ValueError(f"pages can't be below {path!r}: {', '.join(sorted(_OWN_PATHS))} are the server's own")
+        return url
 
     @field_validator("oidc_rights")
     @classmethod
@@ -276,3 +298,8 @@ class Settings(BaseSettings):
     def resolved_public_url(self) -> str:
         """Base URL of the pages, without a trailing slash."""
         return self.public_url.rstrip("/") if self.public_url else self.resolved_server_url
+
+    @property
+    def path_prefix(self) -> str:
+        """What stands before every path in a browser's address, as /mapless; empty where that is nothing."""
+        return urlsplit(self.public_url).path.rstrip("/") if self.public_url else ""

@@ -9,6 +9,10 @@ const server = process.env.MAPLESS_SERVER_URL ?? 'http://127.0.0.1:8400'
 
 export default defineConfig({
   plugins: [mantineStyles(), react(), pages(), compressed()],
+  experimental: {
+    // Scripts find one another from where they are: the server may stand below a path (src/lib/base.ts).
+    renderBuiltUrl: (_, { hostType }) => (hostType === 'js' ? { relative: true } : undefined),
+  },
   build: {
     target: 'es2022',
     // One sheet: of what it holds more than a page needs, less is lost than by a turn for each of a dozen.

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import ssl
 import sys
 import tempfile
 import time
@@ -175,7 +176,26 @@ def _server(settings: Settings) -> str:
     if answer.status_code != httpx.codes.OK:
         wrong = [f"{name}: {found}" for name, found in answer.json()["checks"].items() if found != "ok"]
         raise OSError(f"{local_url(settings)} is not ready ({', '.join(wrong)})")
-    return f"{local_url(settings)} is ready"
+    return f"{local_url(settings)} is ready{_public(settings)}"
+
+
+def _public(settings: Settings) -> str:
+    """Whether the address that people use leads to this server; a machine may be unable to look at itself from outside."""
+    if settings.public_url is None:
+        return ""
+    url = settings.resolved_public_url
+    try:
+        # As a worker would: a lab may have a certificate authority of its own.
+        answer = httpx.get(f"{url}/healthz", timeout=5.0, trust_env=False, verify=ssl.create_default_context())
+    except httpx.TransportError as error:
+        return f"; whether {url} leads to it can't be seen from here ({error})"
+    own = _ask(settings, "/healthz", None)
+    if own is None or (answer.status_code, answer.text) != (own.status_code, own.text):
+        raise AilingError(
+            f"{local_url(settings)} is ready, but at {url} something else answers (status {answer.status_code})",
+            f"Have the proxy pass on what comes to {url}/ to {local_url(settings)}, as docs/security.md shows.",
+        )
+    return f", {url} leads to it"
 
 
 def _opened(settings: Settings) -> Database | None:

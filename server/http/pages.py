@@ -1,16 +1,18 @@
 """The built pages: hashed assets that never change, and for every route of the application the HTML of its page."""
 
+import functools
 import json
 import re
 from pathlib import Path
 
 from fastapi import FastAPI, Request
-from fastapi.responses import FileResponse, HTMLResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.datastructures import Headers
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from server.errors import NotFoundError
+from server.http.prefix import is_at_home
 
 _MISSING = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Mapless</title>
 <body style="font: 1rem/1.5 system-ui; max-width: 40rem; margin: 4rem auto; padding: 0 1rem">
@@ -40,8 +42,14 @@ class _Assets(StaticFiles):
         return response
 
 
-def mount_pages(app: FastAPI, dist: Path) -> None:
-    """Serve `dist` beside the API; to be called last, since it answers every path that is left."""
+def mount_pages(app: FastAPI, dist: Path, prefix: str = "") -> None:
+    """Serve `dist` beside the API; to be called last, since it answers every path that is left.
+
+    Args:
+        app: where.
+        dist: the built pages.
+        prefix: what stands before every path in a browser's address, as /mapless; whoever comes without it is led there.
+    """
     app.mount("/assets", _Assets(directory=dist / "assets", check_dir=False), name="assets")
 
     @app.api_route("/{path:path}", methods=["GET", "HEAD"], include_in_schema=False)
@@ -52,9 +60,15 @@ def mount_pages(app: FastAPI, dist: Path) -> None:
         if file is not None:
             return FileResponse(file, headers={"Cache-Control": "no-cache"})
         html = _page_at(dist, f"/{path}")
-        if html.is_file():
+        if not html.is_file():
+            return HTMLResponse(_MISSING, status_code=503)
+        if not prefix:
             return FileResponse(html, headers={"Cache-Control": "no-cache"})
-        return HTMLResponse(_MISSING, status_code=503)
+        if not is_at_home(request, prefix):
+            query = request.url.query
+            return RedirectResponse(f"/{path}?{query}" if query else f"/{path}")
+        page = _below(prefix, html, html.stat().st_mtime_ns)
+        return HTMLResponse(page, headers={"Cache-Control": "no-cache"})
 
 
 def _page_at(dist: Path, address: str) -> Path:
@@ -65,6 +79,13 @@ def _page_at(dist: Path, address: str) -> Path:
         return dist / "index.html"
     found = (file for pattern, file in routes if re.fullmatch(pattern, address))
     return dist / "pages" / next(found, "NotFoundPage.html")
+
+
+@functools.lru_cache(maxsize=64)
+def _below(prefix: str, html: Path, _written: int) -> str:
+    """The HTML of a page whose addresses begin with a prefix; the application reads it there (`web/src/lib/base.ts`)."""
+    text = html.read_text(encoding="utf-8").replace("<html ", f'<html data-base="{prefix}" ', 1)
+    return re.sub(r'((?:href|src|data-entry)=")/', rf"\g<1>{prefix}/", text)
 
 
 def _file_within(directory: Path, path: str) -> Path | None:

@@ -98,7 +98,7 @@ async def choose_theme(subject: WatchedDep, request: Request) -> Response:
 
 
 @router.get("/live/{run_id}/{theme}/", include_in_schema=False, dependencies=[view("run_id")])
-async def show_page(subject: WatchedDep, theme: Theme, request: Request) -> Response:
+async def show_page(subject: WatchedDep, theme: Theme, request: Request, services: ServicesDep) -> Response:
     """The page inside the live view's frame.
 
     viser's client would connect to any server that `websocket` names, and play any file of `playbackPath`: both can bring
@@ -107,7 +107,8 @@ async def show_page(subject: WatchedDep, theme: Theme, request: Request) -> Resp
     path = f"/live/{subject.id}/{theme}"
     query = request.query_params
     servers = query.getlist("websocket")
-    foreign = any(not own_websocket(server, request.headers.get("host", ""), path) for server in servers)
+    ours = services.settings.path_prefix + path
+    foreign = any(not own_websocket(server, request.headers.get("host", ""), ours) for server in servers)
     if foreign or "playbackPath" in query:
         return RedirectResponse(f"{path}/?darkMode" if theme == "dark" else f"{path}/")
     return HTMLResponse(live_page(theme), headers=HEADERS)

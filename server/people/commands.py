@@ -62,7 +62,7 @@ class PeopleCommands:
             request = InvitationCreate(project_id=found.id if found else None, role=role, admin=admin, days=days)
             path = add_invitation(session, _BY, request).path
         database.dispose()
-        return self.settings.resolved_server_url + path
+        return self.settings.resolved_public_url + path
 
     def password_link(self, name: str) -> str:
         """A link by which somebody sets a new password.
@@ -78,7 +78,7 @@ class PeopleCommands:
                 raise NotFoundError(f"There is nobody called {name}.")
             path = add_reset(session, _BY, user).path
         database.dispose()
-        return self.settings.resolved_server_url + path
+        return self.settings.resolved_public_url + path
 
     def lines(self) -> list[str]:
         """Everybody with an account, a line each."""

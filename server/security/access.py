@@ -61,8 +61,9 @@ class AccessMiddleware:
         self._limiter = limiter
         self._metrics_token = settings.metrics_token.get_secret_value() if settings.metrics_token else None
         names = {settings.host, *settings.allowed_hosts, *_LOCAL_NAMES}
-        if settings.server_url:
-            names.add(urlsplit(settings.server_url).hostname or "")
+        for url in (settings.server_url, settings.public_url):
+            if url:
+                names.add(urlsplit(url).hostname or "")
         self._host_names = {name.lower() for name in names}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -2,13 +2,15 @@
 
 import asyncio
 import json
-import shutil
+import os
 import ssl
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -16,10 +18,8 @@ from websockets.asyncio.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from server.live.page import VISER_PROTOCOL
-from tests.conftest import require_program
+from tests.services.proxies import Way, certificate, proxy, settings_behind
 from tests.services.stack import ROLLOUT, TOKEN, Service, assert_one_unbroken_curve, free_port, until
-
-FILES = Path(__file__).parents[2] / "docs" / "proxies"
 
 
 @dataclass
@@ -36,81 +36,27 @@ class Proxied:
         return httpx.Client(base_url=self.url, transport=transport, timeout=30)
 
 
-def certificate(directory: Path) -> tuple[Path, Path]:
-    """A certificate for localhost, and its key."""
-    pem, key = directory / "mapless.pem", directory / "mapless.key"
-    subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"]
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"]
-    subprocess.run([*command, "-keyout", key, "-out", pem, *subject], check=True, capture_output=True)
-    return pem, key
+WAYS = (Way("caddy"), Way("nginx"), Way("caddy", "/mapless"), Way("nginx", "/tools/mapless"))
 
 
-def caddy(directory: Path, port: int, service: Service, pem: Path, key: Path) -> list[str]:
-    """The command that runs docs/proxies/Caddyfile with another name, port and certificate."""
-    text = (FILES / "Caddyfile").read_text()
-    assert "mapless.lab.example {" in text
-    text = text.replace("mapless.lab.example {", f"https://localhost:{port} {{\n\ttls {pem} {key}").replace(
-        "127.0.0.1:8400", f"127.0.0.1:{service.port}"
-    )
-    # Nothing outside of this test: no other port, no certificate authority.
-    (directory / "Caddyfile").write_text(f"{{\n\tadmin off\n\tauto_https disable_redirects\n}}\n{text}")
-    return ["caddy", "run", "--adapter", "caddyfile", "--config", str(directory / "Caddyfile")]
-
-
-def nginx(directory: Path, port: int, service: Service, pem: Path, key: Path) -> list[str]:
-    """The command that runs docs/proxies/nginx.conf with another name, port and certificate."""
-    text = (FILES / "nginx.conf").read_text()
-    for before, after in (
-        ("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"),
-        ("mapless.lab.example", "localhost"),
-        ("/etc/ssl/certs/mapless.pem", str(pem)),
-        ("/etc/ssl/private/mapless.key", str(key)),
-        ("127.0.0.1:8400", f"127.0.0.1:{service.port}"),
-    ):
-        assert before in text
-        text = text.replace(before, after)
-    places = "".join(
-        f"{kind}_temp_path {directory / kind};\n" for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
-    )
-    process = f"daemon off;\npid {directory / 'pid'};\nerror_log stderr;\nevents {{}}\n"
-    (directory / "nginx.conf").write_text(f"{process}http {{\naccess_log off;\n{places}{text}}}\n")
-    return ["nginx", "-c", str(directory / "nginx.conf"), "-e", "stderr"]
-
-
-@pytest.fixture(scope="module", params=[caddy, nginx], ids=["caddy", "nginx"])
+@pytest.fixture(scope="module", params=WAYS, ids=str)
 def proxied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxied]:
-    require_program(request.param.__name__)
+    way: Way = request.param
     directory = tmp_path_factory.mktemp("proxied")
-    directory.chmod(0o755)  # nginx's own user looks for its folders here
-    pem, key = certificate(directory)
-    port = free_port()
-    url = f"https://localhost:{port}"
-    service = Service(
-        directory,
-        MAPLESS_TRUSTED_PROXIES='["127.0.0.1"]',
-        MAPLESS_ALLOWED_HOSTS='["localhost"]',
-        SSL_CERT_FILE=str(pem),
-    )
-    service.start_server()
-    command = request.param(directory, port, service, pem, key)
-    with (directory / "proxy.log").open("wb") as log:
-        process = subprocess.Popen(
-            [shutil.which(command[0]) or command[0], *command[1:]],
-            env={**service.environment, "XDG_DATA_HOME": str(directory), "XDG_CONFIG_HOME": str(directory)},
-            stdout=log,
-            stderr=subprocess.STDOUT,
-        )
-    service.processes.append(process)
-    proxied = Proxied(service, url, ssl.create_default_context(cafile=str(pem)))
-    with proxied.client() as client:
+    own, port = certificate(directory), free_port()
+    service = Service(directory, SSL_CERT_FILE=str(own.pem), **settings_behind(way, port))
+    try:
+        service.start_server()
+        with proxy(directory, way, port, service.port, own, service.environment):
+            yield Proxied(service, f"https://localhost:{port}{way.path}", own.trust)
+    finally:
+        service.close()
 
-        def answers() -> bool:
-            assert process.poll() is None, (directory / "proxy.log").read_text()
-            return client.get("/healthz").status_code == 200
 
-        until(answers)
-    yield proxied
-    service.close()
+def origin(proxied: Proxied) -> str:
+    """As a browser has it: without the path."""
+    parts = urlsplit(proxied.url)
+    return f"{parts.scheme}://{parts.netloc}"
 
 
 @pytest.mark.services
@@ -130,7 +76,7 @@ def test_a_worker_that_knows_the_proxy_only_trains_and_is_watched(proxied: Proxi
             ssl=proxied.trust,
             subprotocols=[Subprotocol(VISER_PROTOCOL)],
             additional_headers=login,
-            origin=Origin(proxied.url),
+            origin=Origin(origin(proxied)),
         ) as scene:
             return await asyncio.wait_for(scene.recv(decode=False), 60)
 
@@ -170,7 +116,7 @@ def test_pages_hear_of_a_launch_at_once(proxied: Proxied) -> None:
 @pytest.mark.services
 def test_the_login_is_encrypted_and_guesses_count_for_who_guesses(proxied: Proxied) -> None:
     with proxied.client() as owner:
-        answer = owner.post("/api/login", json={"token": TOKEN}, headers={"Origin": proxied.url})
+        answer = owner.post("/api/login", json={"token": TOKEN}, headers={"Origin": origin(proxied)})
         assert answer.status_code == 204
         assert "secure" in answer.headers["set-cookie"].lower()
         assert owner.get("/api/status").status_code == 200
@@ -189,6 +135,25 @@ def test_the_login_is_encrypted_and_guesses_count_for_who_guesses(proxied: Proxi
 def test_an_upload_is_refused_by_mapless_not_by_the_proxy(proxied: Proxied) -> None:
     with proxied.client() as browser:
         answer = browser.post(
-            "/api/arenas", content=b"x" * 3_000_000, headers={"Authorization": f"Bearer {TOKEN}", "Origin": proxied.url}
+            "/api/arenas", content=b"x" * 3_000_000, headers={"Authorization": f"Bearer {TOKEN}", "Origin": origin(proxied)}
         )
     assert json.loads(answer.content)["detail"]
+
+
+@pytest.mark.services
+def test_the_client_and_the_doctor_know_the_address_of_the_proxy(proxied: Proxied) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**proxied.service.environment, "PATH": path, "MAPLESS_URL": f"{proxied.url}/", "MAPLESS_TOKEN": TOKEN}
+
+    def mapless(*arguments: str) -> str:
+        return subprocess.run(["mapless", *arguments], env=environment, check=True, capture_output=True, text=True).stdout
+
+    (run_id,) = proxied.service.launch(ROLLOUT)
+    (listed, *_) = map(json.loads, mapless("runs", "--json").splitlines())
+    assert listed["id"] == proxied.service.run(run_id)["experiment_id"]
+    if "MAPLESS_PUBLIC_URL" in environment:
+        assert f"{proxied.url} leads to it" in mapless("doctor")
+        environment["MAPLESS_PUBLIC_URL"] += "/elsewhere"
+        with pytest.raises(subprocess.CalledProcessError) as refused:
+            mapless("doctor")
+        assert "something else answers" in refused.value.stdout

@@ -10,6 +10,7 @@ import { BrowserRouter } from 'react-router'
 import { createQueryClient } from './api/client'
 import { App } from './app'
 import { Providers } from './components/Providers'
+import { BASE } from './lib/base'
 
 const root = document.getElementById('root')
 if (!root) throw new Error('index.html has no element with the id "root".')
@@ -37,7 +38,7 @@ startTransition(() =>
     <StrictMode>
       <QueryClientProvider client={createQueryClient()}>
         <Providers>
-          <BrowserRouter>
+          <BrowserRouter basename={BASE}>
             <App />
           </BrowserRouter>
         </Providers>

@@ -2,10 +2,11 @@
 import { notifications } from '@mantine/notifications'
 import { useEffect, useState } from 'react'
 import { $api } from '../api/client'
+import { at, BASE } from '../lib/base'
 
 /** Asked for in a hidden tab too: that is when somebody wants to be told. */
 const EVERY_MS = 10_000
-const KEY = 'mapless.alerts.shown'
+const KEY = `mapless.alerts.shown${BASE}`
 
 /** The newest alert that this browser has shown, in any of its tabs; undefined before the first. */
 function shown(): number | undefined {
@@ -35,7 +36,7 @@ export function useAlertNews(enabled: boolean): void {
       note.onclick = () => {
         window.focus()
         const path = run_id ? `/runs/${run_id}` : experiment_id ? `/experiments/${experiment_id}` : '/alerts'
-        window.location.assign(path)
+        window.location.assign(at(path))
       }
     }
   }, [data])

@@ -2,6 +2,7 @@
 import type { QueryClient } from '@tanstack/react-query'
 import { useQueryClient } from '@tanstack/react-query'
 import { useEffect } from 'react'
+import { at } from '../lib/base'
 import { positionOfFirstAnswer } from './client'
 
 export interface Change {
@@ -145,7 +146,7 @@ export function streamPath(client: QueryClient, since: string | undefined): stri
     }
   }
   const what = ['follow=shown', ...[...shown].sort()].join('&')
-  return `/api/events?${what}${since === undefined ? '' : `&since=${encodeURIComponent(since)}`}`
+  return at(`/api/events?${what}${since === undefined ? '' : `&since=${encodeURIComponent(since)}`}`)
 }
 
 /**

@@ -2,6 +2,7 @@
 import { Badge, Button, Group, Table, VisuallyHidden } from '@mantine/core'
 import { Link } from 'react-router'
 import type { Checkpoint } from '../api/types'
+import { at } from '../lib/base'
 import { count, dateTime, fileSize, significant } from '../lib/format'
 import classes from './ExperimentTable.module.css'
 import { evaluate, play, policyKey } from './evaluations/choices'
@@ -170,7 +171,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: Chec
                   </Button>
                   <Button
                     component="a"
-                    href={`/api/checkpoints/${checkpoint.id}/bundle`}
+                    href={at(`/api/checkpoints/${checkpoint.id}/bundle`)}
                     download
                     size="compact-sm"
                     variant="default"
@@ -181,7 +182,7 @@ export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: Chec
                   </Button>
                   <Button
                     component="a"
-                    href={`/api/checkpoints/${checkpoint.id}/download`}
+                    href={at(`/api/checkpoints/${checkpoint.id}/download`)}
                     download
                     size="compact-sm"
                     variant={checkpoint.best ? 'filled' : 'default'}

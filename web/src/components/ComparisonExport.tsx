@@ -1,5 +1,6 @@
 /** What leaves of a comparison: a table as one would print it, everything as a report or a link. */
 import { ActionIcon, Button, CopyButton, Menu } from '@mantine/core'
+import { at } from '../lib/base'
 import { IconDownload } from './icons'
 
 type Table = 'figures' | 'verdicts' | 'improvements' | 'differences'
@@ -32,7 +33,7 @@ export function TableExport({ table, title, query }: TableExportProps) {
           <Menu.Item
             key={format}
             component="a"
-            href={`/api/compare/table?${query}&table=${table}&format=${format}`}
+            href={at(`/api/compare/table?${query}&table=${table}&format=${format}`)}
             download
           >
             {label}
@@ -65,7 +66,7 @@ export function WholeExport({ query, data }: WholeExportProps) {
           </Button>
         )}
       </CopyButton>
-      <Button component="a" variant="default" href={`/api/compare/report?${query}`} download>
+      <Button component="a" variant="default" href={at(`/api/compare/report?${query}`)} download>
         Report (HTML)
       </Button>
       <Menu position="bottom-end" width={230}>
@@ -78,7 +79,7 @@ export function WholeExport({ query, data }: WholeExportProps) {
               key={format}
               leftSection={<IconDownload size={16} />}
               component="a"
-              href={`/api/compare/export?${data}&format=${format}`}
+              href={at(`/api/compare/export?${data}&format=${format}`)}
               download
             >
               {label}

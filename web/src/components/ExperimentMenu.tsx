@@ -5,6 +5,7 @@ import { useState } from 'react'
 import { Link } from 'react-router'
 import { useActions } from '../api/actions'
 import type { ListedExperiment } from '../api/types'
+import { at } from '../lib/base'
 import { plural } from '../lib/format'
 import { DeleteDialog } from './DeleteDialog'
 import {
@@ -132,7 +133,7 @@ function ExportItems({ path }: { path: string }) {
           key={format}
           leftSection={<IconDownload size={16} />}
           component="a"
-          href={`${path}/export?format=${format}`}
+          href={at(`${path}/export?format=${format}`)}
           download
         >
           {label}

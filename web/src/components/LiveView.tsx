@@ -15,6 +15,7 @@ import { type ReactNode, type RefObject, useEffect, useRef, useState } from 'rea
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
+import { at } from '../lib/base'
 import { count } from '../lib/format'
 import { IconMaximize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
@@ -160,7 +161,7 @@ export function LiveFrame({ page, overlay, receiving, whole }: LiveFrameProps) {
         <iframe
           key={`${dark}`}
           title="The robots in 3D"
-          src={`${page}${dark ? '?darkMode' : ''}`}
+          src={at(`${page}${dark ? '?darkMode' : ''}`)}
           allow="fullscreen"
           data-testid="live-frame"
         />

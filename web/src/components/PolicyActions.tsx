@@ -2,6 +2,7 @@
 import { Button, Menu } from '@mantine/core'
 import { Link } from 'react-router'
 import type { ShippedPolicy } from '../api/types'
+import { at } from '../lib/base'
 import { fileSize } from '../lib/format'
 import { evaluate, play, policyKey } from './evaluations/choices'
 import { IconCopy, IconDownload, IconPencil } from './icons'
@@ -12,7 +13,7 @@ interface PolicyActionsProps {
 }
 
 export function PolicyActions({ policy, size = 'sm' }: PolicyActionsProps) {
-  const path = `/api/policies/${policy.name}`
+  const path = at(`/api/policies/${policy.name}`)
   return (
     <>
       <Menu width={250}>

@@ -5,6 +5,7 @@ import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
 import { $api } from '../api/client'
 import type { LogLine, RunState } from '../api/types'
+import { at } from '../lib/base'
 import { count, dateTime, plural } from '../lib/format'
 import { IconDownload } from './icons'
 import classes from './RunLog.module.css'
@@ -42,7 +43,7 @@ export function RunLog({ runId, state }: { runId: string; state: RunState }) {
           />
           <Button
             component="a"
-            href={`/api/runs/${runId}/log/text`}
+            href={at(`/api/runs/${runId}/log/text`)}
             size="xs"
             variant="default"
             leftSection={<IconDownload size={14} />}

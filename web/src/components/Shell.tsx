@@ -9,6 +9,7 @@ import { useServerEvents } from '../api/events'
 import type { Status } from '../api/types'
 import { useStatus } from '../api/useStatus'
 import { BELL, MOON, NAVIGATION, SUN } from '../frame'
+import { at } from '../lib/base'
 import { plural } from '../lib/format'
 import { Boundary } from './Broken'
 import classes from './Shell.module.css'
@@ -34,7 +35,7 @@ export function Shell() {
       </a>
       <header className="frame-header">
         <Link to="/" className="frame-name" aria-label="Mapless, home">
-          <img src="/favicon.svg" alt="" width={22} height={22} />
+          <img src={at('/favicon.svg')} alt="" width={22} height={22} />
           <span>Mapless</span>
         </Link>
         {!locked && (

@@ -6,11 +6,12 @@ import { Link } from 'react-router'
 import { errorOf } from '../api/errors'
 import { IconSearch } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
+import { at } from '../lib/base'
 import { plural, words } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import classes from './ApiPage.module.css'
 
-const DESCRIPTION = '/api/openapi.json'
+const DESCRIPTION = at('/api/openapi.json')
 
 interface Parameter {
   name: string

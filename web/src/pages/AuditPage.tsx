@@ -7,6 +7,7 @@ import { IconDownload } from '../components/icons'
 import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { Page, Panel } from '../components/ui'
+import { at } from '../lib/base'
 import { dateTime } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -45,7 +46,7 @@ export function AuditPage() {
       actions={
         <Button
           component="a"
-          href={`/api/audit/csv?${new URLSearchParams(wanted)}`}
+          href={at(`/api/audit/csv?${new URLSearchParams(wanted)}`)}
           variant="default"
           leftSection={<IconDownload size={16} />}
         >

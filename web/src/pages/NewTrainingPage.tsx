@@ -24,6 +24,7 @@ import { SearchContext, settingsOf, useSearchState } from '../form/search'
 import { type Form, useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
 import { arenaFromSearch } from '../lib/arenas'
+import { BASE } from '../lib/base'
 import { suggestedName } from '../lib/experiments'
 import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -100,7 +101,7 @@ export function NewTrainingPage() {
       ) : (
         <LaunchForm
           key={key}
-          draft={`mapless-draft:${key}`}
+          draft={`mapless-draft${BASE}:${key}`}
           schema={form.data.schema as Schema}
           defaults={form.data.defaults as unknown as Json}
           initial={initial}

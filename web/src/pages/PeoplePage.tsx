@@ -11,6 +11,7 @@ import { Rows } from '../components/people/Rows'
 import { Secret } from '../components/people/Secret'
 import { useChange } from '../components/people/useChange'
 import { Page, Panel } from '../components/ui'
+import { at } from '../lib/base'
 import { dateTime } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -92,7 +93,10 @@ function People() {
                       onClick={() =>
                         reset.mutate(of, {
                           onSuccess: ({ path }) =>
-                            setLink({ name: person.name, href: new URL(path, window.location.origin).href }),
+                            setLink({
+                              name: person.name,
+                              href: new URL(at(path), window.location.origin).href,
+                            }),
                         })
                       }
                     >

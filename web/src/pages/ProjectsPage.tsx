@@ -11,6 +11,7 @@ import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
 import { Page, Panel } from '../components/ui'
+import { at } from '../lib/base'
 import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -112,7 +113,7 @@ function ProjectTools({ project, people }: { project: Project; people: boolean }
         size="compact-xs"
         variant="default"
         component="a"
-        href={`/api/projects/${project.id}/export`}
+        href={at(`/api/projects/${project.id}/export`)}
         download
         aria-label={`Export ${project.name}`}
       >

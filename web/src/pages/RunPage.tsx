@@ -34,6 +34,7 @@ import { thinnedInWords } from '../components/storage/rules'
 import { UnreadableSettings } from '../components/UnreadableSettings'
 import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
 import { useArenaTitle } from '../components/useArenaTitle'
+import { at } from '../lib/base'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
 import { useNumberInAddress, useReplayInAddress, useTitle } from '../lib/hooks'
@@ -335,7 +336,7 @@ function RunActions({ run, best, known }: OfRun) {
       {best && (
         <Button
           component="a"
-          href={`/api/checkpoints/${best.id}/download`}
+          href={at(`/api/checkpoints/${best.id}/download`)}
           download
           leftSection={<IconDownload size={16} />}
         >

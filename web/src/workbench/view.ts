@@ -1,6 +1,7 @@
 /** What the table of trainings shows, as its address says it: query, order, columns, groups, place. */
 import { useCallback, useMemo } from 'react'
 import { useSearchParams } from 'react-router'
+import { BASE } from '../lib/base'
 
 export type Place = 'live' | 'archived' | 'trash'
 
@@ -31,7 +32,7 @@ const DEFAULTS: TableView = {
 }
 const PLACES: readonly string[] = ['live', 'archived', 'trash']
 
-const PROJECT = 'mapless.project'
+const PROJECT = `mapless.project${BASE}`
 
 /** Id of the project that this browser's person chose last: lists show it, trainings are launched into it. Empty for all. */
 export const chosenProject = (): string => localStorage.getItem(PROJECT) ?? ''

@@ -1,9 +1,10 @@
 /** The arena that is being drawn, with what was undone; it survives leaving the page, in this browser. */
 import { useCallback, useEffect, useReducer } from 'react'
 import type { ArenaGeometry } from '../../api/types'
+import { BASE } from '../../lib/base'
 import { EMPTY, type Thing } from './things'
 
-const KEY = 'mapless-arena-draft'
+const KEY = `mapless-arena-draft${BASE}`
 
 /** Steps that can be undone. */
 const STEPS = 200

@@ -3,6 +3,7 @@ import { Button, Group, NumberInput, Select, Stack, TextInput } from '@mantine/c
 import { useState } from 'react'
 import { $api } from '../../api/client'
 import type { Project, Role } from '../../api/types'
+import { at } from '../../lib/base'
 import { Secret } from './Secret'
 import { useChange } from './useChange'
 
@@ -42,7 +43,7 @@ export function InviteForm({ projects, administrators = false }: InviteFormProps
           }
           invite.mutate(
             { body },
-            { onSuccess: ({ path }) => setLink(new URL(path, window.location.origin).href) },
+            { onSuccess: ({ path }) => setLink(new URL(at(path), window.location.origin).href) },
           )
         }}
       >

@@ -88,7 +88,7 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
               </Button>
               <DownloadPage page={page} />
               <Download
-                href={`/api/replays/${subjects}/${episode}/mcap`}
+                path={`/api/replays/${subjects}/${episode}/mcap`}
                 title="Scans, odometry, commands and transforms as ROS 2 messages, for Foxglove and ROS"
               >
                 MCAP

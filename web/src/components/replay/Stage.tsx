@@ -1,6 +1,7 @@
 /** Where a recording plays in 3D, once it is there; and the way to take it along. */
 import { Button } from '@mantine/core'
 import type { ComponentProps, RefObject } from 'react'
+import { at } from '../../lib/base'
 import { IconDownload } from '../icons'
 import { QueryError } from '../ui'
 import classes from './Replay.module.css'
@@ -29,7 +30,7 @@ export function Stage({ ref, frame, testId, title, what, page, time, query, prog
           key={page}
           ref={frame}
           title={title}
-          src={page}
+          src={at(page)}
           allow="fullscreen"
           data-testid={`${testId}-frame`}
           data-seconds={time ?? undefined}
@@ -44,16 +45,16 @@ export function Stage({ ref, frame, testId, title, what, page, time, query, prog
 }
 
 interface DownloadProps {
-  href: string
+  path: string
   title: string
   children: string
 }
 
-export function Download({ href, title, children }: DownloadProps) {
+export function Download({ path, title, children }: DownloadProps) {
   return (
     <Button
       component="a"
-      href={href}
+      href={at(path)}
       download
       variant="default"
       size="xs"
@@ -68,7 +69,7 @@ export function Download({ href, title, children }: DownloadProps) {
 /** The recording itself. */
 export function DownloadPage({ page }: { page: string }) {
   return (
-    <Download href={`${page}?download`} title="One file that plays in any browser, without Mapless">
+    <Download path={`${page}?download`} title="One file that plays in any browser, without Mapless">
       Download
     </Download>
   )
