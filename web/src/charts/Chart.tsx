@@ -9,13 +9,16 @@ import { type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
 import { lineColor } from './palette'
-import { type ChartData, type Line, lastValue, valueAt } from './series'
+import { aboveZero, allPositive, type ChartData, type Line, lastValue, valueAt } from './series'
 
 const HEIGHT = 220
 const STRIP = 150
 const AXIS_FONT = '11px system-ui, sans-serif'
 const THIN_ALPHA = 0.38
 const BAND_ALPHA = 0.14
+/** How uPlot calls what a scale is. */
+const LINEAR = 1
+const LOGARITHMIC = 3
 
 interface ChartProps {
   data: ChartData
@@ -24,7 +27,10 @@ interface ChartProps {
   format?: (value: number) => string
   /** Fixed ends of the y axis; without them it follows the data. */
   yRange?: readonly [number, number]
+  /** Where every value that is shown is above 0; else it says why not. */
   logarithmic?: boolean
+  /** The same of x: what lies at 0 is left out. */
+  logX?: boolean
   height?: number
   x?: Horizontal
   /** Where on x the cursor stands; null leaves it to whoever points. */
@@ -42,7 +48,8 @@ export function Chart({
   label,
   format = compact,
   yRange,
-  logarithmic = false,
+  logarithmic: wanted = false,
+  logX = false,
   height = HEIGHT,
   x = STEPS,
   at = null,
@@ -62,12 +69,13 @@ export function Chart({
   seek.current = onSeek
   const [zoomed, setZoomed] = useState(false)
   const [hidden, setHidden] = useState<readonly string[]>([])
-  const labelled = data.lines.filter((line) => line.label !== undefined)
-  const all = data
+  const all = useMemo(() => (logX ? aboveZero(data) : data), [data, logX])
+  const labelled = all.lines.filter((line) => line.label !== undefined)
   const drawn = useMemo(
     () => ({ x: all.x, lines: all.lines.filter((line) => !hidden.some((key) => isOf(line, key))) }),
     [all, hidden],
   )
+  const logarithmic = useMemo(() => wanted && allPositive(drawn.lines), [wanted, drawn])
 
   // A plot is made anew when its lines are others; new values of the same lines are only handed over.
   const structure = JSON.stringify([
@@ -92,9 +100,12 @@ export function Chart({
         width: element.clientWidth,
         height,
         scales: {
-          x: { time: false },
-          y:
-            low !== undefined && high !== undefined ? { range: [low, high] } : { distr: logarithmic ? 3 : 1 },
+          x: { time: false, distr: logX ? LOGARITHMIC : LINEAR },
+          y: logarithmic
+            ? { distr: LOGARITHMIC }
+            : low !== undefined && high !== undefined
+              ? { range: [low, high] }
+              : { distr: LINEAR },
         },
         legend: { show: false },
         cursor: {
@@ -155,7 +166,7 @@ export function Chart({
       made.destroy()
       plot.current = null
     }
-  }, [near, structure, dark, low, high, logarithmic, height, format, x])
+  }, [near, structure, dark, low, high, logarithmic, logX, height, format, x])
 
   const range = linked?.range ?? null
   const inside = useRef(false)
@@ -172,11 +183,11 @@ export function Chart({
   useEffect(() => {
     const chart = plot.current
     if (!chart || !linked) return
-    const [from, to] = range ?? [data.x[0], data.x.at(-1)]
+    const [from, to] = range ?? [all.x[0], all.x.at(-1)]
     const [shownFrom, shownTo] = rangeOf(chart)
     if (from === undefined || to === undefined || (from === shownFrom && to === shownTo)) return
     chart.setScale('x', { min: from, max: to })
-  }, [near, range, structure, dark, logarithmic])
+  }, [near, range, structure, dark, logarithmic, logX])
 
   // biome-ignore lint/correctness/useExhaustiveDependencies: a plot that is made anew, or zoomed, has its cursor elsewhere.
   useEffect(() => {
@@ -202,7 +213,7 @@ export function Chart({
       if (cell) cell.textContent = value === null ? '–' : format(value)
     })
     const step = where.current
-    if (step) step.textContent = index === null ? '' : `${x.title} ${x.format(data.x[index] ?? 0)}`
+    if (step) step.textContent = index === null ? '' : `${x.title} ${x.format(all.x[index] ?? 0)}`
   }
 
   return (
@@ -245,6 +256,14 @@ export function Chart({
           <button type="button" className={classes.reset} onClick={() => zoomOut.current()}>
             Reset zoom
           </button>
+        )}
+        {wanted && !logarithmic && (
+          <span className={classes.note}>
+            Drawn linearly: a logarithmic axis has no place for values of 0 or below
+          </span>
+        )}
+        {all.x.length < data.x.length && (
+          <span className={classes.note}>What lies at 0 has no place on a logarithmic axis</span>
         )}
       </div>
     </figure>

@@ -6,7 +6,8 @@ import { type Horizontal, STEPS } from './axis'
 import { Chart } from './Chart'
 import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
-import { allPositive, type ChartData, smoothed } from './series'
+import { type ChartData, smoothed } from './series'
+import type { LogSwitch } from './view'
 
 const MOST_SMOOTHING = 0.99
 
@@ -18,8 +19,10 @@ interface MetricChartProps {
   yRange?: readonly [number, number]
   /** Whether smoothing makes sense: not for a handful of evaluations. */
   smoothable?: boolean
-  /** Whether a logarithmic axis is offered. */
-  scalable?: boolean
+  /** Whether y is logarithmic, where that is offered. */
+  log?: LogSwitch
+  /** Whether x is. */
+  logX?: boolean
   height?: number
   /** Steps of the environment without it. */
   x?: Horizontal
@@ -34,7 +37,8 @@ export function MetricChart({
   note,
   data,
   smoothable = false,
-  scalable = false,
+  log,
+  logX = false,
   height = 220,
   foot = null,
   empty = 'No value yet',
@@ -43,9 +47,7 @@ export function MetricChart({
   ...rest
 }: MetricChartProps) {
   const [strength, setStrength] = useState(0)
-  const [logarithmic, setLogarithmic] = useState(false)
   const shown = useMemo(() => smoothed(data, strength), [data, strength])
-  const loggable = scalable && allPositive(data.lines)
   return (
     <div className={classes.metric}>
       <div className={classes.head}>
@@ -70,12 +72,13 @@ export function MetricChart({
               />
             </div>
           )}
-          {loggable && (
+          {log && (
             <Checkbox
               size="xs"
               label="Log"
-              checked={logarithmic}
-              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
+              aria-label={`Log axis of ${note ? `${title}, ${note}` : title}`}
+              checked={log.on}
+              onChange={(event) => log.set(event.currentTarget.checked)}
             />
           )}
           {data.x.length > 0 && (
@@ -85,7 +88,8 @@ export function MetricChart({
               format={format}
               x={x}
               yRange={rest.yRange}
-              logarithmic={logarithmic && loggable}
+              logarithmic={log?.on ?? false}
+              logX={logX}
             />
           )}
         </Group>
@@ -98,7 +102,8 @@ export function MetricChart({
         <Chart
           data={shown}
           label={title}
-          logarithmic={logarithmic && loggable}
+          logarithmic={log?.on ?? false}
+          logX={logX}
           height={height}
           format={format}
           x={x}

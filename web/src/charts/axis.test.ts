@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { choices, numbers, rounds } from './axis'
+import { choices, factors, numbers, rounds } from './axis'
 
 test('an axis of numbers has round ticks within its ends', () => {
   expect(rounds(0, 1)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1])
@@ -9,11 +9,14 @@ test('an axis of numbers has round ticks within its ends', () => {
   expect(axis.place(7)).toBeCloseTo(0.5)
 })
 
-test('a logarithmic axis has powers of ten, and its ends where those are fewer than two', () => {
+test('a logarithmic axis has powers of ten, or 1, 2 and 5 of one where those are fewer than two', () => {
   const axis = numbers([1e-4, 1e-2], String, { log: true })
   expect(axis.ticks.map(({ label }) => label)).toEqual(['0.0001', '0.001', '0.01'])
   expect(axis.place(1e-3)).toBeCloseTo(0.5)
-  expect(numbers([2, 8], String, { log: true }).ticks.map(({ label }) => label)).toEqual(['2', '8'])
+  expect(numbers([2, 8], String, { log: true }).ticks.map(({ label }) => label)).toEqual(['2', '5'])
+  expect(factors(300, 40_000)).toEqual([1_000, 10_000])
+  expect(factors(1e-12, 1e12)).toEqual([1e-12, 1e-7, 1e-2, 1e3, 1e8])
+  expect(factors(6, 8)).toEqual([6, 8])
 })
 
 test('where all values are one, or there are none, they lie in the middle', () => {

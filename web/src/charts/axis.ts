@@ -42,7 +42,7 @@ export function numbers(
   const isLog = log && low > 0
   const on = (value: number) => (isLog ? Math.log10(value) : value)
   const place = (value: unknown) => (on(Number(value)) - on(low)) / (on(high) - on(low))
-  const marks = isLog ? decades(low, high) : rounds(low, high)
+  const marks = isLog ? factors(low, high) : rounds(low, high)
   return { place, ticks: marks.map((mark) => ({ at: place(mark), label: roundTick(format(mark)) })) }
 }
 
@@ -67,10 +67,14 @@ export function rounds(low: number, high: number, steps: readonly number[] = [])
   )
 }
 
-/** Powers of ten between, or the ends where there are fewer than two. */
-function decades(low: number, high: number): number[] {
-  const first = Math.ceil(Math.log10(low) - 1e-9)
-  const last = Math.floor(Math.log10(high) + 1e-9)
-  const found = Array.from({ length: Math.max(0, last - first + 1) }, (_, index) => 10 ** (first + index))
-  return found.length >= 2 ? found : [low, high]
+/** Powers of ten from `low` to `high`, a few of them; where there are fewer than two, those of 1, 2 and 5 times one. */
+export function factors(low: number, high: number): number[] {
+  const found: number[] = []
+  for (let power = Math.floor(Math.log10(low)); 10 ** power <= high * (1 + 1e-9); power++)
+    for (const times of [1, 2, 5]) found.push(Number((times * 10 ** power).toPrecision(12)))
+  const inside = found.filter((one) => one >= low * (1 - 1e-9) && one <= high * (1 + 1e-9))
+  const powers = inside.filter((one) => Number.isInteger(Math.round(Math.log10(one) * 1e6) / 1e6))
+  if (powers.length < 2) return inside.length > 0 ? inside : [low, high]
+  const every = Math.ceil(powers.length / (TICKS + 1))
+  return powers.filter((_, index) => index % every === 0)
 }

@@ -10,7 +10,13 @@ export interface ChartSpec {
   format?: (value: number) => string
   yRange?: readonly [number, number]
   smoothable?: boolean
-  scalable?: boolean
+}
+
+/** What a chart is called in an address: its one metric, or else its title. */
+export function nameOf({ title, note, metrics, prefix }: ChartSpec): string {
+  const [only, ...more] = metrics
+  if (only && more.length === 0 && prefix === undefined) return only.name
+  return note ? `${title}, ${note}` : title
 }
 
 const rate = { format: percent, yRange: [0, 1.02] as const }
@@ -87,7 +93,6 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
         title: 'Value loss',
         metrics: [{ name: 'loss/value', label: 'loss' }],
         smoothable: true,
-        scalable: true,
         format: significant,
       },
       {
@@ -95,7 +100,6 @@ export const SECTIONS: readonly { title: string; charts: readonly ChartSpec[] }[
         note: 'old to new policy',
         metrics: [{ name: 'policy/kl', label: 'KL' }],
         smoothable: true,
-        scalable: true,
         format: significant,
       },
       { title: 'Entropy', metrics: [{ name: 'policy/entropy', label: 'entropy' }], format: significant },

@@ -45,3 +45,16 @@ test('a logarithmic axis has powers of ten', () => {
   const svg = svgOf({ x: [0, 1], lines: [values] }, { ...look, logarithmic: true })
   for (const power of ['0.01', '0.1', '1', '10']) expect(svg).toContain(`>${power}</text>`)
 })
+
+test('with a value at 0 the picture stays linear, as the chart on the page does', () => {
+  const values = { key: 'a', label: 'loss', color: 0, values: [0, 10] }
+  const chart = { x: [0, 1], lines: [values] }
+  expect(svgOf(chart, { ...look, logarithmic: true })).toBe(svgOf(chart, look))
+})
+
+test('a logarithmic x begins above 0: a tenth of the way is half of two decades', () => {
+  const values = { key: 'a', label: 'loss', color: 0, values: [9, 1, 2, 3] }
+  const svg = svgOf({ x: [0, 1, 10, 100], lines: [values] }, { ...look, yRange: [1, 3], logX: true })
+  expect(svg).toContain('<polyline points="70.0,312.0 387.0,174.0 704.0,36.0"')
+  for (const power of ['1', '10', '100']) expect(svg).toContain(`>${power}</text>`)
+})

@@ -1,7 +1,7 @@
 /** A chart as it leaves the page: SVG that needs nothing else, and the numbers as CSV. */
-import { type Horizontal, rounds } from './axis'
+import { factors, type Horizontal, rounds } from './axis'
 import { lineColor } from './palette'
-import type { ChartData, Line, Values } from './series'
+import { aboveZero, allPositive, type ChartData, type Line, type Values } from './series'
 
 export const WIDTH = 720
 const HEIGHT = 360
@@ -16,24 +16,29 @@ export interface PictureOptions {
   x: Horizontal
   format: (value: number) => string
   yRange?: readonly [number, number] | undefined
+  /** Where every value is above 0. */
   logarithmic?: boolean
+  /** The same of x: what lies at 0 is left out. */
+  logX?: boolean
 }
 
 /** The chart in its light colours, with title, axes and legend; as high as `heightOf` says. */
-export function svgOf(data: ChartData, options: PictureOptions): string {
-  const { title, x, format, yRange, logarithmic = false } = options
-  const bend = logarithmic ? Math.log10 : (value: number) => value
+export function svgOf(whole: ChartData, options: PictureOptions): string {
+  const { title, x, format, yRange, logX = false } = options
+  const data = logX ? aboveZero(whole) : whole
+  const logarithmic = options.logarithmic === true && allPositive(data.lines)
+  const bend = logarithmic ? Math.log10 : straight
+  const bendX = logX ? Math.log10 : straight
+  const [start, end] = [data.x[0] ?? 0, data.x.at(-1) ?? 0]
   const seen = data.lines.flatMap((line) => [line.values, line.band?.low ?? [], line.band?.high ?? []].flat())
   const values = seen.filter((value): value is number => value !== null && (!logarithmic || value > 0))
   const [low, high] = yRange && !logarithmic ? yRange : padded(values.map(bend))
-  const across = scale(data.x[0] ?? 0, data.x.at(-1) ?? 0, LEFT, WIDTH - RIGHT)
+  const along = scale(bendX(start), bendX(end), LEFT, WIDTH - RIGHT)
+  const across = (value: number) => along(bendX(value))
   const rise = scale(low, high, HEIGHT - BOTTOM, TOP)
   const up = (value: number) => rise(bend(value))
-  const yTicks = logarithmic
-    ? ticks(Math.floor(low), Math.ceil(high))
-        .filter((power) => Number.isInteger(power) && power >= low && power <= high)
-        .map((power) => 10 ** power)
-    : ticks(low, high)
+  const yTicks = logarithmic ? factors(10 ** low, 10 ** high) : ticks(low, high)
+  const xTicks = logX && end > start ? factors(start, end) : ticks(start, end, x.rounds)
   const ink = 'fill="#3d464d"'
   const legend = data.lines.filter((line) => line.label !== undefined)
   return [
@@ -44,7 +49,7 @@ export function svgOf(data: ChartData, options: PictureOptions): string {
       (tick) =>
         `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(format(tick))}</text>`,
     ),
-    ...ticks(data.x[0] ?? 0, data.x.at(-1) ?? 0, x.rounds).map(
+    ...xTicks.map(
       (tick) =>
         `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(x.format(tick))}</text>`,
     ),
@@ -124,6 +129,7 @@ function ticks(low: number, high: number, steps?: readonly number[]): number[] {
   return high <= low ? [low] : rounds(low, high, steps)
 }
 
+const straight = (value: number) => value
 const fixed = (value: number) => value.toFixed(1)
 
 function escaped(text: string): string {

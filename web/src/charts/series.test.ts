@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
 import { curves } from '../testing/examples'
 import { MAIN_CHARTS, SECTIONS } from './metrics'
-import { alignSeries, allPositive, lastValue, smooth, smoothed, valueAt } from './series'
+import { aboveZero, alignSeries, allPositive, lastValue, smooth, smoothed, valueAt } from './series'
 import { chartOf, chartOfCurves } from './shape'
 
 test('series of different steps share one x, with gaps where they have no point', () => {
@@ -53,6 +53,17 @@ test('a smoothed line keeps its raw values beneath it, and its own place in the 
 test('zero and below have no logarithm', () => {
   expect(allPositive([{ key: 'a', color: 0, values: [1, null, 0.1] }])).toBe(true)
   expect(allPositive([{ key: 'a', color: 0, values: [1, 0] }])).toBe(false)
+})
+
+test('a logarithmic x has a place for what lies above 0, with its band', () => {
+  const line = { key: 'a', color: 0, values: [1, 2, 3], band: { low: [0, 1, 2], high: [2, 3, 4] } }
+  const data = { x: [0, 10, 20], lines: [line] }
+  expect(aboveZero(data)).toEqual({
+    x: [10, 20],
+    lines: [{ key: 'a', color: 0, values: [2, 3], band: { low: [1, 2], high: [3, 4] } }],
+  })
+  expect(aboveZero({ ...data, x: [1, 10, 20] })).toEqual({ ...data, x: [1, 10, 20] })
+  expect(aboveZero({ x: [0], lines: [{ ...line, values: [1], band: { low: [0], high: [1] } }] }).x).toEqual([])
 })
 
 test('a chart of a run shows the series that have points, each with a colour of its own', () => {

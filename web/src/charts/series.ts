@@ -96,7 +96,22 @@ export function valueAt(values: Values, index: number): number | null {
   return null
 }
 
-/** Whether a logarithmic axis can show every point. */
+/** Whether a logarithmic axis can show every value. */
 export function allPositive(lines: readonly Line[]): boolean {
   return lines.every((line) => line.values.every((value) => value === null || value > 0))
+}
+
+/** What a logarithmic axis of x has a place for: all that lies above 0. */
+export function aboveZero({ x, lines }: ChartData): ChartData {
+  const from = x.findIndex((at) => at > 0)
+  if (from === 0) return { x, lines }
+  const cut = (values: Values) => (from < 0 ? [] : values.slice(from))
+  return {
+    x: from < 0 ? [] : x.slice(from),
+    lines: lines.map(({ band, ...line }) => ({
+      ...line,
+      values: cut(line.values),
+      ...(band ? { band: { low: cut(band.low), high: cut(band.high) } } : {}),
+    })),
+  }
 }

@@ -5,25 +5,40 @@ import { type Across, isAcross } from './across'
 
 export interface ChartView {
   across: Across
+  /** Whether x is logarithmic, in all charts. */
+  logX: boolean
+  /** The charts whose y is. */
+  logY: readonly string[]
 }
 
 /** What stands in the address only where it is another. */
-const USUAL: ChartView = { across: 'steps' }
+const USUAL: ChartView = { across: 'steps', logX: false, logY: [] }
+const ON = '1'
+/** More charts than a page has. */
+const MOST_NAMES = 60
 
 export function readView(search: URLSearchParams): ChartView {
   const across = search.get('x')
-  return { across: isAcross(across) ? across : USUAL.across }
+  return {
+    across: isAcross(across) ? across : USUAL.across,
+    logX: search.get('xlog') === ON,
+    logY: [...new Set(search.getAll('ylog'))].slice(0, MOST_NAMES),
+  }
 }
 
 /** The address's query with a view in it; all else stays. */
 export function writtenView(before: URLSearchParams, view: ChartView): URLSearchParams {
   const after = new URLSearchParams(before)
-  after.delete('x')
+  for (const name of ['x', 'xlog', 'ylog']) after.delete(name)
   if (view.across !== USUAL.across) after.set('x', view.across)
+  if (view.logX) after.set('xlog', ON)
+  for (const name of view.logY) after.append('ylog', name)
   return after
 }
 
-export function useChartView(): [ChartView, (change: Partial<ChartView>) => void] {
+export type ChangeView = (change: Partial<ChartView>) => void
+
+export function useChartView(): [ChartView, ChangeView] {
   const [search, setSearch] = useSearchParams()
   const change = useCallback(
     (part: Partial<ChartView>) =>
@@ -35,3 +50,17 @@ export function useChartView(): [ChartView, (change: Partial<ChartView>) => void
   )
   return [readView(search), change]
 }
+
+/** Whether a chart's y is logarithmic, and what changes it. */
+export interface LogSwitch {
+  on: boolean
+  set: (on: boolean) => void
+}
+
+export function logOf({ logY }: ChartView, change: ChangeView, name: string): LogSwitch {
+  const others = logY.filter((one) => one !== name)
+  return { on: others.length < logY.length, set: (on) => change({ logY: on ? [...others, name] : others }) }
+}
+
+/** What charts that share their zoom have in common: with another one they show all of x again. */
+export const sharedX = ({ across, logX }: ChartView): string => (logX ? `${across}, logarithmic` : across)

@@ -1,11 +1,11 @@
-/** How all charts of a page are looked at: what x is. */
-import { Group, NativeSelect, Text } from '@mantine/core'
+/** How all charts of a page are looked at: what x is, and whether it is logarithmic. */
+import { Checkbox, Group, NativeSelect, Text } from '@mantine/core'
 import { ACROSS, type Across } from '../charts/across'
-import type { ChartView } from '../charts/view'
+import type { ChangeView, ChartView } from '../charts/view'
 
 interface ChartControlsProps {
   view: ChartView
-  onView: (change: Partial<ChartView>) => void
+  onView: ChangeView
   /** Whether what x would be is known of any of the runs. */
   isKnown: (across: Across) => boolean
 }
@@ -30,6 +30,13 @@ export function ChartControls({ view, onView, isKnown }: ChartControlsProps) {
         value={view.across}
         data={options}
         onChange={(event) => onView({ across: event.currentTarget.value as Across })}
+      />
+      <Checkbox
+        size="xs"
+        label="Log"
+        aria-label="Log horizontal axis"
+        checked={view.logX}
+        onChange={(event) => onView({ logX: event.currentTarget.checked })}
       />
     </Group>
   )

@@ -6,7 +6,7 @@ import type { Curves } from '../api/types'
 import { ACROSS, type Across, isTime } from '../charts/across'
 import { MetricChart } from '../charts/MetricChart'
 import { chartOfCurves } from '../charts/shape'
-import type { ChartView } from '../charts/view'
+import { type ChangeView, type ChartView, logOf } from '../charts/view'
 import { compact, percent, plural } from '../lib/format'
 
 const POINTS = 400
@@ -38,16 +38,21 @@ interface CurveChartProps {
   metric: (typeof COMPARED)[number]
   experiments: readonly string[]
   view: ChartView
+  onView: ChangeView
 }
 
-export function CurveChart({ metric, experiments, view }: CurveChartProps) {
+export function CurveChart({ metric, experiments, view, onView }: CurveChartProps) {
   const { name, ...look } = metric
-  const { across } = view
-  const query = { experiment: [...experiments], name, points: POINTS, lines: LINES }
+  const { across, logX } = view
+  const query = {
+    ...{ experiment: [...experiments], name, points: POINTS, lines: LINES },
+    ...(across === 'steps' ? {} : { x: across }),
+    ...(logX ? { log: true } : {}),
+  }
   const { data, error } = $api.useQuery(
     'get',
     '/api/compare/curves',
-    { params: { query: across === 'steps' ? query : { ...query, x: across } } },
+    { params: { query } },
     { placeholderData: keepPreviousData },
   )
   const chart = useMemo(() => (data ? chartOfCurves(data) : { x: [], lines: [] }), [data])
@@ -56,6 +61,8 @@ export function CurveChart({ metric, experiments, view }: CurveChartProps) {
       {...look}
       data={chart}
       x={ACROSS[data?.across ?? across]}
+      logX={logX}
+      log={logOf(view, onView, name)}
       foot={data ? gridOf(data) : null}
       empty={error && !data ? 'Could not be loaded' : data ? (leftOut(data) ?? 'No value yet') : ''}
     />

@@ -7,7 +7,7 @@ import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
-import { useChartView } from '../charts/view'
+import { sharedX, useChartView } from '../charts/view'
 import { ChartControls } from '../components/ChartControls'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
@@ -213,10 +213,16 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               </Group>
             }
           >
-            <LinkedCharts of={view.across}>
+            <LinkedCharts of={sharedX(view)}>
               <div className={charts.grid}>
                 {COMPARED.map((metric) => (
-                  <CurveChart key={metric.name} metric={metric} experiments={chosen} view={view} />
+                  <CurveChart
+                    key={metric.name}
+                    metric={metric}
+                    experiments={chosen}
+                    view={view}
+                    onView={setView}
+                  />
                 ))}
               </div>
             </LinkedCharts>

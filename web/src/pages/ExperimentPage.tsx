@@ -7,7 +7,7 @@ import { isRefusal } from '../api/errors'
 import type { Experiment } from '../api/types'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
-import { useChartView } from '../charts/view'
+import { sharedX, useChartView } from '../charts/view'
 import { Below } from '../components/Below'
 import { ChartControls } from '../components/ChartControls'
 import { Configuration } from '../components/Configuration'
@@ -182,10 +182,16 @@ function Curves({ experimentId }: { experimentId: string }) {
   const isKnown = useKnownAcross([experimentId])
   return (
     <Panel title="Curves" actions={<ChartControls view={view} onView={setView} isKnown={isKnown} />}>
-      <LinkedCharts of={view.across}>
+      <LinkedCharts of={sharedX(view)}>
         <div className={charts.grid}>
           {COMPARED.map((metric) => (
-            <CurveChart key={metric.name} metric={metric} experiments={[experimentId]} view={view} />
+            <CurveChart
+              key={metric.name}
+              metric={metric}
+              experiments={[experimentId]}
+              view={view}
+              onView={setView}
+            />
           ))}
         </div>
       </LinkedCharts>

@@ -608,6 +608,7 @@ test('a run from before time was counted says so in place of its curves', async 
   ).toBeGreaterThan(0)
 })
 
+<<<<<<< HEAD
 test('a run whose curves were thinned says so beside its charts, and so does one that will be', async () => {
   const ended = { ...runDetail, state: 'completed', steps_per_second: null, seconds_left: null }
   startServer({
@@ -622,4 +623,31 @@ test('a run whose curves were thinned says so beside its charts, and so does one
   startServer({ ...routes, 'GET /api/runs/run1': { ...ended, thins_at: NOW + 9e4 } })
   open('/runs/run1')
   expect(await screen.findByTestId('thinned')).toHaveTextContent(/^A rule thins these curves on/)
+=======
+test('logarithmic axes are kept in the address, and where there can be none the chart says why', async () => {
+  const series = (name: string, values: number[]) => ({
+    name,
+    steps: [4096, 8192],
+    values,
+    min: null,
+    max: null,
+  })
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/metrics': {
+      series: [series('train/success_rate', [0, 0.4]), series('train/return', [10, 400])],
+      attempt: 1,
+      since: null,
+    },
+  })
+  const { router, user } = open('/runs/run1')
+  const main = within(await screen.findByTestId('main-curves'))
+  await user.click(main.getByRole('checkbox', { name: 'Log axis of Return, per episode' }))
+  expect(router.state.location.search).toBe('?ylog=Return%2C+per+episode')
+  expect(main.queryByText(/Drawn linearly/)).not.toBeInTheDocument()
+  await user.click(main.getByRole('checkbox', { name: 'Log axis of Success rate' }))
+  expect(main.getByText(/Drawn linearly: a logarithmic axis has no place for values of 0 or below/)).toBeVisible()
+  await user.click(main.getByRole('checkbox', { name: 'Log horizontal axis' }))
+  expect(router.state.location.search).toBe('?xlog=1&ylog=Return%2C+per+episode&ylog=Success+rate')
+>>>>>>> 202911f (Offer logarithmic axes on every chart of a run, a training and a comparison, kept in the address)
 })

@@ -7,14 +7,14 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Checkpoint, CheckpointPage, RunDetail, Series } from '../api/types'
-import { ACROSS, type Across, isCounted, placed } from '../charts/across'
+import { ACROSS, isCounted, placed } from '../charts/across'
 import { useCurves } from '../charts/following'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
-import { type ChartSpec, MAIN_CHARTS, SECTIONS } from '../charts/metrics'
+import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
 import { chartOf } from '../charts/shape'
-import { useChartView } from '../charts/view'
+import { type ChangeView, type ChartView, logOf, sharedX, useChartView } from '../charts/view'
 import { Below } from '../components/Below'
 import { ChartControls } from '../components/ChartControls'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
@@ -118,7 +118,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
         : series === null && reported.length > 0
           ? `${ACROSS[looks.across].label} was not counted when this run trained`
           : 'No value yet'
-  const drawn = { series: series ?? NO_SERIES, across: looks.across, empty: waiting }
+  const drawn = { series: series ?? NO_SERIES, view: looks, onView: setLooks, empty: waiting }
   const controls = (
     <ChartControls
       view={looks}
@@ -148,7 +148,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       actions={<RunActions run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />}
     >
-      <LinkedCharts of={looks.across}>
+      <LinkedCharts of={sharedX(looks)}>
         <Stack gap="md">
           <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
           {run.error && (
@@ -285,15 +285,26 @@ const NO_SERIES: readonly Series[] = []
 interface SpecChartProps {
   spec: ChartSpec
   series: readonly Series[]
-  across: Across
+  view: ChartView
+  onView: ChangeView
   height: number
   empty: string
 }
 
-function SpecChart({ spec, series, across, height, empty }: SpecChartProps) {
+function SpecChart({ spec, series, view, onView, height, empty }: SpecChartProps) {
   const data = useMemo(() => chartOf(spec, series), [spec, series])
   const { metrics: _, ...look } = spec
-  return <MetricChart {...look} data={data} x={ACROSS[across]} height={height} empty={empty} />
+  return (
+    <MetricChart
+      {...look}
+      data={data}
+      x={ACROSS[view.across]}
+      logX={view.logX}
+      log={logOf(view, onView, nameOf(spec))}
+      height={height}
+      empty={empty}
+    />
+  )
 }
 
 interface OfRun {
