@@ -5,8 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, PlainTextResponse
 
-from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Margin
+from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Horizontal, LogarithmicX, Margin
 from server.http.problems import INVALID, NOT_FOUND
+from server.printing.report import Look
 from server.printing.service import SUFFIXES, PrintingService, TextFormat, Wanted
 from server.printing.tables import TableName
 from server.security.permissions import view
@@ -15,16 +16,20 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/compare", tags=["comparison"])
 
 _MEDIA = {"latex": "application/x-tex", "markdown": "text/markdown", "csv": "text/csv"}
-# What the page shows at first.
-_CURVES = ("eval/success_rate", "train/success_rate", "train/return", "eval/steps")
+# Curves of a report.
+_MOST_CURVES = 24
 
 Metrics = Annotated[
     list[str],
     Query(
         alias="name",
-        max_length=24,
+        max_length=_MOST_CURVES,
         description="Metrics whose curves are drawn; those that the page shows at first without.",
     ),
+]
+LogarithmicY = Annotated[
+    list[str],
+    Query(alias="ylog", max_length=_MOST_CURVES, description="Metrics whose values are drawn on a logarithmic axis."),
 ]
 
 
@@ -62,10 +67,13 @@ def compare_report(
     margin: Margin = 0.02,
     base: Base = None,
     every_pair: EveryPair = False,
+    across: Horizontal = "steps",
+    logarithmic: LogarithmicX = False,
+    log_names: LogarithmicY = [],  # noqa: B006
 ) -> HTMLResponse:
     """The whole comparison as one HTML file that needs no script and opens offline."""
     wanted = Wanted(list(dict.fromkeys(experiment_ids)), margin, base, every_pair)
-    metrics = list(dict.fromkeys(names)) or _CURVES
-    text = PrintingService(services).report(wanted, metrics, str(request.base_url).rstrip("/"))
+    look = Look(list(dict.fromkeys(names)), across, logarithmic, list(dict.fromkeys(log_names)))
+    text = PrintingService(services).report(wanted, look, str(request.base_url).rstrip("/"))
     headers = {"Content-Disposition": 'attachment; filename="mapless-comparison.html"'}
     return HTMLResponse(text, headers=headers)

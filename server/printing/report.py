@@ -1,12 +1,14 @@
 """The whole comparison as one HTML file: no script, nothing to load, opens offline."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles
 from server.estimates import is_rate
-from server.printing.svg import Line, line_chart
+from server.printing.axes import ACROSS, Horizontal
+from server.printing.svg import Line, can_be_logarithmic, line_chart
 from server.printing.tables import PrintedTable, TableName, printed
 
 _STYLE = """
@@ -17,9 +19,32 @@ th, td { padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; bo
 .wide { overflow-x: auto; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr)); gap: 1.5rem; }
 figure { margin: 0; }
-p.note { max-width: 90ch; font-size: .87em; opacity: .85; }
+p.note, figcaption.note { max-width: 90ch; font-size: .87em; opacity: .85; }
 """
 _TABLES: tuple[TableName, ...] = ("figures", "verdicts", "improvements", "differences")
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the curves are looked at, as a page's address says it.
+
+    Attributes:
+        metrics: whose curves there are, in order; empty for those that a page shows at first.
+        across: what x is.
+        log_x: whether it is logarithmic.
+        log_y: the metrics whose values are.
+    """
+
+    metrics: Sequence[str] = ()
+    across: Across = "steps"
+    log_x: bool = False
+    log_y: Collection[str] = ()
+
+    def address(self) -> list[tuple[str, str]]:
+        """As a page's address says it."""
+        across = [] if self.across == "steps" else [("x", str(self.across))]
+        log_x = [("xlog", "1")] if self.log_x else []
+        return [*across, *log_x, *(("ylog", name) for name in self.log_y), *(("panel", name) for name in self.metrics)]
 
 
 @dataclass(frozen=True)
@@ -29,6 +54,7 @@ class Report:
     Attributes:
         comparison, profiles: of the experiments.
         curves: of each metric.
+        look: how they are drawn.
         link: the address of the page that shows the same.
         made: when and by what, as a sentence.
     """
@@ -36,6 +62,7 @@ class Report:
     comparison: Comparison
     profiles: Profiles
     curves: Sequence[Curves]
+    look: Look
     link: str
     made: str
 
@@ -71,22 +98,46 @@ class Report:
             if one.mean
         ]
         title = "Performance profile: share of attempts that score more"
-        x_title = "Score: path efficiency of an arrival, else 0"
-        return _figure(title, line_chart(title, x_title, self.profiles.thresholds, lines, rate=True))
+        return _figure(title, line_chart(title, _SCORE, self.profiles.thresholds, lines, rate=True))
 
     def _curves(self, curves: Curves) -> str:
         lines = [
             Line(_label(one.name, max(one.count, default=0)), color, one.mean, one.low, one.high)
             for color, one in enumerate(curves.experiments)
         ]
-        return _figure(curves.name, line_chart(curves.name, "Steps", curves.steps, lines, rate=is_rate(curves.name)))
+        log_y = curves.name in self.look.log_y
+        chart = line_chart(
+            curves.name,
+            ACROSS[curves.across],
+            curves.steps if curves.x is None else curves.x,
+            lines,
+            rate=is_rate(curves.name),
+            log_x=self.look.log_x,
+            log_y=log_y,
+        )
+        return _figure(curves.name, chart, " ".join(_notes(curves, linear=log_y and not can_be_logarithmic(lines))))
 
 
+def _notes(curves: Curves, *, linear: bool) -> list[str]:
+    """What has to be known to read the curves."""
+    left_out = sum(one.unplaced for one in curves.experiments)
+    notes = []
+    if curves.across != "steps":
+        notes.append("Means end where the first seed is through.")
+    if left_out:
+        notes.append(f"Runs left out, of which x was not counted when they trained: {left_out}.")
+    if linear:
+        notes.append("Drawn linearly: a logarithmic axis has no place for values of 0 or below.")
+    return notes
+
+
+_SCORE = Horizontal("Score: path efficiency of an arrival, else 0", lambda value: f"{value:g}")
 _BANDS = "Means over seeds; bands are 95 % intervals over seeds (Student's t, of rates on the scale of the logit)."
 
 
-def _figure(title: str, chart: str) -> str:
-    return f"<figure><h3>{escape(title)}</h3>{chart}</figure>"
+def _figure(title: str, chart: str, note: str = "") -> str:
+    below = f'<figcaption class="note">{escape(note)}</figcaption>' if note else ""
+    return f"<figure><h3>{escape(title)}</h3>{chart}{below}</figure>"
 
 
 def _label(name: str, seeds: int) -> str:

@@ -7,7 +7,7 @@ from typing import Literal
 from urllib.parse import urlencode
 
 from server.comparison.service import ComparisonService
-from server.printing.report import Report
+from server.printing.report import Look, Report
 from server.printing.tables import TableName, printed
 from server.printing.text import comma_separated, latex, markdown
 from server.services import Services
@@ -19,6 +19,8 @@ SUFFIXES: dict[TextFormat, str] = {"latex": "tex", "markdown": "md", "csv": "csv
 _WRITERS = {"latex": latex, "markdown": markdown, "csv": comma_separated}
 # Of curves in a report: as many as its charts have room for.
 _POINTS = 240
+# What the page shows at first.
+_USUAL = ("eval/success_rate", "train/success_rate", "train/return", "eval/steps")
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,11 @@ class Wanted:
     base: str | None
     every_pair: bool
 
-    def address(self) -> str:
+    def address(self, look: Look) -> str:
         """Of the page that shows it, without the host."""
         base = "pairs" if self.every_pair else self.base
         query = [*(("experiment", each) for each in self.experiment_ids), ("margin", f"{self.margin:g}")]
-        return f"/compare?{urlencode(query + ([('base', base)] if base else []))}"
+        return f"/compare?{urlencode([*query, *([('base', base)] if base else []), *look.address()])}"
 
 
 class PrintingService:
@@ -61,12 +63,12 @@ class PrintingService:
         )
         return _WRITERS[text_format](printed(comparison, name))
 
-    def report(self, wanted: Wanted, metrics: Sequence[str], host: str) -> str:
+    def report(self, wanted: Wanted, look: Look, host: str) -> str:
         """Everything in one HTML file.
 
         Args:
             wanted: what is compared.
-            metrics: whose curves are drawn.
+            look: how its curves are.
             host: where the service is reached, without a slash at its end.
 
         Raises:
@@ -77,7 +79,11 @@ class PrintingService:
         return Report(
             comparison=self._comparisons.compare(ids, wanted.margin, wanted.base, every_pair=wanted.every_pair),
             profiles=self._comparisons.profiles(ids),
-            curves=[self._comparisons.curves(ids, name, _POINTS) for name in metrics],
-            link=host + wanted.address(),
+            curves=[
+                self._comparisons.curves(ids, name, _POINTS, across=look.across, logarithmic=look.log_x)
+                for name in look.metrics or _USUAL
+            ],
+            look=look,
+            link=host + wanted.address(look),
             made=f"Made {made} by Mapless {version()}{f' ({commit()})' if commit() else ''}.",
         ).html()

@@ -1,15 +1,15 @@
 """A line chart as SVG: means with their bands, axes with titles, a legend. Needs no script and no font of its own."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+
+from server.printing.axes import Horizontal, scale, ticks
 
 _WIDTH, _HEIGHT = 560, 280
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 12, 12, 48
 # Pixels of a row of the legend.
 _ROW = 18
-_TICKS = 5
 # After Okabe and Ito (2008), as on the pages; after eight they repeat.
 COLORS = ("#0072b2", "#d55e00", "#00895e", "#b8568f", "#a06f00", "#3f9bd1", "#6a4fb3", "#767676")
 
@@ -27,28 +27,43 @@ class Line:
     high: Values
 
 
-def line_chart(title: str, x_title: str, x: Sequence[float], lines: Sequence[Line], *, rate: bool) -> str:
+def line_chart(
+    title: str,
+    horizontal: Horizontal,
+    x: Sequence[float],
+    lines: Sequence[Line],
+    *,
+    rate: bool,
+    log_x: bool = False,
+    log_y: bool = False,
+) -> str:
     """The chart as an `svg` element.
 
     Args:
         title: for those who can't see it.
-        x_title: of the axis.
+        horizontal: what x is.
         x: of every value, ascending.
         lines: each as long as `x`.
         rate: whether y is a share, 0 to 1.
+        log_x: whether x is logarithmic; every one is above 0 then.
+        log_y: whether y is, where every mean is above 0.
     """
     drawn = [line for line in lines if any(value is not None for value in line.mean)]
-    values = [value for line in drawn for side in (line.mean, line.low, line.high) for value in side if value is not None]
+    log_y = log_y and can_be_logarithmic(drawn)
+    sides = [(line.mean,) if log_y else (line.mean, line.low, line.high) for line in drawn]
+    values = [value for line in sides for side in line for value in side if value is not None]
     height = _HEIGHT + _ROW * len(drawn)
     box = f'viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="{escape(title)}"'
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" {box} font-family="system-ui, sans-serif" font-size="11">']
     if values:
-        low, high = (0.0, 1.0) if rate else _padded(min(values), max(values))
-        across = _scale(x[0], x[-1], _LEFT, _WIDTH - _RIGHT)
-        up = _scale(low, high, _HEIGHT - _BOTTOM, _TOP)
-        parts += _axes(x_title, (x[0], x[-1]), (low, high), across, up, rate=rate)
+        low, high = (0.0, 1.0) if rate and not log_y else _padded(min(values), max(values), log=log_y)
+        across = scale(x[0], x[-1], _LEFT, _WIDTH - _RIGHT, logarithmic=log_x)
+        up = scale(low, high, _HEIGHT - _BOTTOM, _TOP, logarithmic=log_y)
+        parts += _levels(ticks(low, high, logarithmic=log_y), up, rate=rate)
+        parts += _places(horizontal, ticks(x[0], x[-1], horizontal.rounds, logarithmic=log_x), across)
         for line in drawn:
-            parts += _line(x, line, across, up)
+            # An interval that reaches below what a logarithmic axis shows ends at its edge.
+            parts += _line(x, line, across, lambda value: up(max(value, low)) if log_y else up(value))
         parts += [_entry(row, line) for row, line in enumerate(drawn)]
     else:
         parts.append(
@@ -57,24 +72,25 @@ def line_chart(title: str, x_title: str, x: Sequence[float], lines: Sequence[Lin
     return "\n".join([*parts, "</svg>"])
 
 
-def _axes(
-    x_title: str,
-    x: tuple[float, float],
-    y: tuple[float, float],
-    across: Callable[[float], float],
-    up: Callable[[float], float],
-    *,
-    rate: bool,
-) -> list[str]:
+def can_be_logarithmic(lines: Sequence[Line]) -> bool:
+    """Whether a logarithmic axis has a place for every mean."""
+    return all(value is None or value > 0.0 for line in lines for value in line.mean)
+
+
+def _levels(levels: Sequence[float], up: Callable[[float], float], *, rate: bool) -> list[str]:
     parts = []
-    for tick in _ticks(*y):
+    for tick in levels:
         level = f"{up(tick):.1f}"
         ends = f'x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{level}" y2="{level}"'
         parts.append(f'<line {ends} stroke="currentColor" stroke-opacity="0.15"/>')
-        parts.append(_text(_LEFT - 6, up(tick) + 4, "end", f"{tick:.0%}" if rate else f"{tick:g}"))
+        parts.append(_text(_LEFT - 6, up(tick) + 4, "end", f"{100 * tick:.3g}%" if rate else f"{tick:g}"))
+    return parts
+
+
+def _places(horizontal: Horizontal, places: Sequence[float], across: Callable[[float], float]) -> list[str]:
     below = _HEIGHT - _BOTTOM
-    parts += [_text(across(tick), below + 16, "middle", f"{tick:,g}") for tick in _ticks(*x)]
-    return [*parts, _text((_LEFT + _WIDTH - _RIGHT) / 2, below + 34, "middle", x_title)]
+    parts = [_text(across(tick), below + 16, "middle", horizontal.text(tick)) for tick in places]
+    return [*parts, _text((_LEFT + _WIDTH - _RIGHT) / 2, below + 34, "middle", horizontal.title)]
 
 
 def _text(left: float, top: float, anchor: str, text: str) -> str:
@@ -108,22 +124,9 @@ def _entry(row: int, line: Line) -> str:
     )
 
 
-def _padded(low: float, high: float) -> tuple[float, float]:
+def _padded(low: float, high: float, *, log: bool = False) -> tuple[float, float]:
+    if log:
+        room = max((high / low) ** 0.05, 1.01)
+        return low / room, high * room
     room = (high - low) * 0.05 or abs(high) * 0.05 or 1.0
     return low - room, high + room
-
-
-def _scale(low: float, high: float, start: float, end: float) -> Callable[[float], float]:
-    span = high - low
-    return lambda value: (start + end) / 2 if span == 0 else start + (value - low) / span * (end - start)
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Round numbers from low to high, about five."""
-    if high <= low:
-        return [low]
-    rough = (high - low) / _TICKS
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(power * factor for factor in (1, 2, 2.5, 5, 10) if power * factor >= rough)
-    first = math.ceil(low / step - 1e-9)
-    return [round(index * step, 12) + 0.0 for index in range(first, math.floor(high / step + 1e-9) + 1)]

@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from httpx import Response
 
+from server.printing.axes import STEPS, elapsed, ticks
 from server.printing.svg import Line, line_chart
 from server.printing.tables import PrintedTable
 from server.printing.text import comma_separated, latex, markdown
@@ -121,13 +122,57 @@ def test_the_report_is_one_file_without_a_script(
 def test_a_line_chart_in_numbers() -> None:
     """From 64 to 548 across, from 232 up to 12: a half is at 122."""
     line = Line("one", 0, mean=[0.0, None, 0.5], low=[None, None, 0.25], high=[None, None, 1.0])
-    chart = line_chart("t", "Steps", [0, 50, 100], [line], rate=True)
+    chart = line_chart("t", STEPS, [0, 50, 100], [line], rate=True)
     assert '<polyline points="64.0,232.0 548.0,122.0"' in chart
     assert '<polygon points="548.0,12.0 548.0,177.0"' in chart
     assert all(f">{tick}</text>" in chart for tick in ("0%", "100%", "20", "100"))
-    alone = line_chart("t", "Steps", [5], [Line("one", 0, [2.0], [None], [None])], rate=False)
+    alone = line_chart("t", STEPS, [5], [Line("one", 0, [2.0], [None], [None])], rate=False)
     assert '<circle cx="306.0" cy="122.0" r="3"' in alone
-    assert "No value yet" in line_chart("t", "Steps", [], [], rate=True)
+    assert "No value yet" in line_chart("t", STEPS, [], [], rate=True)
+
+
+def test_logarithmic_axes_of_a_chart_in_numbers() -> None:
+    """Across from 1 to 100: 10 is in the middle, at 306. Up from 1 / r to 100 r with r = 100 ** 0.05: 10 is halfway, at 122."""
+    line = Line("one", 0, mean=[1.0, 10.0, 100.0], low=[0.5, -3.0, 90.0], high=[2.0, 20.0, 110.0])
+    chart = line_chart("t", STEPS, [1, 10, 100], [line], rate=False, log_x=True, log_y=True)
+    assert " 306.0,122.0 " in chart
+    # Where the interval reaches below 0 it ends at the chart's edge.
+    assert "306.0,232.0" in chart
+    assert all(f">{tick}</text>" in chart for tick in ("1", "10", "100"))
+    zero = Line("one", 0, mean=[0.0, 1.0], low=[None] * 2, high=[None] * 2)
+    assert line_chart("t", STEPS, [1, 2], [zero], rate=False, log_y=True) == line_chart(
+        "t", STEPS, [1, 2], [zero], rate=False
+    )
+
+
+def test_ticks_are_round_as_what_they_count() -> None:
+    assert ticks(0.0, 1.0) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
+    assert ticks(0.0, 7_200.0, (900.0, 1_800.0, 3_600.0)) == [0.0, 1_800.0, 3_600.0, 5_400.0, 7_200.0]
+    assert ticks(300.0, 40_000.0, logarithmic=True) == [1_000.0, 10_000.0]
+    assert ticks(2.0, 8.0, logarithmic=True) == [2.0, 5.0]
+    assert ticks(6.0, 8.0, logarithmic=True) == [6.0, 8.0]
+    assert [elapsed(seconds) for seconds in (0.25, 45, 200, 7_500, 270_000)] == [
+        *("0.25 s", "45 s", "3 min 20 s", "2 h 5 min", "3 d 3 h")
+    ]
+
+
+def test_a_report_is_looked_at_as_its_page_was(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment(seeds=(0, 1))
+    for run in experiment["runs"]:
+        reports.rows(
+            run,
+            {step: {"time/wall_seconds": 36.0 * step, "loss/value": step - 100.0, "policy/kl": 0.1} for step in (100, 200)},
+        )
+    asked = {"name": ["policy/kl", "loss/value"], "x": "wall", "log": "true", "ylog": ["loss/value"]}
+    text = printed(client, "report", experiment, **asked).text  # type: ignore[arg-type]
+    assert text.index("<h3>policy/kl") < text.index("<h3>loss/value")
+    assert "<h3>eval/success_rate" not in text
+    assert text.count(">Time under way</text>") == 2
+    assert ">1 h 23 min</text>" in text
+    assert "Means end where the first seed is through." in text
+    assert text.count("Drawn linearly: a logarithmic axis has no place for values of 0 or below.") == 1
+    link = f"/compare?experiment={experiment['id']}&margin=0.02&x=wall&xlog=1&ylog=loss%2Fvalue"
+    assert f"{link}&panel=policy%2Fkl&panel=loss%2Fvalue".replace("&", "&amp;") in text
 
 
 def test_what_cannot_be_printed(client: TestClient, reports: Reports) -> None:

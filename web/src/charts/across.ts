@@ -35,10 +35,10 @@ export const isAcross = (text: string | null): text is Across => text !== null &
 /** Whether x is in seconds. */
 export const isTime = (across: Across): boolean => across === 'wall' || across === 'cpu'
 
-/** Whether it is known what was counted at the series' steps. */
-export function isCounted(series: readonly Series[], across: Across): boolean {
+/** Whether what x would be was counted, given all metrics that were reported; before any was, nobody knows. */
+export function isCounted(reported: readonly string[], across: Across): boolean {
   const { counter } = ACROSS[across]
-  return counter === undefined || series.some(({ name }) => name === counter)
+  return counter === undefined || reported.length === 0 || reported.includes(counter)
 }
 
 function time(title: string): Horizontal {

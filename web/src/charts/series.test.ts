@@ -63,7 +63,9 @@ test('a logarithmic x has a place for what lies above 0, with its band', () => {
     lines: [{ key: 'a', color: 0, values: [2, 3], band: { low: [1, 2], high: [3, 4] } }],
   })
   expect(aboveZero({ ...data, x: [1, 10, 20] })).toEqual({ ...data, x: [1, 10, 20] })
-  expect(aboveZero({ x: [0], lines: [{ ...line, values: [1], band: { low: [0], high: [1] } }] }).x).toEqual([])
+  expect(aboveZero({ x: [0], lines: [{ ...line, values: [1], band: { low: [0], high: [1] } }] }).x).toEqual(
+    [],
+  )
 })
 
 test('a chart of a run shows the series that have points, each with a colour of its own', () => {

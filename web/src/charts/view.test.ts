@@ -2,17 +2,17 @@ import { expect, test } from 'vitest'
 import { logOf, readView, sharedX, writtenView } from './view'
 
 test('a view is read from the address as it was written there, and leaves the rest of it alone', () => {
-  const view = { across: 'wall', logX: true, logY: ['loss/value', 'Return, per episode'] } as const
+  const view = { across: 'wall', logX: true, logY: ['loss/value', 'Return, per episode'], panels: ['policy/kl', 'train/return'] } as const
   const written = writtenView(new URLSearchParams('experiment=a&experiment=b&x=cpu'), view)
   expect(written.toString()).toBe(
-    'experiment=a&experiment=b&x=wall&xlog=1&ylog=loss%2Fvalue&ylog=Return%2C+per+episode',
+    'experiment=a&experiment=b&x=wall&xlog=1&ylog=loss%2Fvalue&ylog=Return%2C+per+episode&panel=policy%2Fkl&panel=train%2Freturn',
   )
   expect(readView(written)).toEqual(view)
 })
 
 test('what is usual does not stand in the address, and what nobody could have chosen is not believed', () => {
   const usual = readView(new URLSearchParams('x=nonsense&xlog=maybe'))
-  expect(usual).toEqual({ across: 'steps', logX: false, logY: [] })
+  expect(usual).toEqual({ across: 'steps', logX: false, logY: [], panels: null })
   expect(writtenView(new URLSearchParams('x=nonsense&step=4'), usual).toString()).toBe('step=4')
   const many = new URLSearchParams(Array.from({ length: 500 }, (_, index) => ['ylog', `m/${index}`]))
   expect(readView(many).logY).toHaveLength(60)

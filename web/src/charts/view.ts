@@ -2,6 +2,7 @@
 import { useCallback } from 'react'
 import { useSearchParams } from 'react-router'
 import { type Across, isAcross } from './across'
+import { panelsOf } from './panels'
 
 export interface ChartView {
   across: Across
@@ -9,10 +10,12 @@ export interface ChartView {
   logX: boolean
   /** The charts whose y is. */
   logY: readonly string[]
+  /** The metrics that are looked at, in order; null for what is usual. */
+  panels: readonly string[] | null
 }
 
 /** What stands in the address only where it is another. */
-const USUAL: ChartView = { across: 'steps', logX: false, logY: [] }
+const USUAL: ChartView = { across: 'steps', logX: false, logY: [], panels: null }
 const ON = '1'
 /** More charts than a page has. */
 const MOST_NAMES = 60
@@ -23,16 +26,18 @@ export function readView(search: URLSearchParams): ChartView {
     across: isAcross(across) ? across : USUAL.across,
     logX: search.get('xlog') === ON,
     logY: [...new Set(search.getAll('ylog'))].slice(0, MOST_NAMES),
+    panels: panelsOf(search.getAll('panel')),
   }
 }
 
 /** The address's query with a view in it; all else stays. */
 export function writtenView(before: URLSearchParams, view: ChartView): URLSearchParams {
   const after = new URLSearchParams(before)
-  for (const name of ['x', 'xlog', 'ylog']) after.delete(name)
+  for (const name of ['x', 'xlog', 'ylog', 'panel']) after.delete(name)
   if (view.across !== USUAL.across) after.set('x', view.across)
   if (view.logX) after.set('xlog', ON)
   for (const name of view.logY) after.append('ylog', name)
+  for (const name of view.panels ?? []) after.append('panel', name)
   return after
 }
 

@@ -1,18 +1,18 @@
 /** How all charts of a page are looked at: what x is, and whether it is logarithmic. */
 import { Checkbox, Group, NativeSelect, Text } from '@mantine/core'
-import { ACROSS, type Across } from '../charts/across'
+import { ACROSS, type Across, isCounted } from '../charts/across'
 import type { ChangeView, ChartView } from '../charts/view'
 
 interface ChartControlsProps {
   view: ChartView
   onView: ChangeView
-  /** Whether what x would be is known of any of the runs. */
-  isKnown: (across: Across) => boolean
+  /** All metrics that were reported. */
+  reported: readonly string[]
 }
 
-export function ChartControls({ view, onView, isKnown }: ChartControlsProps) {
+export function ChartControls({ view, onView, reported }: ChartControlsProps) {
   const options = (Object.keys(ACROSS) as Across[]).map((value) => {
-    const known = isKnown(value)
+    const known = isCounted(reported, value)
     return {
       value,
       label: known ? ACROSS[value].label : `${ACROSS[value].label}, not counted`,

@@ -1,5 +1,7 @@
 /** What leaves of a comparison: a table as one would print it, everything as a report or a link. */
 import { ActionIcon, Button, CopyButton, Menu } from '@mantine/core'
+import { MOST_PANELS } from '../charts/panels'
+import type { ChartView } from '../charts/view'
 import { at } from '../lib/base'
 import { IconDownload } from './icons'
 
@@ -51,12 +53,14 @@ const DATA = [
 
 interface WholeExportProps {
   query: string
+  /** How its curves are looked at. */
+  view: ChartView
   /** What is compared, and the margin, as the API takes it. */
   data: string
 }
 
 /** The whole comparison: a file of its own, its data, and the address of this page. */
-export function WholeExport({ query, data }: WholeExportProps) {
+export function WholeExport({ query, view, data }: WholeExportProps) {
   return (
     <>
       <CopyButton value={window.location.href}>
@@ -66,7 +70,7 @@ export function WholeExport({ query, data }: WholeExportProps) {
           </Button>
         )}
       </CopyButton>
-      <Button component="a" variant="default" href={at(`/api/compare/report?${query}`)} download>
+      <Button component="a" variant="default" href={at(`/api/compare/report?${query}${lookOfReport(view)}`)} download>
         Report (HTML)
       </Button>
       <Menu position="bottom-end" width={230}>
@@ -101,4 +105,13 @@ export function comparisonQuery(
   query.set('margin', String(margin))
   for (const [name, value] of Object.entries(held)) query.set(name, String(value))
   return query.toString()
+}
+
+/** What a report is told of how curves are looked at, after another query; nothing where that is as usual. */
+function lookOfReport({ across, logX, logY, panels }: ChartView): string {
+  const query = new URLSearchParams((panels ?? []).map((name) => ['name', name]))
+  if (across !== 'steps') query.set('x', across)
+  if (logX) query.set('log', 'true')
+  for (const name of logY.slice(0, MOST_PANELS)) query.append('ylog', name)
+  return query.size > 0 ? `&${query}` : ''
 }

@@ -3,46 +3,26 @@ import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo } from 'react'
 import { $api } from '../api/client'
 import type { Curves } from '../api/types'
-import { ACROSS, type Across, isTime } from '../charts/across'
+import { ACROSS, isTime } from '../charts/across'
 import { MetricChart } from '../charts/MetricChart'
+import { lookOf } from '../charts/panels'
 import { chartOfCurves } from '../charts/shape'
 import { type ChangeView, type ChartView, logOf } from '../charts/view'
-import { compact, percent, plural } from '../lib/format'
+import { plural } from '../lib/format'
 
 const POINTS = 400
 /** Single seeds, of all experiments together: more lines are a blur, and slow. */
 const LINES = 100
 
-/** The curves in which experiments are compared. */
-export const COMPARED = [
-  {
-    name: 'eval/success_rate',
-    title: 'Success rate',
-    note: 'evaluation',
-    format: percent,
-    yRange: [0, 1.02] as const,
-  },
-  {
-    name: 'train/success_rate',
-    title: 'Success rate',
-    note: 'training',
-    format: percent,
-    yRange: [0, 1.02] as const,
-    smoothable: true,
-  },
-  { name: 'train/return', title: 'Return', note: 'per episode, training', format: compact, smoothable: true },
-  { name: 'eval/steps', title: 'Steps to the target', note: 'evaluation', format: compact },
-] as const
-
 interface CurveChartProps {
-  metric: (typeof COMPARED)[number]
+  /** Of the metric. */
+  name: string
   experiments: readonly string[]
   view: ChartView
   onView: ChangeView
 }
 
-export function CurveChart({ metric, experiments, view, onView }: CurveChartProps) {
-  const { name, ...look } = metric
+export function CurveChart({ name, experiments, view, onView }: CurveChartProps) {
   const { across, logX } = view
   const query = {
     ...{ experiment: [...experiments], name, points: POINTS, lines: LINES },
@@ -58,7 +38,7 @@ export function CurveChart({ metric, experiments, view, onView }: CurveChartProp
   const chart = useMemo(() => (data ? chartOfCurves(data) : { x: [], lines: [] }), [data])
   return (
     <MetricChart
-      {...look}
+      {...lookOf(name)}
       data={chart}
       x={ACROSS[data?.across ?? across]}
       logX={logX}
@@ -92,17 +72,13 @@ function leftOut({ across, experiments }: Curves): string | null {
   return `${plural(runs, 'run')} left out: ${ACROSS[across].label} was not counted when ${runs === 1 ? 'it' : 'they'} trained`
 }
 
-/** What x may be of charts of these experiments, as far as it is told. */
-export function useKnownAcross(experiments: readonly string[]): (across: Across) => boolean {
+/** The metrics that the runs of these experiments have reported, as far as it is told. */
+export function useReported(experiments: readonly string[]): readonly string[] {
   const { data } = $api.useQuery(
     'get',
     '/api/compare/metrics',
     { params: { query: { experiment: [...experiments] } } },
     { placeholderData: keepPreviousData },
   )
-  return (across) => {
-    const { counter } = ACROSS[across]
-    const reported = data?.metrics ?? []
-    return counter === undefined || reported.length === 0 || reported.some(({ name }) => name === counter)
-  }
+  return useMemo(() => (data?.metrics ?? []).map(({ name }) => name), [data])
 }

@@ -140,3 +140,41 @@ test('curves over time under way: in the address, on a grid that is told, and wh
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
   expect(screen.queryByText(/evenly spaced/)).not.toBeInTheDocument()
 })
+
+test('any metric that was reported becomes a panel, and the address keeps them in their order', async () => {
+  const server = startServer({
+    ...routes,
+    'GET /api/compare/metrics': {
+      runs: 3,
+      metrics: ['eval/steps', 'eval/success_rate', 'loss/value', 'policy/kl', 'train/return'].map((name) => ({
+        name,
+        runs: 3,
+      })),
+    },
+  })
+  const { router, user } = open('/compare?experiment=exp1&experiment=exp2&panel=train/return&panel=loss/value')
+  expect(await screen.findByRole('figure', { name: 'Value loss' })).toBeInTheDocument()
+  expect(screen.queryByRole('figure', { name: 'Success rate' })).not.toBeInTheDocument()
+
+  await user.click(screen.getByRole('button', { name: 'Panels' }))
+  const search = await screen.findByRole('combobox', { name: 'Add a panel' })
+  await user.type(search, 'kl')
+  await user.click(await screen.findByRole('option', { name: 'policy/kl' }))
+  await user.click(screen.getByRole('button', { name: 'Move policy/kl up' }))
+  await user.click(screen.getByRole('button', { name: 'Remove train/return' }))
+  expect(router.state.location.search).toBe(
+    '?experiment=exp1&experiment=exp2&panel=policy%2Fkl&panel=loss%2Fvalue',
+  )
+  expect(await screen.findByRole('figure', { name: 'KL divergence' })).toBeInTheDocument()
+  expect(server.asked.some((path) => path.includes('name=policy%2Fkl'))).toBe(true)
+  expect(screen.getByRole('link', { name: 'Report (HTML)' })).toHaveAttribute(
+    'href',
+    '/api/compare/report?experiment=exp1&experiment=exp2&margin=0.02&name=policy%2Fkl&name=loss%2Fvalue',
+  )
+
+  await user.click(screen.getByRole('button', { name: 'Remove policy/kl' }))
+  expect(screen.getByRole('button', { name: 'Remove loss/value' })).toBeDisabled()
+  await user.click(screen.getByRole('button', { name: 'Usual' }))
+  expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
+  expect((await screen.findAllByRole('figure', { name: 'Success rate' })).length).toBe(2)
+})

@@ -5,14 +5,11 @@ import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
-import { LinkedCharts } from '../charts/LinkedCharts'
-import charts from '../charts/MetricChart.module.css'
-import { sharedX, useChartView } from '../charts/view'
-import { ChartControls } from '../components/ChartControls'
+import { useChartView } from '../charts/view'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
 import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts'
-import { COMPARED, CurveChart, useKnownAcross } from '../components/CurveChart'
+import { CurvePanels } from '../components/CurvePanels'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
 import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
@@ -145,8 +142,7 @@ interface ChosenProps {
 function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
   const held = base === EVERY_PAIR ? { pairs: true } : base === chosen[0] ? {} : { base }
   const query = comparisonQuery(chosen, margin, held)
-  const [view, setView] = useChartView()
-  const isKnown = useKnownAcross(chosen)
+  const [view] = useChartView()
   const { data, error, refetch } = $api.useQuery(
     'get',
     '/api/compare',
@@ -163,7 +159,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
       }
       actions={
         <Group gap="sm">
-          <WholeExport query={query} data={comparisonQuery(chosen, margin, {})} />
+          <WholeExport query={query} view={view} data={comparisonQuery(chosen, margin, {})} />
           <Button variant="default" onClick={onChange}>
             Choose others
           </Button>
@@ -202,31 +198,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
             />
           )}
           {data && data.verdicts.length > 0 && <ComparisonDistributions comparison={data} query={query} />}
-          <Panel
-            title="Curves"
-            actions={
-              <Group gap="md">
-                <Text size="xs" c="dimmed">
-                  thin: single seeds · bold: their mean · band: 95 % interval over seeds
-                </Text>
-                <ChartControls view={view} onView={setView} isKnown={isKnown} />
-              </Group>
-            }
-          >
-            <LinkedCharts of={sharedX(view)}>
-              <div className={charts.grid}>
-                {COMPARED.map((metric) => (
-                  <CurveChart
-                    key={metric.name}
-                    metric={metric}
-                    experiments={chosen}
-                    view={view}
-                    onView={setView}
-                  />
-                ))}
-              </div>
-            </LinkedCharts>
-          </Panel>
+          <CurvePanels experiments={chosen} />
           <Panel
             title="What differs in their settings"
             flush

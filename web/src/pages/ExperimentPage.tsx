@@ -5,13 +5,9 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Experiment } from '../api/types'
-import { LinkedCharts } from '../charts/LinkedCharts'
-import charts from '../charts/MetricChart.module.css'
-import { sharedX, useChartView } from '../charts/view'
 import { Below } from '../components/Below'
-import { ChartControls } from '../components/ChartControls'
 import { Configuration } from '../components/Configuration'
-import { COMPARED, CurveChart, useKnownAcross } from '../components/CurveChart'
+import { CurvePanels } from '../components/CurvePanels'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
 import { ExperimentLineage } from '../components/Lineage'
@@ -166,7 +162,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         </Panel>
         <Below height={1_400}>
           <ExperimentLineage experimentId={experiment.id} />
-          <Curves experimentId={experiment.id} />
+          <CurvePanels experiments={[experiment.id]} />
           <Panel title="Configuration">
             <Configuration training={experiment.training} />
           </Panel>
@@ -174,27 +170,5 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         </Below>
       </Stack>
     </Page>
-  )
-}
-
-function Curves({ experimentId }: { experimentId: string }) {
-  const [view, setView] = useChartView()
-  const isKnown = useKnownAcross([experimentId])
-  return (
-    <Panel title="Curves" actions={<ChartControls view={view} onView={setView} isKnown={isKnown} />}>
-      <LinkedCharts of={sharedX(view)}>
-        <div className={charts.grid}>
-          {COMPARED.map((metric) => (
-            <CurveChart
-              key={metric.name}
-              metric={metric}
-              experiments={[experimentId]}
-              view={view}
-              onView={setView}
-            />
-          ))}
-        </div>
-      </LinkedCharts>
-    </Panel>
   )
 }

@@ -646,8 +646,41 @@ test('logarithmic axes are kept in the address, and where there can be none the 
   expect(router.state.location.search).toBe('?ylog=Return%2C+per+episode')
   expect(main.queryByText(/Drawn linearly/)).not.toBeInTheDocument()
   await user.click(main.getByRole('checkbox', { name: 'Log axis of Success rate' }))
-  expect(main.getByText(/Drawn linearly: a logarithmic axis has no place for values of 0 or below/)).toBeVisible()
+  expect(
+    main.getByText(/Drawn linearly: a logarithmic axis has no place for values of 0 or below/),
+  ).toBeVisible()
   await user.click(main.getByRole('checkbox', { name: 'Log horizontal axis' }))
   expect(router.state.location.search).toBe('?xlog=1&ylog=Return%2C+per+episode&ylog=Success+rate')
 >>>>>>> 202911f (Offer logarithmic axes on every chart of a run, a training and a comparison, kept in the address)
+})
+
+test('any metric of a run becomes a panel of one’s own', async () => {
+  startServer({
+    ...routes,
+    'GET /api/runs/run1/metrics': {
+      series: ['mine/bumps', 'train/success_rate'].map((name) => ({
+        name,
+        steps: [4096, 8192],
+        values: [0.1, 0.4],
+        min: null,
+        max: null,
+      })),
+      attempt: 1,
+      since: null,
+    },
+  })
+  const { router, user } = open('/runs/run1')
+  await user.click(await screen.findByRole('tab', { name: 'Chosen' }))
+  await user.click(await screen.findByRole('button', { name: 'Panels' }))
+  await user.type(await screen.findByRole('combobox', { name: 'Add a panel' }), 'bumps')
+  await user.click(await screen.findByRole('option', { name: 'mine/bumps' }))
+  expect(await screen.findByRole('figure', { name: 'mine/bumps' })).toBeInTheDocument()
+  expect(router.state.location.search).toContain('panel=mine%2Fbumps')
+})
+
+test('a link to chosen panels opens them', async () => {
+  startServer(routes)
+  open('/runs/run1?panel=policy/kl')
+  expect(await screen.findByRole('tab', { name: 'Chosen' })).toHaveAttribute('aria-selected', 'true')
+  expect(await screen.findByRole('heading', { name: /KL divergence/ })).toBeInTheDocument()
 })

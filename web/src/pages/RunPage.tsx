@@ -1,22 +1,15 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
-import { Anchor, Button, Group, Skeleton, Stack, Tabs, Text, VisuallyHidden } from '@mantine/core'
+import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useMemo, useRef, useState } from 'react'
+import { useRef, useState } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
 import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
-import type { Checkpoint, CheckpointPage, RunDetail, Series } from '../api/types'
-import { ACROSS, isCounted, placed } from '../charts/across'
-import { useCurves } from '../charts/following'
+import type { Checkpoint, CheckpointPage, RunDetail } from '../api/types'
 import { LinkedCharts } from '../charts/LinkedCharts'
-import { MetricChart } from '../charts/MetricChart'
-import grid from '../charts/MetricChart.module.css'
-import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
-import { chartOf } from '../charts/shape'
-import { type ChangeView, type ChartView, logOf, sharedX, useChartView } from '../charts/view'
+import { sharedX } from '../charts/view'
 import { Below } from '../components/Below'
-import { ChartControls } from '../components/ChartControls'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
 import { Diagnoses } from '../components/Diagnoses'
@@ -27,6 +20,7 @@ import { LearningSlider } from '../components/LearningSlider'
 import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
+import { AllCurves, MainCurves, useRunCurves } from '../components/RunCurves'
 import { RunLog } from '../components/RunLog'
 import { LapseDialog } from '../components/replay/LapseDialog'
 import { canResume, canStop, isActive } from '../components/states'
@@ -40,7 +34,6 @@ import { count, duration, percent } from '../lib/format'
 import { useNumberInAddress, useReplayInAddress, useTitle } from '../lib/hooks'
 import classes from './RunPage.module.css'
 
-const POINTS = 600
 const CHECKPOINTS_A_PAGE = 25
 
 export function RunPage() {
@@ -72,7 +65,7 @@ export function RunPage() {
 
 function LoadedRun({ run }: { run: RunDetail }) {
   const init = { params: { path: { run_id: run.id } } }
-  const metrics = useCurves(run.id, POINTS)
+  const curves = useRunCurves(run)
   const arena = useArenaTitle(run.training.task.arena)
   const [page, setPage] = useState(1)
   const checkpoints = $api.useQuery(
@@ -107,26 +100,6 @@ function LoadedRun({ run }: { run: RunDetail }) {
     setWatched(checkpoint.step)
     view.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
   }
-  const [looks, setLooks] = useChartView()
-  const reported = metrics.data?.series ?? NO_SERIES
-  const series = useMemo(() => placed(reported, looks.across), [reported, looks.across])
-  const waiting =
-    run.state === 'queued'
-      ? 'Curves start with the training'
-      : metrics.isPending
-        ? ''
-        : series === null && reported.length > 0
-          ? `${ACROSS[looks.across].label} was not counted when this run trained`
-          : 'No value yet'
-  const drawn = { series: series ?? NO_SERIES, view: looks, onView: setLooks, empty: waiting }
-  const controls = (
-    <ChartControls
-      view={looks}
-      onView={setLooks}
-      isKnown={(across) => reported.length === 0 || isCounted(reported, across)}
-    />
-  )
-
   return (
     <Page
       title={`${run.experiment_name}, seed ${run.seed}`}
@@ -148,7 +121,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       actions={<RunActions run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />}
     >
-      <LinkedCharts of={sharedX(looks)}>
+      <LinkedCharts of={sharedX(curves.view)}>
         <Stack gap="md">
           <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
           {run.error && (
@@ -181,43 +154,16 @@ function LoadedRun({ run }: { run: RunDetail }) {
                 />
               )}
             </Panel>
-            <Panel data-testid="main-curves">
-              <VisuallyHidden component="h2">Main curves</VisuallyHidden>
-              <Stack gap="md">
-                {controls}
-                {MAIN_CHARTS.map((spec) => (
-                  <SpecChart key={spec.title} spec={spec} height={214} {...drawn} />
-                ))}
-                {thinnedInWords(run) && (
-                  <Text size="sm" c="dimmed" data-testid="thinned">
-                    {thinnedInWords(run)}
-                  </Text>
-                )}
-              </Stack>
-            </Panel>
+            <MainCurves curves={curves} />
+            {thinnedInWords(run) && (
+              <Text size="sm" c="dimmed" data-testid="thinned">
+                {thinnedInWords(run)}
+              </Text>
+            )}
           </div>
           <Below height={1_600} now={episode !== null || step !== null}>
             <Diagnoses runId={run.id} state={run.state} />
-            <Panel title="Curves" actions={controls}>
-              <Tabs defaultValue={SECTIONS[0]?.title ?? ''} keepMounted={false}>
-                <Tabs.List mb="md" className={classes.tabs}>
-                  {SECTIONS.map(({ title }) => (
-                    <Tabs.Tab key={title} value={title}>
-                      {title}
-                    </Tabs.Tab>
-                  ))}
-                </Tabs.List>
-                {SECTIONS.map(({ title, charts }) => (
-                  <Tabs.Panel key={title} value={title}>
-                    <div className={grid.grid}>
-                      {charts.map((spec) => (
-                        <SpecChart key={spec.title} spec={spec} height={180} {...drawn} />
-                      ))}
-                    </div>
-                  </Tabs.Panel>
-                ))}
-              </Tabs>
-            </Panel>
+            <AllCurves curves={curves} />
             <Panel title="Checkpoints" flush>
               {checkpoints.data ? (
                 <>
@@ -278,33 +224,6 @@ function useChosen(
   )
   const wanted = step === null ? undefined : (here ?? elsewhere.data?.items[0])
   return wanted?.evaluation ? wanted : (shown?.best ?? undefined)
-}
-
-const NO_SERIES: readonly Series[] = []
-
-interface SpecChartProps {
-  spec: ChartSpec
-  series: readonly Series[]
-  view: ChartView
-  onView: ChangeView
-  height: number
-  empty: string
-}
-
-function SpecChart({ spec, series, view, onView, height, empty }: SpecChartProps) {
-  const data = useMemo(() => chartOf(spec, series), [spec, series])
-  const { metrics: _, ...look } = spec
-  return (
-    <MetricChart
-      {...look}
-      data={data}
-      x={ACROSS[view.across]}
-      logX={view.logX}
-      log={logOf(view, onView, nameOf(spec))}
-      height={height}
-      empty={empty}
-    />
-  )
 }
 
 interface OfRun {

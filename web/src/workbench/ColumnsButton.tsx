@@ -1,10 +1,10 @@
 /** Which columns the table has, in which order, and which stay in sight. */
-import { ActionIcon, Button, Group, Popover, Select, Text, Tooltip } from '@mantine/core'
+import { Button, Group, Popover, Select, Text } from '@mantine/core'
 import type { KnownKey } from '../api/types'
-import { IconArrowDown, IconArrowUp, IconColumns, IconPin, IconX } from '../components/icons'
+import { IconColumns, IconPin } from '../components/icons'
+import { OrderedList, SmallButton } from '../components/OrderedList'
 import { titleOf } from './cells'
 import { DEFAULT_COLUMNS, type TableView } from './view'
-import classes from './workbench.module.css'
 
 const MAX_COLUMNS = 40
 
@@ -16,12 +16,6 @@ interface ColumnsButtonProps {
 
 export function ColumnsButton({ view, onView, keys }: ColumnsButtonProps) {
   const { columns, pinned } = view
-  const move = (place: number, by: number) => {
-    const next = [...columns]
-    const [key] = next.splice(place, 1)
-    if (key !== undefined) next.splice(place + by, 0, key)
-    onView({ columns: next })
-  }
   const remove = (place: number) =>
     onView({
       columns: columns.filter((_, other) => other !== place),
@@ -36,33 +30,22 @@ export function ColumnsButton({ view, onView, keys }: ColumnsButtonProps) {
         </Button>
       </Popover.Target>
       <Popover.Dropdown>
-        <ol className={classes.columns} aria-label="Columns">
-          {columns.map((key, place) => (
-            <li key={key}>
-              <span title={key}>{titleOf(key)}</span>
-              <Small
-                label={place < pinned ? `Unpin up to ${key}` : `Pin up to ${key}`}
-                pressed={place < pinned}
-                onClick={() => onView({ pinned: place < pinned ? place : place + 1 })}
-              >
-                <IconPin size={14} />
-              </Small>
-              <Small label={`Move ${key} up`} disabled={place === 0} onClick={() => move(place, -1)}>
-                <IconArrowUp size={14} />
-              </Small>
-              <Small
-                label={`Move ${key} down`}
-                disabled={place === columns.length - 1}
-                onClick={() => move(place, 1)}
-              >
-                <IconArrowDown size={14} />
-              </Small>
-              <Small label={`Remove ${key}`} onClick={() => remove(place)}>
-                <IconX size={14} />
-              </Small>
-            </li>
-          ))}
-        </ol>
+        <OrderedList
+          label="Columns"
+          items={columns}
+          titleOf={titleOf}
+          extra={(key, place) => (
+            <SmallButton
+              label={place < pinned ? `Unpin up to ${key}` : `Pin up to ${key}`}
+              pressed={place < pinned}
+              onClick={() => onView({ pinned: place < pinned ? place : place + 1 })}
+            >
+              <IconPin size={14} />
+            </SmallButton>
+          )}
+          onMove={(moved) => onView({ columns: moved })}
+          onRemove={remove}
+        />
         <Group gap="xs" wrap="nowrap">
           <Select
             aria-label="Add a column"
@@ -89,35 +72,5 @@ export function ColumnsButton({ view, onView, keys }: ColumnsButtonProps) {
         </Text>
       </Popover.Dropdown>
     </Popover>
-  )
-}
-
-function Small({
-  label,
-  pressed,
-  disabled,
-  onClick,
-  children,
-}: {
-  label: string
-  pressed?: boolean | undefined
-  disabled?: boolean | undefined
-  onClick: () => void
-  children: React.ReactNode
-}) {
-  return (
-    <Tooltip label={label}>
-      <ActionIcon
-        variant={pressed ? 'light' : 'subtle'}
-        {...(pressed ? {} : { color: 'gray' })}
-        size="sm"
-        aria-label={label}
-        aria-pressed={pressed}
-        disabled={disabled ?? false}
-        onClick={onClick}
-      >
-        {children}
-      </ActionIcon>
-    </Tooltip>
   )
 }

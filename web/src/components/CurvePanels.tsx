@@ -1,0 +1,43 @@
+/** The curves of experiments: the metrics that are looked at, each a chart, and how. */
+import { Group, Text } from '@mantine/core'
+import { LinkedCharts } from '../charts/LinkedCharts'
+import charts from '../charts/MetricChart.module.css'
+import { USUAL_PANELS } from '../charts/panels'
+import { sharedX, useChartView } from '../charts/view'
+import { Below } from './Below'
+import { ChartControls } from './ChartControls'
+import { CurveChart, useReported } from './CurveChart'
+import { PanelsButton } from './PanelsButton'
+import { Panel } from './ui'
+
+/** About what a chart is high. */
+const CHART_PX = 310
+
+export function CurvePanels({ experiments }: { experiments: readonly string[] }) {
+  const [view, setView] = useChartView()
+  const reported = useReported(experiments)
+  return (
+    <Panel
+      title="Curves"
+      actions={
+        <Group gap="md">
+          <Text size="xs" c="dimmed">
+            thin: single seeds · bold: their mean · band: 95 % interval over seeds
+          </Text>
+          <ChartControls view={view} onView={setView} reported={reported} />
+          <PanelsButton view={view} onView={setView} names={reported} />
+        </Group>
+      }
+    >
+      <LinkedCharts of={sharedX(view)}>
+        <div className={charts.grid}>
+          {(view.panels ?? USUAL_PANELS).map((name) => (
+            <Below key={name} height={CHART_PX}>
+              <CurveChart name={name} experiments={experiments} view={view} onView={setView} />
+            </Below>
+          ))}
+        </div>
+      </LinkedCharts>
+    </Panel>
+  )
+}

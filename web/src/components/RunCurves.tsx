@@ -1,0 +1,135 @@
+/** The curves of one run: the main ones, all others by section, and any metric as a panel of one's own. */
+import { Group, Stack, Tabs, VisuallyHidden } from '@mantine/core'
+import { useMemo } from 'react'
+import type { RunDetail, Series } from '../api/types'
+import { ACROSS, placed } from '../charts/across'
+import { useCurves } from '../charts/following'
+import { MetricChart } from '../charts/MetricChart'
+import grid from '../charts/MetricChart.module.css'
+import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
+import { lookOf, USUAL_PANELS } from '../charts/panels'
+import { chartOf } from '../charts/shape'
+import { type ChangeView, type ChartView, logOf, useChartView } from '../charts/view'
+import { Below } from './Below'
+import { ChartControls } from './ChartControls'
+import { PanelsButton } from './PanelsButton'
+import classes from './RunCurves.module.css'
+import { Panel } from './ui'
+
+const POINTS = 600
+const NO_SERIES: readonly Series[] = []
+const CHOSEN = 'Chosen'
+/** About what a chart is high. */
+const CHART_PX = 270
+
+export interface RunCurves {
+  /** Over what x is. */
+  series: readonly Series[]
+  /** Every metric's name. */
+  reported: readonly string[]
+  view: ChartView
+  onView: ChangeView
+  /** What stands in place of a curve without points. */
+  empty: string
+}
+
+export function useRunCurves(run: RunDetail): RunCurves {
+  const metrics = useCurves(run.id, POINTS)
+  const [view, onView] = useChartView()
+  const { across } = view
+  const all = metrics.data?.series ?? NO_SERIES
+  const series = useMemo(() => placed(all, across), [all, across])
+  const reported = useMemo(() => all.map(({ name }) => name), [all])
+  const uncounted = series === null && all.length > 0
+  const empty =
+    run.state === 'queued'
+      ? 'Curves start with the training'
+      : metrics.isPending
+        ? ''
+        : uncounted
+          ? `${ACROSS[across].label} was not counted when this run trained`
+          : 'No value yet'
+  return { series: series ?? NO_SERIES, reported, view, onView, empty }
+}
+
+export function MainCurves({ curves }: { curves: RunCurves }) {
+  return (
+    <Panel data-testid="main-curves">
+      <VisuallyHidden component="h2">Main curves</VisuallyHidden>
+      <Stack gap="md">
+        <ChartControls {...curves} />
+        {MAIN_CHARTS.map((spec) => (
+          <SpecChart key={spec.title} spec={spec} height={214} curves={curves} />
+        ))}
+      </Stack>
+    </Panel>
+  )
+}
+
+export function AllCurves({ curves }: { curves: RunCurves }) {
+  const { view, onView, reported } = curves
+  return (
+    <Panel title="Curves" actions={<ChartControls {...curves} />}>
+      <Tabs defaultValue={view.panels === null ? (SECTIONS[0]?.title ?? CHOSEN) : CHOSEN} keepMounted={false}>
+        <Tabs.List mb="md" className={classes.tabs}>
+          {[...SECTIONS.map(({ title }) => title), CHOSEN].map((title) => (
+            <Tabs.Tab key={title} value={title}>
+              {title}
+            </Tabs.Tab>
+          ))}
+        </Tabs.List>
+        {SECTIONS.map(({ title, charts }) => (
+          <Tabs.Panel key={title} value={title}>
+            <div className={grid.grid}>
+              {charts.map((spec) => (
+                <SpecChart key={nameOf(spec)} spec={spec} height={180} curves={curves} />
+              ))}
+            </div>
+          </Tabs.Panel>
+        ))}
+        <Tabs.Panel value={CHOSEN}>
+          <Group justify="flex-end" mb="sm">
+            <PanelsButton view={view} onView={onView} names={reported} />
+          </Group>
+          <div className={grid.grid}>
+            {(view.panels ?? USUAL_PANELS).map((name) => (
+              <Below key={name} height={CHART_PX}>
+                <OwnChart name={name} curves={curves} />
+              </Below>
+            ))}
+          </div>
+        </Tabs.Panel>
+      </Tabs>
+    </Panel>
+  )
+}
+
+function OwnChart({ name, curves }: { name: string; curves: RunCurves }) {
+  const spec = useMemo(
+    () => ({ ...lookOf(name), metrics: [{ name, label: name.slice(name.indexOf('/') + 1) }] }),
+    [name],
+  )
+  return <SpecChart spec={spec} height={180} curves={curves} />
+}
+
+interface SpecChartProps {
+  spec: ChartSpec
+  height: number
+  curves: RunCurves
+}
+
+function SpecChart({ spec, height, curves: { series, view, onView, empty } }: SpecChartProps) {
+  const data = useMemo(() => chartOf(spec, series), [spec, series])
+  const { metrics: _, prefix: __, ...look } = spec
+  return (
+    <MetricChart
+      {...look}
+      data={data}
+      x={ACROSS[view.across]}
+      logX={view.logX}
+      log={logOf(view, onView, nameOf(spec))}
+      height={height}
+      empty={empty}
+    />
+  )
+}
