@@ -14,8 +14,15 @@ test('a metric looks as in its chart on a run, and its name tells it from its ne
 })
 
 test('a metric that no chart of ours knows is called by its name', () => {
-  expect(lookOf('reward/my_own_term')).toMatchObject({ title: 'Reward: my own term', note: 'reward/my_own_term' })
-  expect(lookOf('mine/miss_rate')).toMatchObject({ title: 'mine/miss_rate', format: percent, smoothable: true })
+  expect(lookOf('reward/my_own_term')).toMatchObject({
+    title: 'Reward: my own term',
+    note: 'reward/my_own_term',
+  })
+  expect(lookOf('mine/miss_rate')).toMatchObject({
+    title: 'mine/miss_rate',
+    format: percent,
+    smoothable: true,
+  })
   expect(lookOf('optim/other_learning_rate').yRange).toBeUndefined()
 })
 

@@ -2,7 +2,12 @@ import { expect, test } from 'vitest'
 import { logOf, readView, sharedX, writtenView } from './view'
 
 test('a view is read from the address as it was written there, and leaves the rest of it alone', () => {
-  const view = { across: 'wall', logX: true, logY: ['loss/value', 'Return, per episode'], panels: ['policy/kl', 'train/return'] } as const
+  const view = {
+    across: 'wall',
+    logX: true,
+    logY: ['loss/value', 'Return, per episode'],
+    panels: ['policy/kl', 'train/return'],
+  } as const
   const written = writtenView(new URLSearchParams('experiment=a&experiment=b&x=cpu'), view)
   expect(written.toString()).toBe(
     'experiment=a&experiment=b&x=wall&xlog=1&ylog=loss%2Fvalue&ylog=Return%2C+per+episode&panel=policy%2Fkl&panel=train%2Freturn',

@@ -70,7 +70,12 @@ export function WholeExport({ query, view, data }: WholeExportProps) {
           </Button>
         )}
       </CopyButton>
-      <Button component="a" variant="default" href={at(`/api/compare/report?${query}${lookOfReport(view)}`)} download>
+      <Button
+        component="a"
+        variant="default"
+        href={at(`/api/compare/report?${query}${lookOfReport(view)}`)}
+        download
+      >
         Report (HTML)
       </Button>
       <Menu position="bottom-end" width={230}>

@@ -152,7 +152,9 @@ test('any metric that was reported becomes a panel, and the address keeps them i
       })),
     },
   })
-  const { router, user } = open('/compare?experiment=exp1&experiment=exp2&panel=train/return&panel=loss/value')
+  const { router, user } = open(
+    '/compare?experiment=exp1&experiment=exp2&panel=train/return&panel=loss/value',
+  )
   expect(await screen.findByRole('figure', { name: 'Value loss' })).toBeInTheDocument()
   expect(screen.queryByRole('figure', { name: 'Success rate' })).not.toBeInTheDocument()
 

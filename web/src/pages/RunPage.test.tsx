@@ -608,7 +608,6 @@ test('a run from before time was counted says so in place of its curves', async 
   ).toBeGreaterThan(0)
 })
 
-<<<<<<< HEAD
 test('a run whose curves were thinned says so beside its charts, and so does one that will be', async () => {
   const ended = { ...runDetail, state: 'completed', steps_per_second: null, seconds_left: null }
   startServer({
@@ -623,7 +622,8 @@ test('a run whose curves were thinned says so beside its charts, and so does one
   startServer({ ...routes, 'GET /api/runs/run1': { ...ended, thins_at: NOW + 9e4 } })
   open('/runs/run1')
   expect(await screen.findByTestId('thinned')).toHaveTextContent(/^A rule thins these curves on/)
-=======
+})
+
 test('logarithmic axes are kept in the address, and where there can be none the chart says why', async () => {
   const series = (name: string, values: number[]) => ({
     name,
@@ -651,7 +651,6 @@ test('logarithmic axes are kept in the address, and where there can be none the 
   ).toBeVisible()
   await user.click(main.getByRole('checkbox', { name: 'Log horizontal axis' }))
   expect(router.state.location.search).toBe('?xlog=1&ylog=Return%2C+per+episode&ylog=Success+rate')
->>>>>>> 202911f (Offer logarithmic axes on every chart of a run, a training and a comparison, kept in the address)
 })
 
 test('any metric of a run becomes a panel of one’s own', async () => {
