@@ -132,7 +132,7 @@ def test_a_line_chart_in_numbers() -> None:
 
 
 def test_logarithmic_axes_of_a_chart_in_numbers() -> None:
-    """Across from 1 to 100: 10 is in the middle, at 306. Up from 1 / r to 100 r with r = 100 ** 0.05: 10 is halfway, at 122."""
+    """Across from 1 to 100: 10 is in the middle, at 306. Up from 1 / r to 100 r, r = 100 ** 0.05: 10 is halfway, at 122."""
     line = Line("one", 0, mean=[1.0, 10.0, 100.0], low=[0.5, -3.0, 90.0], high=[2.0, 20.0, 110.0])
     chart = line_chart("t", STEPS, [1, 10, 100], [line], rate=False, log_x=True, log_y=True)
     assert " 306.0,122.0 " in chart
