@@ -14960,12 +14960,18 @@ export interface operations {
                 base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
+                /** @description For a logarithmic axis: a grid that is resampled grows by equal factors. */
+                log?: boolean;
                 /** @description Success rates that differ by less are equivalent, 0 to 1. */
                 margin?: number;
                 /** @description Metrics whose curves are drawn; those that the page shows at first without. */
                 name?: string[];
                 /** @description Judge every pair, of 12 experiments at most. */
                 pairs?: boolean;
+                /** @description What the grid is of: steps, time under way, CPU time, or episodes. */
+                x?: "steps" | "wall" | "cpu" | "episodes";
+                /** @description Metrics whose values are drawn on a logarithmic axis. */
+                ylog?: string[];
             };
             header?: never;
             path?: never;
