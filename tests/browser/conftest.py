@@ -69,7 +69,8 @@ def running(
         yield read_url(process, 60.0)
     finally:
         process.send_signal(signal.SIGINT)
-        assert process.wait(10) == 0, "Ctrl-C must end the service cleanly within 10 s"
+        # How soon is asked in tests/services, where no browser has the cores.
+        assert process.wait(60) == 0, "Ctrl-C must end the service cleanly"
 
 
 @pytest.fixture(scope="package")
