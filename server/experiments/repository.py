@@ -135,6 +135,23 @@ class ExperimentRepository:
             raise NotFoundError.of("campaign", campaign_id)
         return found
 
+    def campaign_runs(self, campaign_id: str) -> Sequence[tables.Run]:
+        """The runs of a campaign by id, without what they were to train.
+
+        Raises:
+            NotFoundError: none is left.
+        """
+        query = (
+            select(tables.Run)
+            .join(tables.Experiment, tables.Experiment.id == tables.Run.experiment_id)
+            .where(tables.Experiment.campaign == campaign_id, tables.Experiment.deleted_at.is_(None))
+            .order_by(tables.Run.id)
+        )
+        found = self._session.scalars(query).all()
+        if not found:
+            raise NotFoundError.of("campaign", campaign_id)
+        return found
+
     def campaigns(self, visible: Collection[str] | None = None) -> list[tuple[str, float]]:
         """Every campaign of which an experiment is left, with the time of its launch, the newest first.
 

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, status
 
 from server.database.tables import DEFAULT_PROJECT
+from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.problems import CONFLICT, NOT_FOUND
 from server.reproduction.schemas import CampaignCreate, Reproduction
 from server.reproduction.service import ReproductionService
@@ -22,13 +23,15 @@ def _service(services: ServicesDep) -> ReproductionService:
 ReproductionServiceDep = Annotated[ReproductionService, Depends(_service)]
 
 
-@router.get("", responses=NOT_FOUND, dependencies=[view("campaign")])
+@router.get("", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("campaign")])
 def get_reproduction(
     service: ReproductionServiceDep,
+    kept: KeptDep,
     principal: PrincipalDep,
     campaign: Annotated[str | None, Query(max_length=16, description="Its id; the newest without it.")] = None,
 ) -> Reproduction:
     """The paper and ours, side by side."""
+    kept.unless(service.state(campaign, principal.visible))
     return service.get(campaign, principal.visible)
 
 

@@ -11,7 +11,7 @@ from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError
 from server.events.changes import Change
-from server.experiments.repository import ExperimentRepository
+from server.experiments.repository import UNFINISHED, ExperimentRepository
 from server.experiments.service import ExperimentService
 from server.ids import new_id
 from server.metrics.points import Points
@@ -20,7 +20,7 @@ from server.projects.repository import ProjectRepository
 from server.reproduction.schemas import CampaignCreate, CampaignSummary, Reproduction
 from server.reproduction.views import campaign_view, reproduction_view
 from server.runs import states
-from server.runs.repository import RunRepository
+from server.runs.repository import PointsState, RunRepository
 from server.runs.service import RunService, resume_run, stop_run
 from server.runs.states import Occasion
 from server.runs.views import EVAL_SUCCESS
@@ -40,6 +40,21 @@ class ReproductionService:
     def __init__(self, services: Services) -> None:
         self._services = services
         self._runs = RunService(services)
+
+    def state(self, campaign_id: str | None = None, visible: Collection[str] | None = None) -> tuple[object, ...]:
+        """What the answer of `get` depends on; where runs are on their way, the time too, to the second.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+        """
+        with self._services.database.read() as session:
+            repository = ExperimentRepository(session)
+            campaigns = repository.campaigns(visible)
+            chosen = campaign_id or (campaigns[0][0] if campaigns else None)
+            runs = repository.campaign_runs(chosen) if chosen is not None else []
+            active = any(run.state in UNFINISHED for run in runs)
+            states = [(*PointsState.of(run), run.state, run.error, run.started_at, run.finished_at) for run in runs]
+            return (chosen, campaigns, len(workers_lately(session)), states, int(time.time()) if active else None)
 
     def get(self, campaign_id: str | None = None, visible: Collection[str] | None = None) -> Reproduction:
         """A campaign beside the paper, the newest if none is named; the paper alone before the first.

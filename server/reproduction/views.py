@@ -47,7 +47,8 @@ def reproduction_view(
         workers: that are here.
     """
     by_row = {experiment.campaign_row: experiment for experiment in experiments}
-    results = {row.id: _results(by_row.get(row.id), latest, evaluations) for row in ROWS}
+    trainings = {row: training_of(experiment) for row, experiment in by_row.items()}
+    results = {row.id: _results(by_row.get(row.id), trainings.get(row.id), latest, evaluations) for row in ROWS}
     return Reproduction(
         campaign=campaign,
         campaigns=list(campaigns),
@@ -58,7 +59,9 @@ def reproduction_view(
             PaperTable(id=table.id, title=table.title, rows=list(table.rows), labels=list(table.labels)) for table in TABLES
         ],
         figures=[PaperFigure(id=figure.id, title=figure.title, rows=list(figure.rows)) for figure in FIGURES],
-        rows=[_row_view(row, by_row.get(row.id), latest, results[row.id]) for row in ROWS],
+        rows=[
+            _row_view(row, by_row.get(row.id), trainings.get(row.id, row.training), latest, results[row.id]) for row in ROWS
+        ],
         claims=list(_judged(tuple((row, tuple(seeds)) for row, seeds in results.items()))),
     )
 
@@ -90,20 +93,20 @@ def campaign_view(campaign_id: str, experiments: Sequence[tables.Experiment], wo
         workers: that are here.
         now: seconds since the epoch.
     """
-    runs = [(run, experiment) for experiment in experiments for run in experiment.runs]
-    shares = [_share(run, experiment, now) for run, experiment in runs]
+    shares = [share for experiment in experiments for share in _shares(experiment, now)]
+    runs = [run for experiment in experiments for run in experiment.runs]
     # What was stopped or has failed takes no more time.
     going_on = [
         share.model_copy(update={"expected": share.expected * share.done, "done": 1.0}) if run.state in _ENDED else share
-        for (run, _), share in zip(runs, shares, strict=True)
+        for run, share in zip(runs, shares, strict=True)
     ]
-    active = any(run.state in UNFINISHED for run, _ in runs)
+    active = any(run.state in UNFINISHED for run in runs)
     return Campaign(
         id=campaign_id,
         created_at=experiments[0].created_at,
-        state=aggregate_state([run.state for run, _ in runs]),
+        state=aggregate_state([run.state for run in runs]),
         seeds=max(len(experiment.runs) for experiment in experiments),
-        effort=_effort(experiments[0]),
+        effort=_effort(experiments[0], training_of(experiments[0])),
         progress=sum(share.expected * share.done for share in shares) / sum(share.expected for share in shares),
         seconds_left=seconds_left(going_on, workers) if active and workers else None,
     )
@@ -112,14 +115,18 @@ def campaign_view(campaign_id: str, experiments: Sequence[tables.Experiment], wo
 _ENDED = frozenset({"stopped", "failed", "stopping"})
 
 
-def _share(run: tables.Run, experiment: tables.Experiment, now: float) -> Share:
+def _shares(experiment: tables.Experiment, now: float) -> list[Share]:
+    training = training_of(experiment)
     row = _row(experiment)
-    done = _progress(run, training_of(experiment))
-    # A run that was taken up more than once has waited in between.
-    timed = run.started_at is not None and run.attempt == 1 and run.state in ("running", "completed")
-    spent = (run.finished_at or now) - run.started_at if timed and run.started_at is not None else None
-    expected = (row.seconds if row else 1.0) * _effort(experiment)
-    return Share(expected=expected, done=done, spent=None if spent is None else max(0.0, spent))
+    expected = (row.seconds if row else 1.0) * _effort(experiment, training)
+    return [Share(expected=expected, done=_progress(run, training), spent=_spent(run, now)) for run in experiment.runs]
+
+
+def _spent(run: tables.Run, now: float) -> float | None:
+    """Seconds; None where they can't be told: a run that was taken up more than once has waited in between."""
+    if run.started_at is None or run.attempt != 1 or run.state not in ("running", "completed"):
+        return None
+    return max(0.0, (run.finished_at or now) - run.started_at)
 
 
 def _row(experiment: tables.Experiment) -> Row | None:
@@ -127,19 +134,23 @@ def _row(experiment: tables.Experiment) -> Row | None:
     return ROW_BY_ID.get(experiment.campaign_row or "")
 
 
-def _effort(experiment: tables.Experiment) -> float:
+def _effort(experiment: tables.Experiment, training: TrainingConfig) -> float:
     row = _row(experiment)
-    return training_of(experiment).steps / row.training.steps if row else 1.0
+    return training.steps / row.training.steps if row else 1.0
 
 
 def _progress(run: tables.Run, training: TrainingConfig) -> float:
     return 1.0 if run.state == "completed" else min(1.0, run.step / training.steps)
 
 
-def _results(experiment: tables.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
-    if experiment is None:
+def _results(
+    experiment: tables.Experiment | None,
+    training: TrainingConfig | None,
+    latest: Latest,
+    evaluations: Mapping[str, Points],
+) -> list[SeedResult]:
+    if experiment is None or training is None:
         return []
-    steps = training_of(experiment).steps
     results = []
     for run in experiment.runs:
         measured = _measured(run, latest)
@@ -147,7 +158,7 @@ def _results(experiment: tables.Experiment | None, latest: Latest, evaluations: 
             continue
         points = evaluations.get(run.id, Points.joined([]))
         learned = learned_at(points.steps.tolist(), points.values.tolist())
-        results.append(SeedResult(seed=run.seed, steps=steps, measured=measured, learned_at=learned))
+        results.append(SeedResult(seed=run.seed, steps=training.steps, measured=measured, learned_at=learned))
     return results
 
 
@@ -155,8 +166,13 @@ def _measured(run: tables.Run, latest: Latest) -> TableRow | None:
     return TableRow.from_metrics(latest.get(run.id, {})) if run.state == "completed" else None
 
 
-def _row_view(row: Row, experiment: tables.Experiment | None, latest: Latest, results: Sequence[SeedResult]) -> CampaignRow:
-    training = training_of(experiment) if experiment else row.training
+def _row_view(
+    row: Row,
+    experiment: tables.Experiment | None,
+    training: TrainingConfig,
+    latest: Latest,
+    results: Sequence[SeedResult],
+) -> CampaignRow:
     return CampaignRow(
         id=row.id,
         method=row.method,

@@ -34,6 +34,7 @@ TAGGED = (
     "/api/policies/{policy}",
     "/api/policies/{policy}/suites/{suite}/episodes",
     "/api/policies/{policy}/download",
+    "/api/reproduction",
     "/api/training/form",
     "/api/arenas/fixed?name=complex",
     "/api/arenas/generated?name=maze&seed=3",

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -307,6 +308,15 @@ def test_a_verdict_mirrors(first: list[float], second: list[float], margin: floa
 def test_fisher_exact(first: tuple[int, int], second: tuple[int, int], p: float) -> None:
     assert fisher_exact(first, second) == pytest.approx(p, abs=5e-5)
     assert fisher_exact(second, first) == pytest.approx(p, abs=5e-5)
+
+
+@given(st.integers(1, 3_000), st.integers(1, 3_000), st.data())
+def test_fisher_exact_is_what_scipy_has(trials: int, other_trials: int, data: st.DataObject) -> None:
+    good, other_good = data.draw(st.integers(0, trials)), data.draw(st.integers(0, other_trials))
+
+    table = [[good, trials - good], [other_good, other_trials - other_good]]
+    expected = float(scipy.stats.fisher_exact(table).pvalue)
+    assert fisher_exact((good, trials), (other_good, other_trials)) == pytest.approx(expected, rel=1e-6, abs=1e-300)
 
 
 # --- tests beside the intervals ---

@@ -19116,7 +19116,10 @@ export interface operations {
                 /** @description Its id; the newest without it. */
                 campaign?: string | null;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -19130,6 +19133,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Reproduction"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
