@@ -76,6 +76,14 @@ class ArenaStore:
             raise NotFoundError.of("imported arena", sha256[:12])
         return StoredArena(document, imported_at)
 
+    @property
+    def changed_at(self) -> int:
+        """When an arena came or went last, in nanoseconds of the file system's clock; 0 before the first."""
+        try:
+            return self._directory.stat().st_mtime_ns
+        except FileNotFoundError:
+            return 0
+
     def name(self, sha256: str) -> str | None:
         """What the arena of a hash is called, read once while its file stays as it is; None where there is none."""
         try:

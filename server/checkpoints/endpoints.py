@@ -18,6 +18,9 @@ router = APIRouter(tags=["checkpoints"])
 
 _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}}
 
+# What a run's list is made of: of runs themselves only whether they are there, and they go with their experiment.
+LISTED_FROM = ("experiments", "checkpoints", "evaluations")
+
 
 def _service(services: ServicesDep) -> CheckpointService:
     return CheckpointService(services)
@@ -26,20 +29,26 @@ def _service(services: ServicesDep) -> CheckpointService:
 CheckpointServiceDep = Annotated[CheckpointService, Depends(_service)]
 
 
-@router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND, dependencies=[view("run_id")])
+@router.get("/api/runs/{run_id}/checkpoints", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("run_id")])
 def list_checkpoints(
     run_id: str,
     service: CheckpointServiceDep,
+    services: ServicesDep,
+    kept: KeptDep,
     window: WindowDep,
     step: Annotated[int | None, Query(ge=0, le=2**62, description="Only that of this step.")] = None,
 ) -> CheckpointPage:
     """The run's checkpoints, the newest first."""
+    kept.unless(services.database.writes.of(*LISTED_FROM), run_id, window, step)
     return service.of_run(run_id, window, step)
 
 
-@router.get("/api/runs/{run_id}/checkpoints/steps", responses=NOT_FOUND, dependencies=[view("run_id")])
-def list_checkpoint_steps(run_id: str, service: CheckpointServiceDep) -> CheckpointSteps:
+@router.get("/api/runs/{run_id}/checkpoints/steps", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("run_id")])
+def list_checkpoint_steps(
+    run_id: str, service: CheckpointServiceDep, services: ServicesDep, kept: KeptDep
+) -> CheckpointSteps:
     """The way of a run by its checkpoints, the oldest first."""
+    kept.unless(services.database.writes.of(*LISTED_FROM), run_id)
     return service.steps(run_id)
 
 

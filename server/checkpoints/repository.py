@@ -170,6 +170,18 @@ class CheckpointRepository:
             raise NotFoundError(f"Checkpoint {checkpoint_id} has not been evaluated.")
         return evaluated_at
 
+    def evaluated(self, run_ids: Collection[str]) -> list[tuple[str, int, float]]:
+        """How many evaluated checkpoints each of these runs has, and when the last was evaluated, by run."""
+        checkpoint, evaluation = tables.Checkpoint, tables.Evaluation
+        query = (
+            select(checkpoint.run_id, func.count(), func.max(evaluation.created_at))
+            .join(evaluation, evaluation.checkpoint_id == checkpoint.id)
+            .where(checkpoint.run_id.in_(run_ids))
+            .group_by(checkpoint.run_id)
+            .order_by(checkpoint.run_id)
+        )
+        return [(row[0], row[1], row[2]) for row in self._session.execute(query)]
+
     def final_evaluations(self, run_ids: Collection[str], *, with_episodes: bool = False) -> dict[str, tables.Evaluation]:
         """The evaluation of each run's last evaluated checkpoint, by run.
 

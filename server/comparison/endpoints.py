@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query
 from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles, ReportedMetrics
 from server.comparison.service import ComparisonService
+from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.problems import INVALID, NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
@@ -33,28 +34,34 @@ LogarithmicX = Annotated[
 GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Places of the grid at most.")]
 
 
-@router.get("", responses=INVALID | NOT_FOUND, dependencies=[view("experiment")])
+@router.get("", responses=INVALID | NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
 def compare(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
+    kept: KeptDep,
     margin: Margin = 0.02,
     base: Base = None,
     every_pair: EveryPair = False,
 ) -> Comparison:
     """Final figures side by side, with intervals and verdicts, and what differs in the configurations."""
-    return ComparisonService(services).compare(list(dict.fromkeys(experiment_ids)), margin, base, every_pair=every_pair)
+    ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
+    kept.unless(service.state(ids), margin, base, every_pair)
+    return service.compare(ids, margin, base, every_pair=every_pair)
 
 
-@router.get("/profiles", responses=NOT_FOUND, dependencies=[view("experiment")])
-def compare_profiles(experiment_ids: ExperimentIds, services: ServicesDep) -> Profiles:
+@router.get("/profiles", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
+def compare_profiles(experiment_ids: ExperimentIds, services: ServicesDep, kept: KeptDep) -> Profiles:
     """How many attempts of the final evaluations reach each score."""
-    return ComparisonService(services).profiles(list(dict.fromkeys(experiment_ids)))
+    ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
+    kept.unless(service.state(ids))
+    return service.profiles(ids)
 
 
-@router.get("/curves", responses=NOT_FOUND, dependencies=[view("experiment")])
+@router.get("/curves", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
 def compare_curves(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
+    kept: KeptDep,
     name: Metric = "eval/success_rate",
     points: GridSteps = 400,
     lines: Annotated[
@@ -67,11 +74,14 @@ def compare_curves(
     logarithmic: LogarithmicX = False,
 ) -> Curves:
     """One metric of every run on one grid, and each experiment's mean and interval."""
-    ids = list(dict.fromkeys(experiment_ids))
-    return ComparisonService(services).curves(ids, name, points, lines, across, logarithmic=logarithmic)
+    ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
+    kept.unless(service.state(ids), name, points, lines, across, logarithmic)
+    return service.curves(ids, name, points, lines, across, logarithmic=logarithmic)
 
 
-@router.get("/metrics", responses=NOT_FOUND, dependencies=[view("experiment")])
-def compare_metrics(experiment_ids: ExperimentIds, services: ServicesDep) -> ReportedMetrics:
+@router.get("/metrics", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
+def compare_metrics(experiment_ids: ExperimentIds, services: ServicesDep, kept: KeptDep) -> ReportedMetrics:
     """Which metrics the runs of the experiments have reported: what there are curves of."""
-    return ComparisonService(services).metrics(list(dict.fromkeys(experiment_ids)))
+    ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
+    kept.unless(service.state(ids))
+    return service.metrics(ids)

@@ -26,6 +26,7 @@ from server.database import tables
 from server.errors import InvalidRequestError
 from server.estimates import is_rate
 from server.experiments.repository import ExperimentRepository
+from server.experiments.told import state_of
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
@@ -49,6 +50,15 @@ class ComparisonService:
 
     def __init__(self, services: Services) -> None:
         self._services = services
+
+    def state(self, experiment_ids: Sequence[str]) -> tuple[object, ...]:
+        """What a comparison of these experiments depends on, beside what is asked of it.
+
+        Raises:
+            NotFoundError: one of the experiments is missing.
+        """
+        with self._services.database.read() as session:
+            return state_of(session, ExperimentRepository(session).get_many(experiment_ids))
 
     def compare(
         self, experiment_ids: Sequence[str], margin: float, base: str | None = None, *, every_pair: bool = False

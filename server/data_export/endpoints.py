@@ -46,9 +46,9 @@ WantedFormat = Annotated[
 )
 async def export_run(run_id: str, services: ServicesDep, kept: KeptDep, wanted: WantedFormat = "csv") -> StreamingResponse:
     """The run's data as a file."""
-    service, headers = DataExportService(services), dict[str, str]()
-    if wanted != "json":
-        headers = kept.unless(wanted, await services.lanes.downloads.run(service.points_of_run, run_id))
+    service = DataExportService(services)
+    state = service.state_of_run if wanted == "json" else service.points_of_run
+    headers = kept.unless(wanted, await services.lanes.downloads.run(state, run_id))
     return await _send(services, lambda: service.run(run_id, wanted), headers)
 
 
@@ -62,21 +62,22 @@ async def export_experiment(
     experiment_id: str, services: ServicesDep, kept: KeptDep, wanted: WantedFormat = "csv"
 ) -> StreamingResponse:
     """The data of all runs of the experiment as a file."""
-    service, headers = DataExportService(services), dict[str, str]()
-    if wanted != "json":
-        headers = kept.unless(wanted, await services.lanes.downloads.run(service.points_of_experiment, experiment_id))
+    service = DataExportService(services)
+    state = service.state_of_experiment if wanted == "json" else service.points_of_experiment
+    headers = kept.unless(wanted, await services.lanes.downloads.run(state, experiment_id))
     return await _send(services, lambda: service.experiment(experiment_id, wanted), headers)
 
 
 @router.get(
     "/api/compare/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
     dependencies=[view("experiment")],
 )
 async def export_comparison(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
+    kept: KeptDep,
     wanted: Annotated[
         TableFormat,
         Query(alias="format", description="csv: a zip of figures.csv, curves.csv and seeds.csv. json: all of it in one."),
@@ -86,8 +87,10 @@ async def export_comparison(
     points: GridSteps = 400,
 ) -> StreamingResponse:
     """The figures of a comparison and the curves of one metric as a file."""
-    ids = list(dict.fromkeys(experiment_ids))
-    return await _send(services, lambda: DataExportService(services).comparison(ids, margin, name, points, wanted), {})
+    ids, service = list(dict.fromkeys(experiment_ids)), DataExportService(services)
+    state = await services.lanes.downloads.run(service.state_of_comparison, ids)
+    headers = kept.unless(wanted, state, margin, name, points)
+    return await _send(services, lambda: service.comparison(ids, margin, name, points, wanted), headers)
 
 
 async def _send(services: Services, find: Callable[[], OutgoingFile], headers: dict[str, str]) -> StreamingResponse:

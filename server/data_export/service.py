@@ -17,6 +17,7 @@ from server.data_export.table import HEADING, WIDE_HEADING, point_rows
 from server.data_export.zips import zipped
 from server.database import tables
 from server.experiments.repository import ExperimentRepository
+from server.experiments.told import state_of_runs
 from server.file_names import slug
 from server.runs.repository import PointsState, RunRepository
 from server.services import Services
@@ -51,6 +52,32 @@ class DataExportService:
         with self._database.read() as session:
             experiment = ExperimentRepository(session).get(experiment_id)
             return (experiment.name, *(PointsState.of(run) for run in experiment.runs))
+
+    def state_of_run(self, run_id: str) -> tuple[object, ...]:
+        """What a run's document depends on.
+
+        Raises:
+            NotFoundError: there is no such run.
+        """
+        with self._database.read() as session:
+            run = RunRepository(session).get(run_id)
+            return state_of_runs(session, [run.experiment], [run])
+
+    def state_of_experiment(self, experiment_id: str) -> tuple[object, ...]:
+        """What an experiment's document depends on.
+
+        Raises:
+            NotFoundError: there is no such experiment.
+        """
+        return self.state_of_comparison([experiment_id])
+
+    def state_of_comparison(self, experiment_ids: Sequence[str]) -> tuple[object, ...]:
+        """What a comparison depends on, beside what is asked of it.
+
+        Raises:
+            NotFoundError: one of the experiments is missing.
+        """
+        return ComparisonService(self._services).state(experiment_ids)
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
         """The data of one run.

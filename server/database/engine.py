@@ -18,6 +18,8 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from server.database.fair_lock import FairLock
+from server.database.tables import Base
+from server.database.writes import Writes
 from server.errors import ServiceError
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ class Database:
         if self.engine.dialect.name == "postgresql":
             # All of a block sees one state; in SQLite every transaction does.
             read_only |= {"postgresql_readonly": True, "isolation_level": "REPEATABLE READ"}
+        self.writes = Writes(self.engine, Base.metadata)
         self._turn = FairLock() if self.engine.dialect.name == "sqlite" else None
         self._read_engine = self.engine.execution_options(**read_only)
 
@@ -64,7 +67,7 @@ class Database:
             DatabaseBusyError: other writers took too long.
         """
         turn = self._turn.held(_TURN_SECONDS) if self._turn else nullcontext()
-        with turn, Session(self.engine, expire_on_commit=False) as session, session.begin():
+        with turn, self.writes.counted(), Session(self.engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     def ping(self) -> None:

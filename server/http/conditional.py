@@ -36,10 +36,12 @@ class Kept:
     def unless(self, *made_of: object) -> dict[str, str]:
         """Go on unless the client has what is made of the same; headers for an answer that brings its own.
 
+        Sets count as the same in any order.
+
         Raises:
             HTTPException: 304, it has.
         """
-        digest = hashlib.sha256(repr((_START, *made_of)).encode()).hexdigest()[:32]
+        digest = hashlib.sha256(repr((_START, *map(_ordered, made_of))).encode()).hexdigest()[:32]
         # Weak: compressed and not, it is the same answer.
         return self._unless(digest, f'W/"{digest}"')
 
@@ -57,6 +59,10 @@ class Kept:
             raise HTTPException(304, headers=headers)
         self._response.headers.update(headers)
         return headers
+
+
+def _ordered(made_of: object) -> object:
+    return sorted(made_of) if isinstance(made_of, frozenset) else made_of
 
 
 def _kept(

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query
 
 from server.experiments.schemas import ExperimentState
+from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.paging import MAX_PAGE, Offset, PartDep, Window, WindowDep
 from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
@@ -67,10 +68,11 @@ OfProject = Annotated[str | None, Query(max_length=16, description="Id of the pr
 KeyName = Annotated[str, Query(min_length=1, max_length=160)]
 
 
-@router.get("/api/experiments", dependencies=[SIGNED_IN])
+@router.get("/api/experiments", responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
 def list_experiments(
     service: WorkbenchServiceDep,
     principal: PrincipalDep,
+    kept: KeptDep,
     window: WindowDep,
     query: QueryText = "",
     state: ExperimentState | None = None,
@@ -86,13 +88,15 @@ def list_experiments(
 ) -> ListedPage:
     """Experiments in short, the newest first where nothing else is asked for."""
     wanted = Wanted(query=query, state=state, project_id=project, place=place, visible=principal.visible)
+    kept.unless(service.state(), wanted, sort, column, window, after)
     return service.page(wanted, sort=sort, columns=column, window=window, after=after)
 
 
-@router.get("/api/workbench/groups", dependencies=[SIGNED_IN])
+@router.get("/api/workbench/groups", responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
 def list_groups(
     service: WorkbenchServiceDep,
     principal: PrincipalDep,
+    kept: KeptDep,
     by: KeyName,
     query: QueryText = "",
     project: OfProject = None,
@@ -103,6 +107,7 @@ def list_groups(
 ) -> Groups:
     """The experiments that a query finds by the values of one key, with intervals over all runs of each group."""
     wanted = Wanted(query=query, project_id=project, place=place, visible=principal.visible)
+    kept.unless(service.state(), wanted, by, column, limit, offset)
     return service.groups(wanted, by=by, columns=column, window=Window(limit, offset))
 
 
@@ -118,9 +123,10 @@ def list_ids(
     return service.ids(Wanted(query=query, project_id=project, place=place, visible=principal.visible))
 
 
-@router.get("/api/workbench/keys", dependencies=[SIGNED_IN])
-def list_keys(service: WorkbenchServiceDep, principal: PrincipalDep) -> KnownKeys:
+@router.get("/api/workbench/keys", responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
+def list_keys(service: WorkbenchServiceDep, principal: PrincipalDep, kept: KeptDep) -> KnownKeys:
     """Everything that experiments can be filtered, sorted and grouped by."""
+    kept.unless(service.state(), principal.visible)
     return service.keys(principal.visible)
 
 

@@ -20,12 +20,19 @@ from server.workbench.schemas import (
     MatchingIds,
 )
 
+# The tables that lists, groups and keys are made of.
+MADE_OF = ("experiments", "experiment_keys", "experiment_tags", "runs", "latest_metrics", "projects")
+
 
 class WorkbenchService:
     """Lists, groups, and names keys."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
+
+    def state(self) -> tuple[object, ...]:
+        """What lists, groups and keys depend on, beside what is asked for."""
+        return self._services.database.writes.of(*MADE_OF), self._services.arenas.changed_at
 
     def page(self, wanted: Wanted, *, sort: str, columns: Sequence[str], window: Window, after: str | None) -> ListedPage:
         """Some of the experiments that are wanted.

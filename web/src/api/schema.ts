@@ -14679,7 +14679,10 @@ export interface operations {
                 /** @description Judge every pair, of 12 experiments at most. */
                 pairs?: boolean;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -14693,6 +14696,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Comparison"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Makes no sense as a whole */
             400: {
@@ -14748,7 +14758,10 @@ export interface operations {
                 /** @description What the grid is of: steps, time under way, CPU time, or episodes. */
                 x?: "steps" | "wall" | "cpu" | "episodes";
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -14762,6 +14775,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Curves"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -14806,7 +14826,10 @@ export interface operations {
                 /** @description Places of the grid at most. */
                 points?: number;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -14823,6 +14846,13 @@ export interface operations {
                     "application/zip": string;
                     "text/csv": string;
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -14859,7 +14889,10 @@ export interface operations {
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -14873,6 +14906,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ReportedMetrics"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -14909,7 +14949,10 @@ export interface operations {
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -14923,6 +14966,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Profiles"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -15629,7 +15679,10 @@ export interface operations {
                 sort?: string;
                 state?: ("queued" | "running" | "stopping" | "stopped" | "completed" | "failed") | "mixed" | null;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -15643,6 +15696,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ListedPage"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -17127,7 +17187,10 @@ export interface operations {
                 /** @description Items to leave out before them. */
                 offset?: number;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -17141,6 +17204,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Leaderboards"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -17170,7 +17240,10 @@ export interface operations {
                 /** @description Items to leave out before them. */
                 offset?: number;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 suite_hash: string;
             };
@@ -17186,6 +17259,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Leaderboard"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -19461,7 +19541,10 @@ export interface operations {
                 /** @description Only that of this step. */
                 step?: number | null;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 run_id: string;
             };
@@ -19477,6 +19560,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["CheckpointPage"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -19510,7 +19600,10 @@ export interface operations {
     list_checkpoint_steps_api_runs__run_id__checkpoints_steps_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path: {
                 run_id: string;
             };
@@ -19538,6 +19631,13 @@ export interface operations {
                      */
                     "application/json": components["schemas"]["CheckpointSteps"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -21903,7 +22003,10 @@ export interface operations {
                 /** @description Part of the name, or what is asked of settings and metrics: `algorithm = ppo train/return > 50`. */
                 query?: string;
             };
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -21917,6 +22020,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Groups"];
                 };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No valid login */
             401: {
@@ -21985,7 +22095,10 @@ export interface operations {
     list_keys_api_workbench_keys_get: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -22000,6 +22113,13 @@ export interface operations {
                     "application/json": components["schemas"]["KnownKeys"];
                 };
             };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description No valid login */
             401: {
                 headers: {
@@ -22007,6 +22127,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
