@@ -9,6 +9,9 @@ from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
 
+from server.errors import PartAwayError
+from server.outage import RETRY_AFTER
+
 logger = logging.getLogger(__name__)
 
 
@@ -55,7 +58,8 @@ async def kept_up(
         some: does a part of what is due, and tells how many it did; blocks.
         at_once: how many it does at most: after so many it is asked again at once.
         pause: seconds until the next look otherwise.
-        failed: what the log says of an error, after which the next look tries again.
+        failed: what the log says of an error, after which the next look tries again. That a part of the service is away it
+            says once for everybody, and the next look is soon.
         wake: ends the pause before its time.
     """
     task = asyncio.create_task(_regularly(some, at_once, pause, failed, wake or Wake()))
@@ -69,10 +73,12 @@ async def kept_up(
 
 async def _regularly(some: Callable[[], int], at_once: int, pause: float, failed: str, wake: Wake) -> None:
     while True:
-        done = 0
+        done, until_next = 0, pause
         try:
             done = await run_in_threadpool(some)
+        except PartAwayError:
+            until_next = min(pause, RETRY_AFTER)
         except Exception:
             logger.exception(failed)
         if done < at_once:
-            await wake.pause(pause)
+            await wake.pause(until_next)

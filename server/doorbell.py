@@ -1,28 +1,32 @@
 """The real doorbell: a Celery message for a run that waits, published from a thread so that nobody waits for a broker."""
 
-import logging
 import queue
 import sqlite3
 import threading
+from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 
 from sqlalchemy import make_url
 
+from server.outage import Outage
 from workers.protocol import Queue
 from workers.runtime.app import TRAIN_TASK, create_app
-
-logger = logging.getLogger(__name__)
 
 # At shutdown: time for the last messages; what is lost is rung again at the next start.
 _CLOSE_SECONDS = 2.0
 
 
 class CeleryDoorbell:
-    """Rings through a Celery broker. A broker that is away costs a log line: the sweeper rings again."""
+    """Rings through a Celery broker. One that is away costs a log line, and is asked now and then whether it is back.
+
+    What should have rung meanwhile is dropped: the sweeper rings again.
+    """
 
     def __init__(self, broker_url: str, queue_prefix: str) -> None:
         self._app = create_app(broker_url)
         self._prefix = queue_prefix
+        self._outage = Outage(f"The broker {self._app.connection_for_write().as_uri()}")
         self._rings: queue.SimpleQueue[tuple[str, int, Queue] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._publish, name="doorbell", daemon=True)
         self._thread.start()
@@ -38,12 +42,32 @@ class CeleryDoorbell:
         self._app.close()
 
     def _publish(self) -> None:
-        while (ring := self._rings.get()) is not None:
-            run_id, attempt, to = ring
+        while True:
             try:
-                self._app.send_task(TRAIN_TASK, (run_id, attempt), queue=self._prefix + to, retry=False, ignore_result=True)
-            except Exception as error:  # whatever a broker's driver raises: nobody's request may fail of it
-                logger.warning("the broker does not take the message for run %s: %s", run_id, error)
+                ring = self._rings.get(timeout=self._outage.until_next)
+            except queue.Empty:
+                if self._outage.may_ask():
+                    self._try(self._look)
+                continue
+            if ring is None:
+                return
+            if self._outage.may_ask():
+                self._try(partial(self._send, *ring))
+
+    def _try(self, do: Callable[[], object]) -> None:
+        try:
+            do()
+        except Exception as error:  # whatever a broker's driver raises: nobody's request may fail of it
+            self._outage.gone(str(error) or type(error).__name__)
+        else:
+            self._outage.back()
+
+    def _send(self, run_id: str, attempt: int, to: Queue) -> None:
+        self._app.send_task(TRAIN_TASK, (run_id, attempt), queue=self._prefix + to, retry=False, ignore_result=True)
+
+    def _look(self) -> None:
+        with self._app.connection_for_write() as connection:
+            connection.ensure_connection(max_retries=1, interval_start=0)
 
 
 def prepare_broker(broker_url: str, queue_prefix: str) -> None:

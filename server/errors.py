@@ -17,11 +17,13 @@ ServiceError (a sim.errors.MaplessError)   500
 ├── JobFailedError                  500  a worker could not do what was asked for
 │   ├── ExportFailedError                a policy could not be exported faithfully
 │   └── ReplayFailedError                an evaluation could not be driven again
+├── PartAwayError                   503  what the server needs from outside can't be reached now
+│   ├── DatabaseAwayError                the database
+│   └── (server.files.StoreAwayError)    an object store, which may also refuse
 ├── DatabaseBusyError               503  other writers take too long
 ├── BusyError                       503  as much of this kind of work waits as may
 ├── JobTimeoutError                 503  what was asked for took a worker too long
 ├── (server.people.oidc.refusals.ProviderUnusableError)
-├── (server.files.StoreAwayError)        an object store can't be reached, or refuses
 └── NoWorkerError                   503  no worker is there to do it
 """
 
@@ -132,6 +134,16 @@ class TooManyAttemptsError(ServiceError):
     """Too many wrong tokens from one address."""
 
     status = 429
+
+
+class PartAwayError(ServiceError):
+    """Something that the server needs from outside can't be reached now; later it may be."""
+
+    status = 503
+
+
+class DatabaseAwayError(PartAwayError):
+    """The database can't be reached, or was lost in the middle of a transaction, nothing of which was kept."""
 
 
 class DatabaseBusyError(ServiceError):

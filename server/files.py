@@ -12,7 +12,8 @@ import fsspec
 from anyio import CapacityLimiter, to_thread
 from fsspec.implementations.local import LocalFileSystem
 
-from server.errors import CorruptUploadError, NotFoundError, ServiceError, TooLargeError
+from server.errors import CorruptUploadError, NotFoundError, PartAwayError, ServiceError, TooLargeError
+from server.outage import RETRY_AFTER, Outage
 from workers.checkpoints import sync_directory
 
 _T = TypeVar("_T")
@@ -29,10 +30,8 @@ class UnusableStoreError(ServiceError):
     """No such kind of store, or its package is not installed."""
 
 
-class StoreAwayError(ServiceError, OSError):
+class StoreAwayError(PartAwayError, OSError):
     """A store that is not a directory can't be reached, or refuses; later it may not."""
-
-    status = 503
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,7 @@ class FileStore:
         self._max_bytes = max_bytes
         self._limiter = CapacityLimiter(_THREADS)
         self._local = isinstance(self._filesystem, LocalFileSystem)
+        self._outage = Outage(f"The store {url}")
         with self._answering():
             self._filesystem.makedirs(self._root, exist_ok=True)
 
@@ -183,7 +183,9 @@ class FileStore:
         except Exception as error:
             if self._local or isinstance(error, (FileNotFoundError, ServiceError)):
                 raise
-            raise StoreAwayError(f"The store {self._url} can't be used: {error}") from error
+            self._outage.gone(str(error))
+            raise StoreAwayError(f"The store {self._url} can't be used: {error}", retry_after=RETRY_AFTER) from error
+        self._outage.back()
 
     def _sync(self, file: IO[bytes]) -> None:
         file.flush()

@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from starlette.concurrency import run_in_threadpool
 
 from server.doorbell import CeleryDoorbell, prepare_broker
+from server.errors import PartAwayError
 from server.experiments.stored import training_of
 from server.jobs.service import JobService
 from server.runs.repository import RunRepository
@@ -133,6 +134,9 @@ async def _sweep_regularly(services: Services) -> None:
         try:
             await services.lanes.sweeper.run(sweeper.sweep)
             services.pulse.beat()
+        except PartAwayError:
+            # The log says so already.
+            pass
         except Exception:
             # Leases must expire for all runs, whatever is wrong with one of them, or with the database for a while.
             logger.exception("a sweep failed: the next one tries again")

@@ -126,7 +126,9 @@ class Proxy:
         doomed = asyncio.Event()
         ways = [asyncio.create_task(self._up(reader, back, doomed)), asyncio.create_task(self._down(there, writer, doomed))]
         try:
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            # Cancelled as the proxy closes: asyncio would log it.
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for way in ways:
                 way.cancel()

@@ -17,6 +17,8 @@ from server.alerts.repository import AlertRepository
 from server.alerts.watcher import AlertWatcher
 from server.database import tables
 from server.database.tables import AlertState
+from server.errors import PartAwayError
+from server.outage import RETRY_AFTER, patiently
 from server.services import Services
 
 logger = logging.getLogger(__name__)
@@ -84,7 +86,10 @@ class AlertSender:
             if taken is None:
                 return
             state, outcome, at = await self._deliver(*taken)
-            await self._lane.run(self._settle, alert_id, state, outcome, at)
+            await patiently(lambda: self._lane.run(self._settle, alert_id, state, outcome, at))
+        except PartAwayError:
+            # It was not taken: it is due when the database is back.
+            return
         except Exception:
             logger.exception("alert %d: what came of it could not be written down", alert_id)
 
@@ -161,6 +166,8 @@ async def _regularly(do: Callable[[], Awaitable[None]], pause: float) -> None:
     while True:
         try:
             await do()
+        except PartAwayError:
+            await asyncio.sleep(RETRY_AFTER)
         except Exception:
             logger.exception("alerts: the next look tries again")
         await asyncio.sleep(pause)

@@ -18,6 +18,7 @@ from server.curve_thinning.repository import DAY, CurveThinningRepository, rule_
 from server.curve_thinning.rule import CurveRule
 from server.curve_thinning.schemas import CurveThinning
 from server.database import tables
+from server.errors import PartAwayError
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
 from server.metrics.repository import MetricRepository
@@ -139,6 +140,8 @@ class CurveThinningService:
             return 0
         try:
             self._thin(run_id, now)
+        except PartAwayError:
+            raise
         except Exception:
             # The others are not to wait for one that can't be read.
             logger.exception("the curves of run %s could not be thinned: the next try is in a day", run_id)

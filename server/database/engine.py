@@ -14,13 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection, create_engine, event, make_url, text
 from sqlalchemy.engine import Engine
+from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as NoConnectionError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from server.database.fair_lock import FairLock
 from server.database.tables import Base
 from server.database.writes import Writes
-from server.errors import ServiceError
+from server.errors import DatabaseAwayError, DatabaseBusyError, ServiceError
+from server.outage import RETRY_AFTER, Outage
 
 if TYPE_CHECKING:
     from psycopg import Connection as PsycopgConnection
@@ -33,6 +36,16 @@ _TURN_SECONDS = 30.0
 _POOL_SIZE = 10
 _POOL_OVERFLOW = 40
 
+# Of a database server that neither answers nor refuses: libpq's names, in seconds but for the last one. A query may take its
+# time; what is sent to a machine that is gone is not acknowledged.
+_PATIENCE = {
+    "connect_timeout": 5,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 20_000,
+}
+
 _READ_ONLY = "mapless_read_only"
 
 
@@ -41,10 +54,17 @@ class UnusableDatabaseError(ServiceError):
 
 
 class Database:
-    """An engine with its transactions. Thread-safe; sessions are not, and live within one `read` or `write`."""
+    """An engine with its transactions. Thread-safe; sessions are not, and live within one `read` or `write`.
+
+    A database server that has answered once may go away: from then on transactions raise DatabaseAwayError until it is back.
+    """
 
     def __init__(self, url: str) -> None:
         self.engine = _create_engine(url)
+        self._outage = Outage(f"The database {self.engine.url.render_as_string(hide_password=True)}")
+        # Until then whoever starts with it tells of it.
+        self._answered = False
+        event.listen(self.engine, "checkout", self._on_checkout)
         read_only: dict[str, Any] = {_READ_ONLY: True}
         if self.engine.dialect.name == "postgresql":
             # All of a block sees one state; in SQLite every transaction does.
@@ -55,8 +75,12 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A consistent view that can't write: an attempt to is an error of the database."""
-        with Session(self._read_engine, expire_on_commit=False, autoflush=False) as session:
+        """A consistent view that can't write: an attempt to is an error of the database.
+
+        Raises:
+            DatabaseAwayError: the database can't be reached.
+        """
+        with self._answering(), Session(self._read_engine, expire_on_commit=False, autoflush=False) as session:
             yield session
 
     @contextmanager
@@ -64,17 +88,25 @@ class Database:
         """A transaction that commits at the end of the block and rolls back if the block raises.
 
         Raises:
+            DatabaseAwayError: the database can't be reached; nothing was written, but for a commit whose answer was lost.
             DatabaseBusyError: other writers took too long.
         """
         turn = self._turn.held(_TURN_SECONDS) if self._turn else nullcontext()
-        with turn, self.writes.counted(), Session(self.engine, expire_on_commit=False) as session, session.begin():
+        with (
+            turn,
+            self._answering(),
+            self.writes.counted(),
+            Session(self.engine, expire_on_commit=False) as session,
+            session.begin(),
+        ):
             yield session
 
     def ping(self) -> None:
         """Ask the database for an answer.
 
         Raises:
-            sqlalchemy.exc.SQLAlchemyError: there is none.
+            DatabaseAwayError: there is none.
+            sqlalchemy.exc.SQLAlchemyError: it can't be used.
         """
         with self.read() as session:
             session.execute(text("SELECT 1"))
@@ -82,6 +114,37 @@ class Database:
     def dispose(self) -> None:
         """Close every connection."""
         self.engine.dispose()
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Tells a database that is away from one that refuses something."""
+        if not self._outage.may_ask():
+            raise _away()
+        try:
+            yield
+        except NoConnectionError as error:
+            raise DatabaseBusyError(
+                "All connections to the database are in use: try again in a moment.", retry_after=RETRY_AFTER
+            ) from error
+        except (OperationalError, InterfaceError) as error:
+            if not self._answered or self.engine.dialect.name == "sqlite":
+                raise
+            if error.connection_invalidated:
+                # Whether it was the connection or the database, the next one to connect finds out.
+                raise _away() from error
+            if error.statement is None and getattr(error.orig, "sqlstate", None) is None:
+                self._outage.gone(str(error.orig).splitlines()[0])
+                raise _away() from error
+            raise
+
+    def _on_checkout(self, *_: object) -> None:
+        """A connection was made, or has answered."""
+        self._answered = True
+        self._outage.back()
+
+
+def _away() -> DatabaseAwayError:
+    return DatabaseAwayError("The database can't be reached now: try again in a moment.", retry_after=RETRY_AFTER)
 
 
 def _check_encoding(connection: "PsycopgConnection[Any]", _record: ConnectionPoolEntry) -> None:
@@ -100,7 +163,10 @@ def _lower(text: str | None) -> str | None:
 def _create_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True)
+        patience = {name: value for name, value in _PATIENCE.items() if name not in parsed.query}
+        engine = create_engine(
+            url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True, connect_args=patience
+        )
         # Ahead of SQLAlchemy's own first look, which does not understand what such a database answers.
         event.listen(engine, "connect", _check_encoding, insert=True)
         return engine

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 
 from server.errors import BusyError
 from server.events.changes import Change, Shown
+from server.outage import patiently
 
 # Seconds between two events: a page redraws once a second.
 _PAUSE = 0.5
@@ -189,7 +190,7 @@ class EventBus:
             await self._woken.wait()
             self._woken.clear()
             if any(subscription.projects is not None for subscription in self._subscriptions):
-                await asyncio.to_thread(self._look_up)
+                await patiently(lambda: asyncio.to_thread(self._look_up))
             self._tell_now()
             await asyncio.sleep(self._pause)
 

@@ -1,15 +1,22 @@
 """How the service's errors are described in OpenAPI and answered over HTTP."""
 
 import math
+from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from starlette.websockets import WebSocketState
 
 from server.errors import ErrorBody, RefusedFieldError, ServiceError
 
 Responses = dict[int | str, dict[str, Any]]
+
+TRY_AGAIN_LATER = 1013
+"""RFC 6455 and its registry: what a socket is closed with that can't be served now."""
+MAX_REASON = 120
+"""Bytes that a closing socket may say; ours are of one byte a character."""
 
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
 FORBIDDEN: Responses = {403: {"model": ErrorBody, "description": "Takes more rights"}}
@@ -38,11 +45,22 @@ def error_response(error: ServiceError) -> JSONResponse:
     return JSONResponse(ErrorBody(detail=error.message).model_dump(), status_code=error.status, headers=headers)
 
 
+async def close_for_now(websocket: WebSocket, error: ServiceError) -> None:
+    """Tell whoever opened a socket to come again; a handshake that is refused would tell a browser no reason."""
+    if websocket.application_state == WebSocketState.CONNECTING:
+        await websocket.accept(subprotocol=next(iter(websocket.scope.get("subprotocols", ())), None))
+    if WebSocketState.DISCONNECTED not in (websocket.application_state, websocket.client_state):
+        await websocket.close(TRY_AGAIN_LATER, error.message[:MAX_REASON])
+
+
 def install_error_handlers(app: FastAPI) -> None:
     """Answer what an endpoint raises with its status and its sentence, and refused fields with their places."""
 
     @app.exception_handler(ServiceError)
-    async def _refuse(_request: Request, error: ServiceError) -> JSONResponse:
+    async def _refuse(connection: Request | WebSocket, error: ServiceError) -> JSONResponse | None:
+        if isinstance(connection, WebSocket) and error.status == HTTPStatus.SERVICE_UNAVAILABLE:
+            await close_for_now(connection, error)
+            return None
         return error_response(error)
 
     @app.exception_handler(RefusedFieldError)

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from functools import partial
 from pathlib import Path
 
 from server.errors import JobFailedError, JobTimeoutError, NoWorkerError
@@ -10,6 +11,7 @@ from server.jobs.names import result_name
 from server.jobs.needed import nobody_for
 from server.jobs.repository import OPEN
 from server.jobs.service import JobService
+from server.outage import patiently
 from server.services import Services
 
 _LOOK_SECONDS = 1.0
@@ -70,7 +72,7 @@ async def _until_done(services: Services, job_id: str) -> None:
     except BaseException:
         # This request was cancelled, because its client has left, or has waited long enough.
         if not board.wanted(job_id):
-            board.start(lane.run(service.cancel, job_id))
+            board.start(patiently(partial(lane.run, service.cancel, job_id)))
         raise
     if job.state != "done":
         raise JobFailedError(job.error or "it was cancelled")

@@ -5,6 +5,7 @@ import contextlib
 import logging
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from server.errors import ServiceError
@@ -13,6 +14,7 @@ from server.jobs.asked import Asked
 from server.jobs.needed import nobody_for
 from server.jobs.repository import OPEN
 from server.live.hub import LiveHub, TooManyViewsError
+from server.outage import patiently
 from workers.errors import FrameError
 from workers.frames import Frame
 from workers.job_protocol import FRAME_LENGTH_BYTES, WatchedJob
@@ -192,8 +194,9 @@ class PolicyDrivers:
             driver.job_id = await asyncio.shield(jobs.lane.run(jobs.ask, asked))
             self._by_job[driver.job_id] = driver
             with jobs.board.asking(driver.job_id) as ended:
-                while (job := await jobs.lane.run(jobs.find, driver.job_id)).state in OPEN and not jobs.board.closed:
-                    lacking = await jobs.lane.run(jobs.lacking, job)
+                look = partial(jobs.lane.run, jobs.find, driver.job_id)
+                while (job := await patiently(look)).state in OPEN and not jobs.board.closed:
+                    lacking = await patiently(partial(jobs.lane.run, jobs.lacking, job))
                     nobody = job.state == "queued" and (bool(lacking) or not jobs.board.workers())
                     driver.waits_in_vain = nobody_for("drives finished policies", lacking) if nobody else None
                     if job.state == "queued":
@@ -212,7 +215,7 @@ class PolicyDrivers:
             self._left(driver)
             if driver.job_id is not None:
                 self._by_job.pop(driver.job_id, None)
-                jobs.board.start(jobs.lane.run(jobs.cancel, driver.job_id))
+                jobs.board.start(patiently(partial(jobs.lane.run, jobs.cancel, driver.job_id)))
 
     @staticmethod
     def _left(driver: _Driver) -> None:

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
 from server.errors import NotFoundError
-from server.http.problems import NOT_FOUND
+from server.http.problems import MAX_REASON, NOT_FOUND, TRY_AGAIN_LATER
 from server.jobs.service import JobService
 from server.live.bridge import PLAY, WATCH, bridge, until_one_ends
 from server.live.hub import TooManyViewsError
@@ -25,11 +25,8 @@ from sim.errors import ArenaError
 
 router = APIRouter(tags=["live"])
 
-# RFC 6455 and its registry: what a socket is closed with.
+# RFC 6455: what a socket is closed with that nobody may open.
 _POLICY_VIOLATION = 1008
-_TRY_AGAIN_LATER = 1013
-# Bytes; ours are of one byte a character.
-_MAX_REASON = 120
 
 _DISPLAY_SECONDS = 0.25
 
@@ -132,7 +129,7 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
                 partial(services.gate.until_changed, principal_of(websocket)),
             )
     except (TooManyViewsError, ArenaError) as error:
-        await websocket.close(_TRY_AGAIN_LATER, str(error)[:_MAX_REASON])
+        await websocket.close(TRY_AGAIN_LATER, str(error)[:MAX_REASON])
 
 
 @router.websocket("/live/{run_id}/{theme}/display", dependencies=[view("run_id")])

@@ -11,7 +11,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 
 from server.database.tables import RunState
-from server.errors import NotFoundError
+from server.errors import NotFoundError, PartAwayError
 from server.experiments.repository import ExperimentRepository
 from server.experiments.stored import training_of
 from server.monitoring.repository import MonitoringRepository
@@ -48,7 +48,7 @@ class StateCollector(Collector):
         up = GaugeMetricFamily("mapless_database_up", "Whether the database answers.")
         try:
             families = list(self._of_database())
-        except SQLAlchemyError:
+        except (SQLAlchemyError, PartAwayError):
             families = []
         up.add_metric([], float(bool(families)))
         yield up

@@ -7,6 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from sqlalchemy import update
 from sqlalchemy.orm import Session
@@ -15,6 +16,7 @@ from server.database import tables
 from server.database.engine import Database
 from server.database.tables import Role, TokenScope
 from server.lanes import Lane
+from server.outage import patiently
 from server.people.repository import CredentialRepository, PeopleRepository
 from server.people.secret import hash_of, new_secret
 from server.security.principal import Principal, capped
@@ -94,7 +96,7 @@ class Gate:
                     await asyncio.wait_for(event.wait(), None if principal.credential is None else _ASK_AGAIN_SECONDS)
                 event.clear()
                 if again is not None and principal.credential is not None:
-                    known = await self._lane.run(again, None, principal.credential)
+                    known = await patiently(partial(self._lane.run, again, None, principal.credential))
                     if known.principal != principal:
                         return
         finally:

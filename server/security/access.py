@@ -18,10 +18,11 @@ from starlette.datastructures import URL, MutableHeaders
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
 
 from server.audit.actor import Actor, acting
-from server.errors import ForbiddenError, InvalidRequestError, ServiceError, UnauthorizedError
-from server.http.problems import error_response
+from server.errors import ForbiddenError, InvalidRequestError, PartAwayError, ServiceError, UnauthorizedError
+from server.http.problems import close_for_now, error_response
 from server.people.gate import Gate
 from server.people.secret import API_PREFIX, WORKER_PREFIX
 from server.security.cookies import cookie_name, session_cookie, session_cookie_name, set_login_cookie
@@ -231,6 +232,9 @@ def _with_cookie(send: Send, cookie: str) -> Send:
 
 
 async def _refuse(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket" and isinstance(error, PartAwayError):
+        await close_for_now(WebSocket(scope, receive, send), error)
+        return
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": error.message[:120]})

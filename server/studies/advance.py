@@ -16,6 +16,7 @@ from server.audit.repository import AuditRepository
 from server.background import kept_up
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
+from server.errors import PartAwayError
 from server.events.changes import Change
 from server.experiments.repository import ExperimentRepository
 from server.ids import new_id
@@ -59,6 +60,8 @@ def advance(services: Services) -> int:
     for study_id in going_on:
         try:
             StudyMover(services, study_id).move()
+        except PartAwayError:
+            raise
         except Exception:
             # One that can't be read must not keep the others waiting.
             logger.exception("study %s could not be moved on: the next look tries again", study_id)

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
 
+from server.outage import patiently
 from server.services import Services
 from server.workbench.keys import KeyRepository
 
@@ -45,7 +46,7 @@ async def keep_indexed(services: Services) -> AsyncIterator[None]:
 async def _index_all(services: Services) -> None:
     try:
         while True:
-            if not await run_in_threadpool(index_some, services):
+            if not await patiently(lambda: run_in_threadpool(index_some, services)):
                 return
             await asyncio.sleep(_PAUSE_SECONDS)
     except Exception:

@@ -12,7 +12,7 @@ from server.checkpoints.archives import LooseArchives
 from server.checkpoints.integrity import is_whole
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
-from server.errors import ConflictError, NotFoundError
+from server.errors import ConflictError, DatabaseBusyError, NotFoundError, PartAwayError
 from server.events.changes import Change, ChangeKind
 from server.experiments.stored import StoredTraining, read_training, training_of
 from server.files import StoredFile
@@ -138,7 +138,7 @@ class WorkerService:
         """
         try:
             return self._receive(reports)
-        except OperationalError as error:
+        except (OperationalError, PartAwayError, DatabaseBusyError) as error:
             # The database is away or busy, for everybody.
             return [error] * len(reports)
         except Exception as error:

@@ -11,7 +11,8 @@ from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.errors import BusyError
+from server import outage
+from server.errors import BusyError, DatabaseAwayError
 from server.events import bus as module
 from server.events.bus import EventBus, Subscription
 from server.events.changes import Change, Shown
@@ -285,3 +286,26 @@ def test_who_may_see_some_projects_hears_of_these_only() -> None:
         assert asked == [{"a", "b", "gone"}]
 
     run(scenario())
+
+
+def test_what_belongs_where_is_asked_again_where_the_database_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outage, "RETRY_AFTER", PAUSE)
+    asked = []
+
+    def find(experiments: Collection[str]) -> dict[str, str]:
+        asked.append(experiments)
+        if len(asked) < 3:
+            raise DatabaseAwayError("away")
+        return {"e": "p"}
+
+    async def scenario() -> None:
+        bus = EventBus(PAUSE, find_projects=find)
+        with bus.subscribe(projects=frozenset({"p"})) as subscription:
+            bus.publish(change())
+            async for _, name, changes in events(subscription):
+                if name == "changes":
+                    assert changes == [change()]
+                    return
+
+    run(scenario())
+    assert len(asked) == 3

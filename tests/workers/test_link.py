@@ -1,5 +1,6 @@
 """The link brings everything to a server that comes and goes, in order, and hears what the server wants."""
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +30,7 @@ class Peer:
         self.deaf = threading.Event()
         self.seconds_per_frame = 0.0
         self.fence = threading.Event()
+        self.unable = threading.Event()
         self.unstorable: int | None = None
         self.puzzled = False
         self._server: Server | None = None
@@ -55,6 +57,9 @@ class Peer:
         self.paths.append(connection.request.path)
         if self.fence.is_set():
             connection.close(CLOSE_FENCED)
+            return
+        if self.unable.is_set():
+            connection.close(1013)
             return
         connection.send(Orders(ack=self.ack).model_dump_json())
         try:
@@ -284,3 +289,24 @@ def test_what_the_server_never_understands_ends_the_attempt_instead_of_being_sen
     assert worker.link.wait(10)
     assert peer.batches[-1].final is not None
     assert peer.batches[-1].final.outcome == "lost"
+
+
+def test_a_server_that_opens_links_and_cannot_serve_them_is_asked_less_and_less_often(
+    peer: Peer, worker: Worker, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "workers")
+    worker.report(1)
+    until(lambda: worker.spool.acked == 1)
+    begun = len(peer.paths)
+    peer.unable.set()
+    assert peer.connection is not None
+    peer.connection.close(1013)
+    time.sleep(3.0)
+    assert len(peer.paths) - begun <= 4
+    (lost,) = caplog.records
+    assert "no link to the server" in lost.getMessage()
+    peer.unable.clear()
+    worker.report(1)
+    until(lambda: worker.spool.acked == 2)
+    assert "linked to the server again" in caplog.records[-1].getMessage()
+    assert len(caplog.records) == 2

@@ -30,6 +30,8 @@ def create_app(broker_url: str) -> Celery:
         # On Redis a message waiting in a busy worker would be delivered to another one after the visibility time-out.
         worker_disable_prefetch=broker_url.startswith(("redis", "rediss", "unix")),
         broker_connection_retry_on_startup=True,
+        # As long as it takes: Celery's own hundred tries are over after less than an hour.
+        broker_connection_max_retries=None,
         broker_transport_options=_transport_options(broker_url),
         worker_hijack_root_logger=True,
         worker_send_task_events=False,

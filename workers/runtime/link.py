@@ -79,6 +79,7 @@ class Link:
         self._broken: str | None = None
         self._misunderstood = 0
         self._waiting = False
+        self._retry = _FIRST_RETRY_SECONDS
         self._frames: deque[bytes] = deque(maxlen=_FRAME_BACKLOG)
         self._final: Final | None = None
         self._fenced = False
@@ -136,7 +137,6 @@ class Link:
             self._done.set()
 
     async def _keep_open(self) -> None:
-        retry = _FIRST_RETRY_SECONDS
         while not self._over():
             try:
                 async with connect(
@@ -149,8 +149,6 @@ class Link:
                     compression=None,
                     proxy=None,
                 ) as connection:
-                    retry = _FIRST_RETRY_SECONDS
-                    self._linked()
                     await self._serve(connection)
             except ConnectionClosed as closed:
                 self._fenced = self._fenced or (closed.rcvd is not None and closed.rcvd.code == CLOSE_FENCED)
@@ -164,8 +162,8 @@ class Link:
             except ValidationError:
                 logger.exception("the server says what this worker does not understand: do their versions agree?")
             if not self._over():
-                await self._pause(retry)
-                retry = min(2 * retry, _LAST_RETRY_SECONDS)
+                await self._pause(self._retry)
+                self._retry = min(2 * self._retry, _LAST_RETRY_SECONDS)
 
     def _wait_for_server(self, reason: Exception) -> None:
         if not self._over() and not self._waiting:
@@ -173,6 +171,8 @@ class Link:
             self._waiting = True
 
     def _linked(self) -> None:
+        """The server has answered: whoever only opens a connection may still be unable to serve."""
+        self._retry = _FIRST_RETRY_SECONDS
         if self._waiting:
             logger.info("%s: linked to the server again", self._thread.name)
             self._waiting = False
@@ -206,6 +206,7 @@ class Link:
     async def _read(self, connection: ClientConnection, acked: asyncio.Event) -> None:
         async for message in connection:
             orders = Orders.model_validate_json(message)
+            self._linked()
             if orders.ack > self._spool.acked:
                 self._misunderstood = 0
             self._spool.acknowledge(orders.ack)
