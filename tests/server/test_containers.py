@@ -36,7 +36,9 @@ def substituted(text: str) -> str:
 def test_every_setting_exists_and_accepts_its_value(service: str) -> None:
     environment = COMPOSE["services"][service]["environment"]
     fields = Settings.model_fields if service == "server" else WorkerSettings.model_fields
-    assert {name.removeprefix("MAPLESS_").lower() for name in environment} <= set(fields)
+    # An object store's library reads its own.
+    ours = {name for name in environment if not name.startswith("AWS_")}
+    assert {name.removeprefix("MAPLESS_").lower() for name in ours} <= set(fields)
 
 
 def test_the_server_starts_on_these_settings(monkeypatch: pytest.MonkeyPatch) -> None:
