@@ -14,6 +14,7 @@ from server.doorbell import CeleryDoorbell, prepare_broker
 from server.errors import PartAwayError
 from server.experiments.stored import training_of
 from server.jobs.service import JobService
+from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.shares import ShareRepository
 from server.services import Services
@@ -110,6 +111,7 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     """Reach workers for as long as the block lasts: doorbell, links and sweeper."""
     broker_url, prefix = services.settings.resolved_broker_url, services.settings.queue_prefix
     await run_in_threadpool(prepare_broker, broker_url, prefix)
+    await run_in_threadpool(_say_what_is_found, services)
     # Nobody has a view open of a server that starts.
     for kind in ("view", "play"):
         await run_in_threadpool(JobService(services).cancel_all, kind)
@@ -126,6 +128,21 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
             await task
         await ingest.close()
         await run_in_threadpool(doorbell.close)
+
+
+def _say_what_is_found(services: Services) -> None:
+    """What a server that starts finds of the one before it, and what becomes of that."""
+    with services.database.read() as session:
+        counts = RunRepository(session).count_by_state()
+    under_way = sum(counts.get(state, 0) for state in states.ACTIVE)
+    if under_way:
+        logger.info(
+            "Runs under way: %d. Their workers have %g s to be heard of; whose is not goes back into the queue.",
+            under_way,
+            services.settings.lease_seconds,
+        )
+    if waiting := counts.get("queued", 0):
+        logger.info("Runs that wait for a worker: %d.", waiting)
 
 
 async def _sweep_regularly(services: Services) -> None:

@@ -33,6 +33,7 @@ from server.worker_api.items import ReportedItems
 from server.worker_api.losses import exhausted, hopeful
 from sim.extending.discovery import missing, wording
 from workers.config import TrainingConfig
+from workers.logs import about
 from workers.protocol import (
     CheckpointReference,
     CheckpointUpload,
@@ -48,6 +49,9 @@ from workers.protocol import (
 )
 
 logger = logging.getLogger(__name__)
+
+# What ends otherwise is worth a warning.
+_AS_IT_SHOULD = ("completed", "stopped", "released")
 
 
 class WorkerService:
@@ -124,7 +128,11 @@ class WorkerService:
         self._services.instruments.claims.labels(request.queue).inc()
         self._services.leases.renew(run.id, claim.attempt)
         self._publish(run, "run")
+        if is_fresh:
+            origin = f"step {checkpoint.step:,}" if checkpoint else "the start"
+            _say(run.id, logging.INFO, f"attempt {claim.attempt} begins from {origin} on {request.worker}")
         if problem is not None:
+            _say(run.id, logging.ERROR, f"attempt {claim.attempt} ended: failed: {problem}")
             raise ConflictError(problem)
         return claim
 
@@ -149,7 +157,7 @@ class WorkerService:
     def _receive(self, reports: Sequence[Report]) -> list[Outcome]:
         outcomes: list[Outcome] = []
         changes: dict[Change, None] = {}
-        ended: list[tables.Run] = []
+        ended: list[tuple[tables.Run, int, Final]] = []
         lost = 0
         # A sign of life alone changes nothing in the database.
         is_read = not any(report.batch.items or report.batch.final for report in reports)
@@ -172,7 +180,7 @@ class WorkerService:
                     items.write()
                     damaged = session.get(tables.Checkpoint, report.damaged) if report.damaged else None
                     attempts.end(session, run, batch.final, takers(session, run, training_of(run.experiment)), damaged)
-                    ended.append(run)
+                    ended.append((run, report.attempt, batch.final))
                     lost += batch.final.outcome == "lost"
                 outcomes.append(
                     Orders(
@@ -189,7 +197,10 @@ class WorkerService:
         self._services.instruments.losses.inc(lost)
         for change in changes:
             self._services.bus.publish(change)
-        for run in ended:
+        for run, attempt, final in ended:
+            reason = f": {final.error}" if final.error else ""
+            level = logging.INFO if final.outcome in _AS_IT_SHOULD else logging.WARNING
+            _say(run.id, level, f"attempt {attempt} ended at step {run.step:,}: {final.outcome}{reason}")
             self._announce(run)
         return outcomes
 
@@ -253,11 +264,15 @@ class WorkerService:
                 # Its worker may have been heard since, or have ended it.
                 if run.state in states.ACTIVE and leases.is_expired(run.id, run.attempt)
             ]
+            reasons = {
+                run.id: f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
+                for run in runs
+            }
             for run in runs:
-                reason = f"worker {run.worker} was not heard of for {self._services.settings.lease_seconds:g} s."
-                attempts.lose(session, run, reason, takers(session, run, training_of(run.experiment)))
+                attempts.lose(session, run, reasons[run.id], takers(session, run, training_of(run.experiment)))
         self._services.instruments.losses.inc(len(runs))
         for run in runs:
+            _say(run.id, logging.WARNING, f"attempt {run.attempt} was lost: {reasons[run.id]}")
             self._services.links.cut(run.id)
             self._announce(run)
 
@@ -307,6 +322,12 @@ class WorkerService:
 
     def _publish(self, run: tables.Run, kind: ChangeKind) -> None:
         self._services.bus.publish(Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind))
+
+
+def _say(run_id: str, level: int, message: str) -> None:
+    """A line of the server's log, after the commit; what an object a line says of the run is said of this one."""
+    with about(run_id):
+        logger.log(level, "run %s: %s", run_id, message)
 
 
 def _refuse_without_extensions(run: tables.Run, stored: StoredTraining, request: ClaimRequest) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,17 @@ from typing import Any
 import anyio
 import httpx
 import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
 
+from server.services import Services
+from server.worker_api.ingest import Report
+from server.worker_api.leases import Leases
+from server.worker_api.service import WorkerService
+from tests.server.harness import BASE_URL, TOKEN, Reports
 from tests.server.test_serving import ROOT, environment, serving
 from workers.logs import JsonFormatter, about, configure, process_is_about
+from workers.protocol import Batch, ClaimRequest, Final, Orders
 from workers.runtime.trainer_handle import TrainerHandle
 
 
@@ -135,3 +144,72 @@ def test_what_a_trainer_prints_is_an_object_a_line_too(
         f"trainer {trainer.pid}: something",
     ]
     assert {one["run"] for one in said[:2]} == {"r0"}
+
+
+class Lines(logging.Handler):
+    """What the server says, as an object a line."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.said: list[dict[str, Any]] = []
+        self.setFormatter(JsonFormatter())
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.said.append(json.loads(self.format(record)))
+
+
+@pytest.fixture
+def lines() -> Iterator[Lines]:
+    log, lines = logging.getLogger("server"), Lines()
+    before = log.level
+    log.setLevel(logging.INFO)
+    log.addHandler(lines)
+    yield lines
+    log.removeHandler(lines)
+    log.setLevel(before)
+
+
+def test_attempts_that_begin_end_and_are_lost_are_a_line_each(client: TestClient, services: Services, lines: Lines) -> None:
+    run_id = client.post("/api/experiments", json={"name": "a training", "seeds": [7]}).json()["runs"][0]["id"]
+    service = WorkerService(services)
+
+    def claim(published: int) -> None:
+        service.claim(run_id, ClaimRequest(worker="w@host", published_attempt=published, claim_id=f"{published:032x}"))
+
+    claim(0)
+    # Its answer got lost: it is the same attempt.
+    claim(0)
+    services.leases = Leases(seconds=-1.0)
+    service.lose_expired()
+    service.lose_expired()
+    services.leases = Leases(seconds=15.0)
+    claim(1)
+    (orders,) = service.receive([Report(run_id, 2, Batch(final=Final(outcome="released")))])
+    assert isinstance(orders, Orders)
+    claim(2)
+    (orders,) = service.receive([Report(run_id, 3, Batch(final=Final(outcome="failed", error="it went wrong")))])
+
+    said = [one for one in lines.said if one["logger"] == "server.worker_api.service"]
+    assert [one["message"].removeprefix(f"run {run_id}: ") for one in said] == [
+        "attempt 1 begins from the start on w@host",
+        "attempt 1 was lost: worker w@host was not heard of for 15 s.",
+        "attempt 2 begins from the start on w@host",
+        "attempt 2 ended at step 0: released",
+        "attempt 3 begins from the start on w@host",
+        "attempt 3 ended at step 0: failed: it went wrong",
+    ]
+    assert {one["run"] for one in said} == {run_id}
+    assert [one["level"] for one in said] == ["INFO", "WARNING", "INFO", "INFO", "INFO", "WARNING"]
+
+
+def test_a_server_that_starts_says_what_it_finds(app: FastAPI, services: Services, lines: Lines) -> None:
+    for _ in range(2):
+        with TestClient(app, base_url=BASE_URL, headers={"Authorization": f"Bearer {TOKEN}"}) as client:
+            runs = client.post("/api/experiments", json={"name": "a training", "seeds": [1, 2]}).json()["runs"]
+            Reports(client, services).state(runs[0], "running", attempt=1, worker="w@host")
+        services.board.closed = False
+    said = [one["message"] for one in lines.said if one["logger"] == "server.sweeper"]
+    assert said == [
+        "Runs under way: 1. Their workers have 15 s to be heard of; whose is not goes back into the queue.",
+        "Runs that wait for a worker: 1.",
+    ]
