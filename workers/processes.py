@@ -16,6 +16,18 @@ def die_with_parent(parent: int) -> None:
         os._exit(1)
 
 
+def how_it_ended(status: int) -> str:
+    """How a process ended, by its exit status as `subprocess` and `multiprocessing` tell it: "was killed by ..."."""
+    if status >= 0:
+        return f"ended with status {status}"
+    try:
+        name = f" ({signal.Signals(-status).name})"
+    except ValueError:
+        name = ""
+    cause = ": out of memory, perhaps" if status == -signal.SIGKILL else ""
+    return f"was killed by signal {-status}{name}{cause}"
+
+
 def usable_cores() -> int:
     """The processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1

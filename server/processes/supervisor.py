@@ -22,7 +22,7 @@ from server.errors import ServiceError
 from server.processes.listening import listen, local_url, login_url
 from server.security.secrets import load_secrets
 from server.settings import PROJECT_ROOT, Settings
-from workers.processes import usable_cores
+from workers.processes import how_it_ended, usable_cores
 from workers.runtime.supervised import SUPERVISED
 
 # The whole of a stop takes less than 10 s: the trainings' checkpoints first, then the server, which takes them in.
@@ -93,7 +93,7 @@ class Child:
                 self._patience = _FIRST_RESTART_SECONDS
             self._start_at = now + self._patience
             self._patience = min(2 * self._patience, _LAST_RESTART_SECONDS)
-            say(f"The {self.name} ended unexpectedly (exit status {code}) and is started again; {self.log} says more.")
+            say(f"The {self.name} {how_it_ended(code)}. It is started again; {self.log} says more.")
         elif now >= self._start_at:
             self.start()
 

@@ -16,6 +16,7 @@ from workers.runtime.fitness import Fitness
 from workers.runtime.jobs.__main__ import kinds_of_places
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.place import Place, forkserver
+from workers.runtime.sight import ServerSight
 
 _AS_WORKER = {"Authorization": f"Bearer {WORKER_TOKEN}"}
 
@@ -47,7 +48,16 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
     work_dir.mkdir(exist_ok=True)
     ending = threading.Event()
     places = [
-        Place(f"w@host/jobs{index}", takes, DirectClient(client), work_dir, Fitness(work_dir, 0), forkserver(), ending)
+        Place(
+            f"w@host/jobs{index}",
+            takes,
+            DirectClient(client),
+            work_dir,
+            Fitness(work_dir, 0),
+            ServerSight("the application"),
+            forkserver(),
+            ending,
+        )
         for index, takes in enumerate([kinds] if kinds else kinds_of_places(2)[:2])
     ]
     threads = [threading.Thread(target=place.run) for place in places]

@@ -56,6 +56,11 @@ def test_a_short_training_runs_to_its_end(running: Service) -> None:
     assert completed["step"] == 2 * ROLLOUT
     assert running.checkpoints(run_id) == running.steps(run_id) == [ROLLOUT, 2 * ROLLOUT]
     assert completed["error"] is None
+    # The worker's log says what happens to runs, and nothing of the messages that wake it.
+    said = running.directory / "w.log"
+    until(lambda: f"run {run_id}: attempt 1 ended: completed" in said.read_text())
+    log = said.read_text()
+    assert not any(noise in log for noise in ("[tasks]", "[queues]", "succeeded in", "received"))
 
 
 def test_a_server_that_dies_and_comes_back_loses_nothing(running: Service) -> None:

@@ -1,6 +1,7 @@
 """What a worker does where the machine or the server's store fails it: it waits, or says what is wrong."""
 
 import hashlib
+import signal
 import stat
 import sys
 import threading
@@ -24,6 +25,7 @@ from workers.runtime.attempt import Attempt
 from workers.runtime.client import ServerClient
 from workers.runtime.fitness import Fitness, make_private
 from workers.runtime.settings import WorkerSettings
+from workers.runtime.sight import ServerSight
 from workers.runtime.slot import Slot
 
 STORED = b"the archive as it was uploaded"
@@ -197,8 +199,35 @@ def test_a_slot_whose_trainers_die_while_they_start_takes_no_run_and_says_why(
     dying.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(dying))
     place = places(tmp_path)
-    with pytest.raises(UnfitError, match=r"ended with exit code 3\. It printed last:\nno such library"):
+    with pytest.raises(UnfitError, match=r"ended with status 3\. It printed last:\nno such library"):
         place.slot.take_trainer()
+
+
+def test_a_worker_that_is_told_to_end_does_not_say_that_it_takes_up_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    place = Slot(settings_for("http://127.0.0.1:9", tmp_path), 0, lambda: True)
+    monkeypatch.setattr(tasks, "_slot", place)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        tasks._train("r" * 32, 0)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+        place.close()
+    assert "takes up no run" not in caplog.text
+
+
+def test_that_the_server_is_away_is_said_once_for_all_threads(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "workers")
+    sight = ServerSight("http://server")
+    for _ in range(6):
+        sight.lost(ConnectionError("nobody there"))
+    sight.found()
+    sight.found()
+    assert caplog.messages == [
+        "Waiting for the server at http://server: nobody there",
+        "The server at http://server answers again.",
+    ]
 
 
 def test_a_worker_without_room_takes_no_run_and_says_how_much_is_missing(

@@ -16,6 +16,7 @@ from workers.runtime.ending import DRAIN_SIGNAL
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.machine import MachineWatch
 from workers.runtime.settings import WorkerSettings
+from workers.runtime.sight import ServerSight
 from workers.runtime.trainer_handle import TrainerHandle
 
 logger = logging.getLogger(__name__)
@@ -58,7 +59,8 @@ class Slot:
         self._spare: TrainerHandle | None = None
         self._patience = _FIRST_RETRY_SECONDS
         self._no_trainer: str | None = None
-        self._first = self._answered = True
+        self._first = True
+        self._sight = ServerSight(settings.server_url)
         self._fitness = Fitness(settings.work_dir, settings.min_free_bytes)
         self._machine = MachineWatch(gpu=settings.worker_queue == "gpu")
         threading.Thread(target=self._keep, name="keeper", daemon=True).start()
@@ -166,6 +168,9 @@ class Slot:
         return True
 
     def _be_patient(self, reason: str) -> None:
+        if self.shutting_down():
+            # A trainer that ends with the worker ends as it should.
+            return
         self._no_trainer = reason[:_TROUBLE_CHARACTERS]
         logger.error("%s The next trial is in %g s.", reason, self._patience)
         self._condition.notify_all()
@@ -199,15 +204,11 @@ class Slot:
             # For who watches over this worker without asking the server, as a container's health check does.
             (self.settings.work_dir / HEARTBEAT_FILE).touch()
         except ServerError as error:
-            if self._answered:
-                logger.warning("Waiting for the server at %s: %s", self.settings.server_url, error)
-            self._answered = False
+            self._sight.lost(error)
             return False
         except OSError as error:
             logger.warning("heartbeat: %s", error)
-        if not self._answered:
-            logger.info("The server at %s answers again.", self.settings.server_url)
-        self._answered = True
+        self._sight.found()
         return True
 
 

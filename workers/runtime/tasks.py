@@ -84,7 +84,8 @@ def _train(run_id: str, attempt: int) -> None:
         trainer = _slot.take_trainer()
     except UnfitError as error:
         # The server rings again, and while this worker rests another one hears it.
-        _slot.rest(str(error))
+        if not _slot.shutting_down():
+            _slot.rest(str(error))
         return
     try:
         claim = _claim(_slot, run_id, attempt)

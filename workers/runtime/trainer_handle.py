@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+from workers.processes import how_it_ended
 from workers.runtime.pipe import Control, Job, Order, Ready, Report, Sender, reports
 
 logger = logging.getLogger(__name__)
@@ -117,13 +118,7 @@ class TrainerHandle:
 
     def cause_of_death(self) -> str:
         """How it ended and what it printed last; call it after `close`."""
-        code = self._process.returncode
-        if code < 0:
-            how = f"was killed by {signal.Signals(-code).name}"
-            if code == -signal.SIGKILL:
-                how += " (out of memory, perhaps)"
-        else:
-            how = f"ended with exit code {code}"
+        how = how_it_ended(self._process.returncode)
         tail = "\n".join(self._output)
         return f"The trainer process {how}." + (f" It printed last:\n{tail}" if tail else "")
 

@@ -1,5 +1,7 @@
 """`mapless worker`: a Celery worker for a server, here or on another machine."""
 
+import functools
+import logging
 import os
 import sys
 from pathlib import Path
@@ -10,7 +12,7 @@ from pydantic import ValidationError
 
 from sim.parts import require
 from workers.errors import UnfitError
-from workers.logs import configure
+from workers.logs import LogFormat, configure
 from workers.processes import usable_cores
 from workers.protocol import Queue
 from workers.runtime.companion import Companion
@@ -107,13 +109,14 @@ def run_worker(settings: WorkerSettings, concurrency: int, jobs: int) -> None:
 
     if companion is not None:
         worker_ready.connect(lambda **_: companion.keep_running(), weak=False)
-    if settings.log_format == "json":
-        # Celery's own lines are for people.
-        setup_logging.connect(_log_json, weak=False)
-        _log_json()
+    # In Celery's place: a line for each message that comes and goes says nothing that ours do not.
+    log = functools.partial(_log, settings.log_format)
+    setup_logging.connect(log, weak=False)
+    log()
     app = create_app(settings.broker_url)
     app.worker_main(
         [
+            "--quiet",
             "worker",
             f"--queues={settings.queue_prefix}{settings.worker_queue}",
             f"--concurrency={concurrency}",
@@ -132,8 +135,10 @@ def _jobs_command(count: int) -> list[str]:
     return ["-m", "workers.runtime.jobs", str(count)]
 
 
-def _log_json(**_: Any) -> None:
-    configure("json")
+def _log(log_format: LogFormat, **_: Any) -> None:
+    configure(log_format)
+    # When the broker is lost and found.
+    logging.getLogger("celery.worker.consumer.connection").setLevel(logging.INFO)
 
 
 def _environment(settings: WorkerSettings) -> dict[str, str]:

@@ -20,6 +20,7 @@ from workers.runtime.fitness import Fitness, make_private
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.place import Place, forkserver
 from workers.runtime.settings import WorkerSettings
+from workers.runtime.sight import ServerSight
 from workers.runtime.supervised import end_with_supervisor
 
 _VIEWS: tuple[JobKind, ...] = ("view", "play")
@@ -58,9 +59,11 @@ def main(count: int) -> None:
     ensure_running()
     client = JobClient(settings.server_url, settings.worker_token.get_secret_value())
     fitness = Fitness(settings.work_dir, settings.min_free_bytes)
+    sight = ServerSight(settings.server_url)
     threads = []
     for index, kinds in enumerate(kinds_of_places(count)):
-        place = Place(f"{settings.host_name}/jobs{index}", kinds, client, settings.work_dir, fitness, context, ending)
+        name = f"{settings.host_name}/jobs{index}"
+        place = Place(name, kinds, client, settings.work_dir, fitness, sight, context, ending)
         threads.append(threading.Thread(target=place.run, name=place.name, daemon=True))
         threads[-1].start()
     while not ending.wait(HEARTBEAT_SECONDS):

@@ -24,10 +24,12 @@ from workers.job_protocol import (
     WatchedJob,
 )
 from workers.play_protocol import PlaySeen
+from workers.processes import how_it_ended
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.process import ARCHIVE, RECORDING, RESULT, Done, Failed, Progressed, Said, main
 from workers.runtime.jobs.pulse import REPORT_SECONDS, pulse
+from workers.runtime.sight import ServerSight
 
 logger = logging.getLogger(__name__)
 
@@ -61,6 +63,7 @@ class Place:
         client: to the server.
         work_dir: where jobs keep their files while they are under way.
         fitness: of this machine.
+        sight: of the server, one for all places of a process.
         context: where processes are forked from.
         ending: set once the worker is to end.
     """
@@ -72,6 +75,7 @@ class Place:
         client: JobClient,
         work_dir: Path,
         fitness: Fitness,
+        sight: ServerSight,
         context: ForkServerContext,
         ending: threading.Event,
     ) -> None:
@@ -80,13 +84,13 @@ class Place:
         self._client = client
         self._work_dir = work_dir
         self._fitness = fitness
+        self._sight = sight
         self._context = context
         self._ending = ending
 
     def run(self) -> None:
         """Take up jobs until the worker ends."""
         claim_id = uuid.uuid4().hex
-        waited = False
         while not self._ending.is_set():
             if self._fitness.trouble is not None:
                 self._ending.wait(REPORT_SECONDS)
@@ -94,12 +98,10 @@ class Place:
             try:
                 claim = self._client.claim_job(self.name, self._kinds, claim_id, _CLAIM_WAIT_SECONDS)
             except ServerError as error:
-                if not waited:
-                    logger.warning("%s waits for the server: %s", self.name, error)
-                waited = True
+                self._sight.lost(error)
                 self._ending.wait(_RETRY_SECONDS)
                 continue
-            waited = False
+            self._sight.found()
             (self._work_dir / HEARTBEAT_FILE).touch()
             if claim is None:
                 continue
@@ -268,6 +270,4 @@ class _Watch:
 
     def _died(self) -> JobEnd:
         self._process.join(_EXIT_SECONDS)
-        code = self._process.exitcode
-        how = f"was killed by signal {-code} (out of memory, perhaps)" if code and code < 0 else f"ended with status {code}"
-        return JobEnd(outcome="lost", error=f"The process {how}.")
+        return JobEnd(outcome="lost", error=f"The process {how_it_ended(self._process.exitcode or 0)}.")
