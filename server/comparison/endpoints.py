@@ -72,11 +72,22 @@ def compare_curves(
     ] = None,
     across: Horizontal = "steps",
     logarithmic: LogarithmicX = False,
+    since: Annotated[
+        str | None,
+        Query(
+            max_length=64,
+            description="`follow` of the answer that is known, to the same question: only what is beyond is wanted.",
+        ),
+    ] = None,
 ) -> Curves:
-    """One metric of every run on one grid, and each experiment's mean and interval."""
+    """One metric of every run on one grid, and each experiment's mean and interval.
+
+    Who follows runs that report asks with `follow` of the answer before: what is known beyond `since` of the next one gives
+    way to what comes. Where a run has begun, or was cut back, it is whole.
+    """
     ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
-    kept.unless(service.state(ids), name, points, lines, across, logarithmic)
-    return service.curves(ids, name, points, lines, across, logarithmic=logarithmic)
+    kept.unless(service.state(ids), name, points, lines, across, logarithmic, since)
+    return service.curves(ids, name, points, lines, across, logarithmic=logarithmic, since=since)
 
 
 @router.get("/metrics", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])

@@ -144,6 +144,13 @@ class Curves(Schema):
     )
     steps: list[int] = Field(description="The grid; empty where it is not of steps.")
     x: list[float] | None = Field(None, description="The grid; null where it is of steps.")
+    since: int | None = Field(
+        None,
+        description="The step beyond which this is all there is: what is known up to there stays. Null for a whole answer.",
+    )
+    follow: str | None = Field(
+        None, description="Asked again with it as `since`, what is new comes alone; null where the next answer is whole."
+    )
     experiments: list[ExperimentCurves]
 
 

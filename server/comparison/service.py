@@ -10,7 +10,8 @@ from sqlalchemy.orm import Session
 from server.checkpoints.repository import CheckpointRepository
 from server.comparison.differences import differences
 from server.comparison.figures import FinalFigures, final_figures
-from server.comparison.grid import COUNTED_BY, Across, Curve, all_under_way, common_grid, resample
+from server.comparison.following import Followed, digest_of, settled_of
+from server.comparison.grid import COUNTED_BY, Across, Curve, Grid, all_under_way, common_grid, resample
 from server.comparison.schemas import (
     Comparison,
     Curves,
@@ -124,8 +125,9 @@ class ComparisonService:
         across: Across = "steps",
         *,
         logarithmic: bool = False,
+        since: str | None = None,
     ) -> Curves:
-        """One metric of all runs on one grid of at most `points` places.
+        """One metric of all runs on one grid of at most `points` places, or what has come of it since another answer.
 
         Args:
             experiment_ids: what is compared, in order.
@@ -134,23 +136,49 @@ class ComparisonService:
             lines: single seeds at most, of all experiments together; None for all. Means and intervals are over all of them.
             across: what x is.
             logarithmic: whether x is shown on a logarithmic axis.
+            since: `follow` of that other answer, to the same question; None for all.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
         counter = COUNTED_BY.get(across)
+        followable = counter is None and not logarithmic
+        known = Followed.of(since) if since is not None and followable else None
         with self._services.database.read() as session:
             experiments = ExperimentRepository(session).get_many(experiment_ids)
             run_ids = [run.id for experiment in experiments for run in experiment.runs]
-            # Finer than the grid: what is looked at is the grid's.
-            wanted = [name] if counter is None else [name, counter]
-            read = MetricRepository(session).curves(run_ids, wanted, max(points, SUMMARY_WIDTH))
             final = CheckpointRepository(session).final_evaluations(run_ids)
             episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
+            repository = MetricRepository(session)
+            shown = None if lines is None else lines // len(experiments)
+            asked = (name, points, lines)
+            if known is not None:
+                tails, began = repository.tails(run_ids, name, known.settled)
+                news = _beyond(tails, known, points)
+                if news is not None:
+                    series, grid = news
+                    digest = digest_of(experiments, series, began, episodes, asked)
+                    if digest == known.digest:
+                        settled = settled_of(experiments, series, grid, known)
+                        return Curves(
+                            name=name,
+                            across=across,
+                            spacing=grid.spacing,
+                            steps=grid.x.astype(np.int64).tolist(),
+                            experiments=[_curves(one, series, grid.x, name, episodes, shown, ()) for one in experiments],
+                            since=known.settled,
+                            follow=None if settled is None else Followed(digest, *settled).token,
+                        )
+            # Finer than the grid: what is looked at is the grid's.
+            wanted = [name] if counter is None else [name, counter]
+            read = repository.curves(run_ids, wanted, max(points, SUMMARY_WIDTH))
+            chunks_began = repository.began(run_ids, name) if followable else {}
         series = {run_id: _curve(read[run_id], name, counter) for run_id in run_ids}
         grid = common_grid(list(series.values()), points, whole=across == "steps", logarithmic=logarithmic)
         unplaced = {run_id for run_id in run_ids if name in read[run_id] and not series[run_id].x.size}
-        shown = None if lines is None else lines // len(experiments)
+        settled = settled_of(experiments, series, grid, None) if followable else None
+        began = {run_id: int(curve.x[0]) for run_id, curve in series.items() if curve.x.size} | chunks_began
+        digest = digest_of(experiments, series, began, episodes, asked)
         return Curves(
             name=name,
             across=across,
@@ -158,7 +186,20 @@ class ComparisonService:
             steps=grid.x.astype(np.int64).tolist() if counter is None else [],
             x=None if counter is None else [float(f"{x:.7g}") for x in grid.x],
             experiments=[_curves(experiment, series, grid.x, name, episodes, shown, unplaced) for experiment in experiments],
+            follow=None if settled is None else Followed(digest, *settled).token,
         )
+
+
+def _beyond(tails: Mapping[str, Points], known: Followed, points: int) -> tuple[dict[str, Curve], Grid] | None:
+    """The curves and the grid beyond what is known; None where that is too much to go on from it."""
+    whole = {run_id: Curve.over_steps(Buckets.of(each)) for run_id, each in tails.items()}
+    grid = known.beyond(list(whole.values()), points)
+    if grid is None or grid.spacing == "points":
+        return None if grid is None else (whole, grid)
+    # As fine as what is known: its places lay on curves of so many buckets.
+    width = 2 + -(-grid.x.size * max(points, SUMMARY_WIDTH) // points)
+    cut = {run_id: Curve.over_steps(Buckets.of(each).cut(width + 2, each.steps[:1])) for run_id, each in tails.items()}
+    return cut, grid
 
 
 def _held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 from sqlalchemy import Table, delete, func, insert, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from server.database import tables
 from server.http.abandoned import stop_if_abandoned
@@ -273,6 +273,44 @@ class MetricRepository:
             if names is None or name in names:
                 parts[name].append(points)
         return {name: Points.joined(parts[name]) for name in sorted(parts)}
+
+    def tails(self, run_ids: Collection[str], name: str, step: int) -> tuple[dict[str, Points], dict[str, int]]:
+        """One series of several runs from the last point at or before `step` on, and where it began, both by run."""
+        chunk, earlier = tables.MetricChunk, aliased(tables.MetricChunk)
+        first = select(func.max(earlier.first_step)).where(
+            earlier.run_id == chunk.run_id, earlier.name == name, earlier.first_step <= step
+        )
+        parts: dict[str, list[Points]] = {run_id: [] for run_id in run_ids}
+        for some in _portions(run_ids):
+            query = select(chunk).where(
+                chunk.run_id.in_(some),
+                chunk.name == name,
+                chunk.first_step >= func.coalesce(first.correlate(chunk).scalar_subquery(), 0),
+            )
+            found = self._session.scalars(query.order_by(chunk.run_id, chunk.first_step))
+            for each, points in self._axes.decoded(found):
+                stop_if_abandoned()
+                parts[each.run_id].append(points)
+            for run_id, rows in self._rows_of(some).items():
+                if (points_of := _series(rows).get(name)) is not None:
+                    parts[run_id].append(points_of)
+        whole = {run_id: Points.joined(each) for run_id, each in parts.items()}
+        tails = {
+            run_id: points[max(0, int(np.searchsorted(points.steps, step, side="right")) - 1) :]
+            for run_id, points in whole.items()
+        }
+        # Without chunks all that there is was read.
+        began = {run_id: int(points.steps[0]) for run_id, points in whole.items() if len(points)}
+        return tails, began | self.began(run_ids, name)
+
+    def began(self, run_ids: Collection[str], name: str) -> dict[str, int]:
+        """The first step of a series in the chunks of each run that has some."""
+        chunk = tables.MetricChunk
+        began: dict[str, int] = {}
+        for some in _portions(run_ids):
+            query = select(chunk.run_id, func.min(chunk.first_step)).where(chunk.run_id.in_(some), chunk.name == name)
+            began |= {row[0]: row[1] for row in self._session.execute(query.group_by(chunk.run_id))}
+        return began
 
     def _extend(self, run_id: str, fresh: Mapping[str, Points]) -> None:
         last_chunks = self._last_chunks(run_id, fresh)

@@ -578,6 +578,9 @@ export interface paths {
         /**
          * Compare Curves
          * @description One metric of every run on one grid, and each experiment's mean and interval.
+         *
+         *     Who follows runs that report asks with `follow` of the answer before: what is known beyond `since` of the next one gives
+         *     way to what comes. Where a run has begun, or was cut back, it is whole.
          */
         get: operations["compare_curves_api_compare_curves_get"];
         put?: never;
@@ -4893,8 +4896,18 @@ export interface components {
             across: "steps" | "wall" | "cpu" | "episodes";
             /** Experiments */
             experiments: components["schemas"]["ExperimentCurves"][];
+            /**
+             * Follow
+             * @description Asked again with it as `since`, what is new comes alone; null where the next answer is whole.
+             */
+            follow: string | null;
             /** Name */
             name: string;
+            /**
+             * Since
+             * @description The step beyond which this is all there is: what is known up to there stays. Null for a whole answer.
+             */
+            since: number | null;
             /**
              * Spacing
              * @description How the grid lies: on the points of all runs together or, where those are too many, evenly over their range, or by equal factors.
@@ -14755,6 +14768,8 @@ export interface operations {
                 name?: string;
                 /** @description Places of the grid at most. */
                 points?: number;
+                /** @description `follow` of the answer that is known, to the same question: only what is beyond is wanted. */
+                since?: string | null;
                 /** @description What the grid is of: steps, time under way, CPU time, or episodes. */
                 x?: "steps" | "wall" | "cpu" | "episodes";
             };

@@ -1,7 +1,9 @@
-/** A run's curves while it goes on: after the first answer only what is new is asked for. */
+/** Curves while runs go on, a run's own and a comparison's: after the first answer only what is new is asked for. */
 import { keepPreviousData, useQuery } from '@tanstack/react-query'
+import { useDeferredValue } from 'react'
 import { api } from '../api/client'
-import type { Metrics, Series } from '../api/types'
+import type { paths } from '../api/schema'
+import type { Curves, Metrics, Series } from '../api/types'
 
 /** A series grows to so many times the width that was asked for; then it is asked for whole, in fewer points. */
 const MOST_WIDTHS = 2
@@ -61,4 +63,61 @@ export function useCurves(runId: string, points: number) {
     },
     placeholderData: keepPreviousData,
   })
+}
+
+type Experiment = Curves['experiments'][number]
+
+/** What is known, up to the place of the grid beyond which the news tells; the news from there on. */
+export function followedCurves(known: Curves, news: Curves): Curves {
+  const { since } = news
+  if (since === null) return news
+  let kept = known.steps.length
+  while (kept > 0 && (known.steps[kept - 1] ?? 0) > since) kept--
+  const behind = <Value>(before: readonly Value[], after: readonly Value[]) => [
+    ...before.slice(0, kept),
+    ...after,
+  ]
+  const experiments = news.experiments.map((next, index): Experiment => {
+    const before = known.experiments[index]
+    if (!before) return next
+    return {
+      ...next,
+      seeds: next.seeds.map((seed, place) => ({
+        ...seed,
+        values: behind(before.seeds[place]?.values ?? [], seed.values),
+      })),
+      mean: behind(before.mean, next.mean),
+      low: behind(before.low, next.low),
+      high: behind(before.high, next.high),
+      count: behind(before.count, next.count),
+    }
+  })
+  return { ...news, steps: behind(known.steps, news.steps), experiments }
+}
+
+/** With what to ask for what is new; undefined where all should be asked for anew. */
+export function follow(known: Curves | undefined, points: number): string | undefined {
+  if (!known || known.steps.length > MOST_WIDTHS * points) return undefined
+  return known.follow ?? undefined
+}
+
+type CurvesQuery = paths['/api/compare/curves']['get']['parameters']['query'] & { points: number }
+
+/** One metric of several experiments on one grid; drawn in slices, as every answer (`$api`). */
+export function useComparedCurves(query: CurvesQuery, placeholderData: typeof keepPreviousData) {
+  const path = '/api/compare/curves'
+  const { data, error } = useQuery({
+    queryKey: ['get', path, { params: { query } }],
+    queryFn: async ({ client, queryKey, signal }) => {
+      const known = client.getQueryData<Curves>(queryKey)
+      const since = follow(known, query.points)
+      const asked = since === undefined ? query : { ...query, since }
+      const { data } = await api.GET(path, { params: { query: asked }, signal })
+      // A refusal has been thrown.
+      const news = data as Curves
+      return known ? followedCurves(known, news) : news
+    },
+    placeholderData,
+  })
+  return { data: useDeferredValue(data), error }
 }

@@ -4,6 +4,7 @@ import { useMemo } from 'react'
 import { $api } from '../api/client'
 import type { Curves } from '../api/types'
 import { ACROSS, isTime } from '../charts/across'
+import { useComparedCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import { lookOf } from '../charts/panels'
 import { chartOfCurves } from '../charts/shape'
@@ -29,12 +30,7 @@ export function CurveChart({ name, experiments, view, onView }: CurveChartProps)
     ...(across === 'steps' ? {} : { x: across }),
     ...(logX ? { log: true } : {}),
   }
-  const { data, error } = $api.useQuery(
-    'get',
-    '/api/compare/curves',
-    { params: { query } },
-    { placeholderData: keepPreviousData },
-  )
+  const { data, error } = useComparedCurves(query, keepPreviousData)
   const chart = useMemo(() => (data ? chartOfCurves(data) : { x: [], lines: [] }), [data])
   return (
     <MetricChart

@@ -141,6 +141,20 @@ test('curves over time under way: in the address, on a grid that is told, and wh
   expect(screen.queryByText(/evenly spaced/)).not.toBeInTheDocument()
 })
 
+test('while its runs report only what is new of a curve is asked for', async () => {
+  const server = startServer({ ...routes, 'GET /api/compare/curves': { ...curves, follow: 'known' } })
+  open('/compare?experiment=exp1&experiment=exp2')
+  await screen.findByTestId('figures')
+  await waitFor(() => expect(FakeEventSource.open).toHaveLength(1))
+  const asked = () => server.asked.filter((path) => path.includes('/api/compare/curves'))
+  await waitFor(() => expect(asked().length).toBeGreaterThan(0))
+  expect(asked().some((path) => path.includes('since='))).toBe(false)
+  FakeEventSource.open[0]?.send({ experiment_id: 'exp1', run_id: 'run1', kind: 'run' })
+  await waitFor(() => expect(asked().some((path) => path.includes('since=known'))).toBe(true), {
+    timeout: 4_000,
+  })
+})
+
 test('any metric that was reported becomes a panel, and the address keeps them in their order', async () => {
   const server = startServer({
     ...routes,

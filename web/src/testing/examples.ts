@@ -337,6 +337,8 @@ export const field: FieldMatrix = {
 }
 
 export const curves: Curves = {
+  since: null,
+  follow: null,
   name: 'eval/success_rate',
   across: 'steps',
   spacing: 'points',
