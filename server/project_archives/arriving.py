@@ -92,12 +92,14 @@ class ProjectArrival:
     Args:
         services: of the server.
         project_id: where to.
+        of_everybodys: whether evaluations of shipped policies and baselines, which everybody sees, are taken too.
     """
 
-    def __init__(self, services: Services, project_id: str) -> None:
+    def __init__(self, services: Services, project_id: str, *, of_everybodys: bool) -> None:
         self._services = services
         self._lane = services.lanes.imports
         self._project_id = project_id
+        self._of_everybodys = of_everybodys
         self._outcomes: list[ImportedRun] = []
         self._checkpoints = 0
         self._others: list[ImportedThing] = []
@@ -168,7 +170,8 @@ class ProjectArrival:
             ProjectRepository(session).get(self._project_id)
             if kind == "policy":
                 return take_policy(session, self._project_id, _read(ArchivedPolicy, content), graph)
-            return take_evaluation(session, self._project_id, _read(ArchivedAskedEvaluation, content))
+            evaluation = _read(ArchivedAskedEvaluation, content)
+            return take_evaluation(session, self._project_id, evaluation, of_everybodys=self._of_everybodys)
 
     async def _run(self, experiment: ArchivedExperiment, archived: ArchivedRun, incoming: IncomingTar) -> None:
         if len(self._outcomes) >= MAX_RUNS:

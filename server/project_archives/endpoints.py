@@ -10,6 +10,7 @@ from server.project_archives.arriving import ProjectArrival
 from server.project_archives.leaving import leaving
 from server.project_archives.schemas import ProjectImport
 from server.security.permissions import edit, view
+from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 
 router = APIRouter(prefix="/api/projects/{project_id}", tags=["projects"])
@@ -36,6 +37,10 @@ async def export_project(project_id: str, services: ServicesDep) -> StreamingRes
     openapi_extra=_BODY,
     dependencies=[edit("project_id")],
 )
-async def import_project(project_id: str, request: Request, services: ServicesDep) -> ProjectImport:
-    """Take what another server exported, with the same ids: each run whole, or not at all; sent again, it goes on."""
-    return await ProjectArrival(services, project_id).take(request.stream())
+async def import_project(project_id: str, request: Request, services: ServicesDep, principal: PrincipalDep) -> ProjectImport:
+    """Take what another server exported, with the same ids: each run whole, or not at all; sent again, it goes on.
+
+    Evaluations of shipped policies and baselines, which everybody sees, are taken from administrators of the installation.
+    """
+    arrival = ProjectArrival(services, project_id, of_everybodys=principal.administrates)
+    return await arrival.take(request.stream())

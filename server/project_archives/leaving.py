@@ -37,7 +37,7 @@ def leaving(services: Services, project_id: str) -> OutgoingFile:
     """The project as one file: studies, experiments with tags and notes, runs with all that hangs on them.
 
     That is events, printed lines, points, checkpoints and their evaluations. Beside them uploaded policies, evaluations that
-    were asked for, and the imported arenas that any of these use.
+    were asked for of any of these, of shipped policies and of baselines, and the imported arenas that any of these use.
 
     What lies in the trash stays, and so do a damaged checkpoint and one whose archive is gone. A run that goes on leaves
     as it is when its turn comes. Only one run's documents are held at a time.

@@ -22,8 +22,17 @@ from server.project_archives.schemas import ArchivedAskedEvaluation, ArchivedPol
 from server.uploads.repository import UploadRepository
 from server.uploads.service import MAX_UPLOADS
 from sim.config import ArenaFile, ImportedArenaConfig, TaskConfig
-from workers.job_protocol import ArenaSuite, CheckpointPolicy, ScenarioSuite, SuiteChoice
+from workers.job_protocol import (
+    AnyPolicy,
+    ArenaSuite,
+    CheckpointPolicy,
+    ScenarioSuite,
+    ShippedPolicyName,
+    SuiteChoice,
+    UploadedPolicy,
+)
 from workers.reporting import EvaluationResult
+from workers.shipped.library import shipped_policies
 
 _CHOICE: TypeAdapter[SuiteChoice] = TypeAdapter(SuiteChoice)
 
@@ -123,20 +132,24 @@ def archived_evaluation(session: Session, evaluation_id: str) -> ArchivedAskedEv
     )
 
 
-def take_evaluation(session: Session, project_id: str, archived: ArchivedAskedEvaluation) -> bool:
+def take_evaluation(session: Session, project_id: str, archived: ArchivedAskedEvaluation, *, of_everybodys: bool) -> bool:
     """Add an evaluation that was asked for; False where it was here.
 
+    Args:
+        session: a transaction that writes.
+        project_id: of the project that it comes with.
+        archived: the evaluation.
+        of_everybodys: whether it may be of a shipped policy or a baseline, which everybody sees.
+
     Raises:
-        ConflictError: there is another one of its id, or its policy is none of the project.
+        ConflictError: there is another one of its id, its policy is none of the project, or may not be measured so.
     """
     known = session.get(tables.PolicyEvaluation, archived.id)
     if known is not None:
         if known.created_at != archived.created_at:
             raise ConflictError(f"This server has another evaluation of the id {archived.id}.")
         return False
-    of_checkpoint = isinstance(archived.policy, CheckpointPolicy)
-    if not ProjectArchiveRepository(session).has_policy(project_id, archived.policy.id, of_checkpoint=of_checkpoint):
-        raise ConflictError(f"The policy {archived.policy.id} that it measures is not in this project.")
+    checkpoint_id, upload_id = _measured_in(session, project_id, archived.policy, of_everybodys=of_everybodys)
     result = archived.result
     session.add(
         tables.PolicyEvaluation(
@@ -147,8 +160,8 @@ def take_evaluation(session: Session, project_id: str, archived: ArchivedAskedEv
             title=archived.title,
             policy=archived.policy.model_dump(mode="json"),
             choice=archived.choice.model_dump(mode="json"),
-            checkpoint_id=archived.policy.id if of_checkpoint else None,
-            upload_id=None if of_checkpoint else archived.policy.id,
+            checkpoint_id=checkpoint_id,
+            upload_id=upload_id,
             created_at=archived.created_at,
             error=archived.error,
             suite=result.suite if result else None,
@@ -160,3 +173,23 @@ def take_evaluation(session: Session, project_id: str, archived: ArchivedAskedEv
         )
     )
     return True
+
+
+def _measured_in(
+    session: Session, project_id: str, policy: AnyPolicy, *, of_everybodys: bool
+) -> tuple[str | None, str | None]:
+    """The ids of the checkpoint and of the upload that a policy is, where it is one of these.
+
+    Raises:
+        ConflictError: it is none of the project, or is not here.
+    """
+    if isinstance(policy, CheckpointPolicy | UploadedPolicy):
+        of_checkpoint = isinstance(policy, CheckpointPolicy)
+        if not ProjectArchiveRepository(session).has_policy(project_id, policy.id, of_checkpoint=of_checkpoint):
+            raise ConflictError(f"The policy {policy.id} that it measures is not in this project.")
+        return (policy.id, None) if of_checkpoint else (None, policy.id)
+    if not of_everybodys:
+        raise ConflictError("It measures what is everybody's: an administrator of the installation brings it in.")
+    if isinstance(policy, ShippedPolicyName) and all(policy.name != each.card.name for each in shipped_policies()):
+        raise ConflictError(f"The policy {policy.name} that it measures does not come with this version.")
+    return None, None

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import or_, select
+from sqlalchemy import and_, or_, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -63,7 +63,10 @@ class ProjectArchiveRepository:
         ).all()
 
     def evaluations(self, project_id: str) -> Sequence[str]:
-        """The ids of the evaluations that were asked for of a project's whole checkpoints and uploads, the oldest first."""
+        """The ids of the evaluations that stand beside one another in a project, the oldest first.
+
+        Those of its whole checkpoints and uploads, and those of shipped policies and baselines, which are everybody's.
+        """
         row, experiment = tables.PolicyEvaluation, tables.Experiment
         trained = (
             select(tables.Checkpoint.id)
@@ -73,7 +76,8 @@ class ProjectArchiveRepository:
             .where(tables.Checkpoint.damaged_at.is_(None))
         )
         uploaded = select(tables.UploadedPolicy.id).where(tables.UploadedPolicy.project_id == project_id)
-        query = select(row.id).where(or_(row.checkpoint_id.in_(trained), row.upload_id.in_(uploaded)))
+        everybodys = and_(row.checkpoint_id.is_(None), row.upload_id.is_(None))
+        query = select(row.id).where(or_(row.checkpoint_id.in_(trained), row.upload_id.in_(uploaded), everybodys))
         return self._session.scalars(query.order_by(row.created_at, row.id)).all()
 
     def has_policy(self, project_id: str, policy_id: str, *, of_checkpoint: bool) -> bool:

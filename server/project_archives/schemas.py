@@ -26,7 +26,7 @@ from server.evaluations.ways import KeptWays
 from server.schemas import Schema
 from server.uploads.schemas import MAX_FILE_BYTES
 from sim.config import TaskConfig
-from workers.job_protocol import CheckpointPolicy, SuiteChoice, UploadedPolicy
+from workers.job_protocol import AnyPolicy, SuiteChoice
 from workers.reporting import EvaluationResult, EventLevel
 
 Id = Annotated[str, StringConstraints(pattern=r"^[0-9a-z]{1,16}$")]
@@ -40,10 +40,11 @@ Step = Annotated[int, Field(ge=0, lt=2**62)]
 class ArchiveManifest(Schema):
     """What an archive is.
 
-    Those of the first format have neither studies nor logs, of the second nothing of `Kind`, of the third no thinned curves.
+    Those of the first format have neither studies nor logs, of the second nothing of `Kind`, of the third no thinned curves,
+    of the fourth no evaluations of what is everybody's.
     """
 
-    format: Literal[1, 2, 3, 4] = 4
+    format: Literal[1, 2, 3, 4, 5] = 5
     version: ShortLine
     project: ShortLine
 
@@ -170,11 +171,14 @@ class ArchivedPolicy(Schema):
 
 
 class ArchivedAskedEvaluation(Schema):
-    """An evaluation that was asked for of the project's checkpoints and policies, and measured, or given up for a reason."""
+    """An evaluation that was asked for, and measured, or given up for a reason.
+
+    Of the project's checkpoints and uploaded policies, or of a shipped policy or a baseline.
+    """
 
     id: Id
     title: Annotated[ShortLine, StringConstraints(max_length=200)]
-    policy: CheckpointPolicy | UploadedPolicy = Field(discriminator="source")
+    policy: AnyPolicy
     choice: SuiteChoice
     created_at: Time
     error: Text | None

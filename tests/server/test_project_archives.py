@@ -24,11 +24,14 @@ from server.checkpoints.repository import CheckpointRepository
 from server.curve_thinning.rule import CurveRule
 from server.curve_thinning.service import CurveThinningService
 from server.database import tables
+from server.errors import ConflictError
 from server.files import StoredFile
 from server.ids import new_id
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
+from server.project_archives.others import take_evaluation
+from server.project_archives.schemas import ArchivedAskedEvaluation
 from server.run_log.repository import LogRepository
 from server.services import Services
 from server.settings import Settings
@@ -309,7 +312,40 @@ def test_what_is_damaged_or_anothers_is_refused_beside_the_runs(
     assert {each["outcome"] for each in answer["others"]} == {"refused"}
 
 
-@pytest.mark.parametrize("number", [2, 3])
+def test_what_is_everybodys_comes_along_where_an_administrator_brings_it(
+    client: TestClient, servers: tuple[Server, Server], job_worker: None, tmp_path: Path
+) -> None:
+    policies = [{"source": "shipped", "name": "simple"}, {"source": "baseline", "name": "go-to-goal"}]
+    body = {"policies": policies, "suites": [{"by": "name", "name": "simple-200"}]}
+    asked = [ended(client, each) for each in client.post("/api/evaluations", json=body).json()]
+    assert [each["state"] for each in asked] == ["done", "done"]
+    there, _ = servers
+    archive = mapless_client.Client(BASE_URL, http=client).export_project("default", tmp_path)
+
+    # Nobody who may only edit a project puts figures onto everybody's leaderboards.
+    with there.services.database.write() as session, pytest.raises(ConflictError, match="administrator"):
+        take_evaluation(session, "default", archived(archive, asked[0]["id"]), of_everybodys=False)
+    unknown = rewritten(
+        archive, lambda _, content: content.replace(b'"shipped","name":"simple"', b'"shipped","name":"psychic"')
+    )
+    answer = send(there, unknown).json()["others"]
+    assert {each["id"]: each["outcome"] for each in answer} == {asked[0]["id"]: "refused", asked[1]["id"]: "imported"}
+    assert "psychic" in next(each["why"] for each in answer if each["why"])
+
+    came = there.client.import_project(archive, "default")
+    assert {each.id: each.outcome for each in came.others} == {asked[0]["id"]: "imported", asked[1]["id"]: "there"}
+    assert others(there.http, asked) == others(client, asked)
+
+
+def archived(archive: Path, evaluation_id: str) -> ArchivedAskedEvaluation:
+    """As it stands in an archive."""
+    with tarfile.open(archive) as file:
+        member = file.extractfile(f"evaluations/{evaluation_id}.json")
+        assert member is not None
+        return ArchivedAskedEvaluation.model_validate_json(member.read())
+
+
+@pytest.mark.parametrize("number", [2, 3, 4])
 def test_an_archive_of_an_older_format_is_read(
     servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path, number: int
 ) -> None:
@@ -317,8 +353,8 @@ def test_an_archive_of_an_older_format_is_read(
 
     def older(name: str, content: bytes) -> bytes:
         if name == "manifest.json":
-            assert b'"format":4' in content
-            return content.replace(b'"format":4', b'"format":%d' % number)
+            assert b'"format":5' in content
+            return content.replace(b'"format":5', b'"format":%d' % number)
         return content.replace(b'"thinned_at":null,', b"")
 
     archive = rewritten(here.client.export_project("default", tmp_path), older)
@@ -505,7 +541,7 @@ def test_an_archive_of_the_first_format_is_read(
         if name.endswith("experiment.json"):
             told = json.loads(content)
             return json.dumps({key: told[key] for key in told.keys() - {"campaign", "campaign_row", "study_id"}}).encode()
-        return content.replace(b'"format":4', b'"format":1') if name == "manifest.json" else content
+        return content.replace(b'"format":5', b'"format":1') if name == "manifest.json" else content
 
     archive = rewritten(here.client.export_project("default", tmp_path), before)
     assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]
