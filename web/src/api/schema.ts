@@ -1732,6 +1732,8 @@ export interface paths {
         /**
          * Import Project
          * @description Take what another server exported, with the same ids: each run whole, or not at all; sent again, it goes on.
+         *
+         *     Evaluations of shipped policies and baselines, which everybody sees, are taken from administrators of the installation.
          */
         post: operations["import_project_api_projects__project_id__import_post"];
         delete?: never;
