@@ -101,6 +101,7 @@ lock: .venv/bin/uv
 	$(LOCK) pyproject.toml --extra server -o requirements-server.txt -c requirements.txt
 	$(LOCK) pyproject.toml --extra worker -o requirements-worker.txt -c requirements.txt
 	$(LOCK) pyproject.toml --extra server --extra s3 -o requirements-s3.txt -c requirements.txt
+	$(LOCK) pyproject.toml --extra server --extra parquet -o requirements-parquet.txt -c requirements.txt
 	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["build"], sep="\n")' \
 	  | $(LOCK) - -o requirements-build.txt -c requirements.txt
 	$(LOCK) server/client/pyproject.toml --extra mcp -o server/client/requirements.txt -c requirements.txt

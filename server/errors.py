@@ -13,6 +13,7 @@ ServiceError (a sim.errors.MaplessError)   500
 ├── MisplacedError                  422  something can't be where a playground's owner wants it
 ├── RefusedFieldError               422  a field of a form, told as FastAPI tells its own
 ├── CorruptUploadError              422  the bytes are not what their checksum says
+├── MissingExtraError               501  a part that few need is not installed
 ├── TooManyAttemptsError            429  too many wrong tokens
 ├── JobFailedError                  500  a worker could not do what was asked for
 │   ├── ExportFailedError                a policy could not be exported faithfully
@@ -128,6 +129,24 @@ class CorruptUploadError(ServiceError):
     """The bytes that arrived are not what their checksum says."""
 
     status = 422
+
+
+class MissingExtraError(ServiceError):
+    """A part of the service that few need is not installed.
+
+    Args:
+        what: that needs it.
+        extra: its name.
+        instead: what to do without it.
+    """
+
+    status = 501
+
+    def __init__(self, what: str, extra: str, instead: str) -> None:
+        super().__init__(
+            f"{what} needs a part that is not installed where the server runs: pip install 'mapless[{extra}]' there, "
+            f"{instead}."
+        )
 
 
 class TooManyAttemptsError(ServiceError):

@@ -9,9 +9,18 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def csv_rows(rows: Iterable[Sequence[object]]) -> bytes:
-    """The rows, UTF-8; text that a spreadsheet would take for a formula begins with an apostrophe, None is an empty cell."""
+    """The rows, UTF-8; text that a spreadsheet would take for a formula begins with an apostrophe, None is an empty cell.
+
+    True and false are written in small letters.
+    """
     text = io.StringIO()
     writer = csv.writer(text)
     for row in rows:
-        writer.writerow([f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell for cell in row])
+        writer.writerow([_cell(each) for each in row])
     return text.getvalue().encode()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

@@ -8,9 +8,10 @@ from fastapi.responses import StreamingResponse
 
 from server.comparison.endpoints import ExperimentIds, GridSteps, Margin, Metric
 from server.data_export.files import OutgoingFile
+from server.data_export.parquet import MEDIA_TYPE
 from server.data_export.service import DataExportService, DataFormat, TableFormat
 from server.http.conditional import NOT_MODIFIED, KeptDep
-from server.http.problems import NOT_FOUND, Responses
+from server.http.problems import NOT_FOUND, NOT_INSTALLED, Responses
 from server.security.permissions import view
 from server.services import Services, ServicesDep
 
@@ -21,6 +22,7 @@ _FILES: Responses = {
         "content": {
             "text/csv": {"schema": {"type": "string"}},
             "application/json": {"schema": {"type": "object"}},
+            MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
             "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
             "application/zip": {"schema": {"type": "string", "format": "binary"}},
         }
@@ -32,7 +34,8 @@ WantedFormat = Annotated[
     Query(
         alias="format",
         description="csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, "
-        "which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. "
+        "which is empty where it was not finite. parquet: the same rows, with types and units in "
+        "the schema. json: configuration, seeds, final evaluations with their episodes. "
         "tensorboard: an event file, or a zip of one for each run.",
     ),
 ]
@@ -41,7 +44,7 @@ WantedFormat = Annotated[
 @router.get(
     "/api/runs/{run_id}/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | NOT_INSTALLED | _FILES,
     dependencies=[view("run_id")],
 )
 async def export_run(run_id: str, services: ServicesDep, kept: KeptDep, wanted: WantedFormat = "csv") -> StreamingResponse:
@@ -55,7 +58,7 @@ async def export_run(run_id: str, services: ServicesDep, kept: KeptDep, wanted: 
 @router.get(
     "/api/experiments/{experiment_id}/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | NOT_INSTALLED | _FILES,
     dependencies=[view("experiment_id")],
 )
 async def export_experiment(
@@ -71,7 +74,7 @@ async def export_experiment(
 @router.get(
     "/api/compare/export",
     response_class=StreamingResponse,
-    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
+    responses=NOT_FOUND | NOT_MODIFIED | NOT_INSTALLED | _FILES,
     dependencies=[view("experiment")],
 )
 async def export_comparison(
@@ -80,7 +83,10 @@ async def export_comparison(
     kept: KeptDep,
     wanted: Annotated[
         TableFormat,
-        Query(alias="format", description="csv: a zip of figures.csv, curves.csv and seeds.csv. json: all of it in one."),
+        Query(
+            alias="format",
+            description="csv, parquet: a zip of the tables figures, curves and seeds. json: all of it in one.",
+        ),
     ] = "csv",
     margin: Margin = 0.02,
     name: Metric = "eval/success_rate",

@@ -7,10 +7,11 @@ from sqlalchemy.orm import Session
 
 from server.audit.repository import AuditRepository
 from server.comparison.service import ComparisonService
-from server.data_export.comparison import figure_rows, mean_rows, seed_rows
+from server.data_export.comparison import tables_of
 from server.data_export.document import document, exported
 from server.data_export.event_file import event_file
 from server.data_export.files import OutgoingFile
+from server.data_export.parquet import MEDIA_TYPE, about, parquet, point_blocks, point_columns, require_parquet
 from server.data_export.schemas import ExportedComparison, ExportedExperiment
 from server.data_export.series import read_run, said_of, with_edges
 from server.data_export.table import HEADING, WIDE_HEADING, point_rows
@@ -22,8 +23,8 @@ from server.file_names import slug
 from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 
-TableFormat = Literal["csv", "json"]
-DataFormat = Literal["csv", "json", "tensorboard"]
+TableFormat = Literal["csv", "parquet", "json"]
+DataFormat = Literal["csv", "parquet", "json", "tensorboard"]
 
 
 class DataExportService:
@@ -84,7 +85,9 @@ class DataExportService:
 
         Raises:
             NotFoundError: there is no such run.
+            MissingExtraError: what writes the format is not installed.
         """
+        _require(data_format)
         with self._database.write() as session:
             run = RunRepository(session).get(run_id)
             _note(session, run.experiment, data_format, target=run.id)
@@ -100,7 +103,9 @@ class DataExportService:
 
         Raises:
             NotFoundError: there is no such experiment.
+            MissingExtraError: what writes the format is not installed.
         """
+        _require(data_format)
         with self._database.write() as session:
             found = ExperimentRepository(session).get(experiment_id)
             _note(session, found, data_format)
@@ -118,11 +123,13 @@ class DataExportService:
     def comparison(
         self, experiment_ids: Sequence[str], margin: float, name: str, points: int, data_format: TableFormat
     ) -> OutgoingFile:
-        """Figures and one metric's curves, as `ComparisonService` has them; as CSV, three tables in a zip.
+        """Figures and one metric's curves, as `ComparisonService` has them; as CSV or Parquet, three tables in a zip.
 
         Raises:
             NotFoundError: one of the experiments is missing.
+            MissingExtraError: what writes the format is not installed.
         """
+        _require(data_format)
         service = ComparisonService(self._services)
         compared, curves = service.compare(experiment_ids, margin), service.curves(experiment_ids, name, points)
         with self._database.write() as session:
@@ -131,26 +138,47 @@ class DataExportService:
         if data_format == "json":
             whole = ExportedComparison(comparison=compared, curves=curves).model_dump_json().encode()
             return OutgoingFile("mapless-comparison.json", "application/json", iter([whole]))
-        files = {"figures.csv": [figure_rows(compared)], "curves.csv": mean_rows(curves), "seeds.csv": seed_rows(curves)}
-        return OutgoingFile("mapless-comparison.zip", "application/zip", zipped(files.items()))
+        tables_there = tables_of(compared, curves)
+        files = ((f"{one.name}.{data_format}", one.csv() if data_format == "csv" else one.parquet()) for one in tables_there)
+        return OutgoingFile("mapless-comparison.zip", "application/zip", zipped(files))
 
     def _file(
         self, stem: str, experiment: ExportedExperiment, runs: dict[str, int], data_format: TableFormat
     ) -> OutgoingFile:
         if data_format == "json":
             return OutgoingFile(f"{stem}.json", "application/json", document(self._database, experiment, list(runs)))
+        if data_format == "parquet":
+            return OutgoingFile(f"{stem}.parquet", MEDIA_TYPE, self._parquet(experiment, runs))
         return OutgoingFile(f"{stem}.csv", "text/csv; charset=utf-8", self._table(runs))
 
     def _events(self, run_id: str, began: float) -> Iterator[bytes]:
         series = read_run(self._database, run_id)
         return event_file(began, with_edges(series), said_of(series))
 
-    def _table(self, runs: dict[str, int]) -> Iterator[bytes]:
+    def _parquet(self, experiment: ExportedExperiment, runs: dict[str, int]) -> Iterator[bytes]:
+        wide = self._any_thinned(runs)
+        blocks = (
+            block
+            for run_id, seed in runs.items()
+            for block in point_blocks(run_id, seed, read_run(self._database, run_id), wide=wide)
+        )
+        told = about("points", experiment=experiment.id, name=experiment.name, project=experiment.project_id)
+        return parquet(point_columns(wide=wide), blocks, told)
+
+    def _any_thinned(self, runs: dict[str, int]) -> bool:
         with self._database.read() as session:
-            wide = RunRepository(session).any_thinned(list(runs))
+            return RunRepository(session).any_thinned(list(runs))
+
+    def _table(self, runs: dict[str, int]) -> Iterator[bytes]:
+        wide = self._any_thinned(runs)
         yield WIDE_HEADING if wide else HEADING
         for run_id, seed in runs.items():
             yield from point_rows(run_id, seed, read_run(self._database, run_id), wide=wide)
+
+
+def _require(data_format: DataFormat) -> None:
+    if data_format == "parquet":
+        require_parquet()
 
 
 def _note(session: Session, experiment: tables.Experiment, details: str, target: str | None = None) -> None:

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from server.data_export.columns import BUCKETS, POINTS, heading
 from server.data_export.series import RunSeries, ThinnedMeanwhileError, stood_for
 from server.spreadsheets import csv_rows
 
-_COLUMNS = ("run", "seed", "metric", "step", "wall_time", "value")
-HEADING = csv_rows([_COLUMNS])
-WIDE_HEADING = csv_rows([(*_COLUMNS, "points", "min", "max")])
+HEADING = csv_rows([heading(POINTS)])
+WIDE_HEADING = csv_rows([heading((*POINTS, *BUCKETS))])
 """Of a file with curves that were thinned: how many points a row stands for, their smallest and their largest value."""
 
 

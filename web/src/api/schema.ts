@@ -14834,8 +14834,8 @@ export interface operations {
             query: {
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
-                /** @description csv: a zip of figures.csv, curves.csv and seeds.csv. json: all of it in one. */
-                format?: "csv" | "json";
+                /** @description csv, parquet: a zip of the tables figures, curves and seeds. json: all of it in one. */
+                format?: "csv" | "parquet" | "json";
                 /** @description Success rates that differ by less are equivalent, 0 to 1. */
                 margin?: number;
                 /** @description Of the metric. */
@@ -14860,6 +14860,7 @@ export interface operations {
                 content: {
                     "application/json": Record<string, never>;
                     "application/octet-stream": string;
+                    "application/vnd.apache.parquet": string;
                     "application/zip": string;
                     "text/csv": string;
                 };
@@ -14896,6 +14897,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Needs a part that is not installed */
+            501: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -16141,8 +16151,8 @@ export interface operations {
     export_experiment_api_experiments__experiment_id__export_get: {
         parameters: {
             query?: {
-                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
-                format?: "csv" | "json" | "tensorboard";
+                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. parquet: the same rows, with types and units in the schema. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
+                format?: "csv" | "parquet" | "json" | "tensorboard";
             };
             header?: {
                 /** @description Tags of answers that one has. */
@@ -16163,6 +16173,7 @@ export interface operations {
                 content: {
                     "application/json": Record<string, never>;
                     "application/octet-stream": string;
+                    "application/vnd.apache.parquet": string;
                     "application/zip": string;
                     "text/csv": string;
                 };
@@ -16199,6 +16210,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Needs a part that is not installed */
+            501: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };
@@ -19802,8 +19822,8 @@ export interface operations {
     export_run_api_runs__run_id__export_get: {
         parameters: {
             query?: {
-                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
-                format?: "csv" | "json" | "tensorboard";
+                /** @description csv: every point in a row, run, seed, metric, step, wall_time (seconds since the epoch) and value, which is empty where it was not finite. parquet: the same rows, with types and units in the schema. json: configuration, seeds, final evaluations with their episodes. tensorboard: an event file, or a zip of one for each run. */
+                format?: "csv" | "parquet" | "json" | "tensorboard";
             };
             header?: {
                 /** @description Tags of answers that one has. */
@@ -19824,6 +19844,7 @@ export interface operations {
                 content: {
                     "application/json": Record<string, never>;
                     "application/octet-stream": string;
+                    "application/vnd.apache.parquet": string;
                     "application/zip": string;
                     "text/csv": string;
                 };
@@ -19860,6 +19881,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Needs a part that is not installed */
+            501: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };

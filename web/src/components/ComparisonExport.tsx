@@ -48,6 +48,7 @@ export function TableExport({ table, title, query }: TableExportProps) {
 
 const DATA = [
   { format: 'csv', label: 'Figures and curves, CSV' },
+  { format: 'parquet', label: 'Figures and curves, Parquet' },
   { format: 'json', label: 'Figures and curves, JSON' },
 ]
 

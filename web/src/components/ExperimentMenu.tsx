@@ -120,6 +120,7 @@ function OpenedMenu({ experiment, runId, onDeleted }: ExperimentMenuProps) {
 
 const FORMATS = [
   { format: 'csv', label: 'Curves, CSV' },
+  { format: 'parquet', label: 'Curves, Parquet' },
   { format: 'tensorboard', label: 'Curves, TensorBoard' },
   { format: 'json', label: 'Settings and episodes, JSON' },
 ]
