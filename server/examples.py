@@ -34,6 +34,7 @@ BODIES: dict[str, Any] = {
     "POST /api/projects": {"name": "Corridors"},
     "PATCH /api/projects/{project_id}": {"name": "Corridors, second attempt"},
     "PUT /api/runs/{run_id}/priority": {"priority": 10},
+    "PUT /api/runs/{run_id}/place": {"beside": "1c2q3w4e5r6t", "side": "before"},
     "POST /api/workers/remove": {"worker": "gpu-1@lab"},
     "POST /api/experiments": {
         "name": "Maze, longer sight",

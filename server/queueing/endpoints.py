@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, status
 
 from server.http.paging import PartDep, WindowDep
 from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
-from server.queueing.schemas import Priority, QueuePage, WorkerName, Workers
+from server.queueing.schemas import Priority, QueuePage, QueuePlace, WorkerName, Workers
 from server.queueing.service import QueueService
 from server.security.permissions import ADMINISTRATE, SIGNED_IN, edit
 from server.security.principal import PrincipalDep
@@ -37,6 +37,17 @@ def list_queue(service: QueueServiceDep, window: WindowDep, principal: Principal
 def set_priority(run_id: str, body: Priority, service: QueueServiceDep, principal: PrincipalDep) -> None:
     """Say how urgent a run is that waits."""
     service.prioritise(run_id, body.priority, principal)
+
+
+@router.put(
+    "/api/runs/{run_id}/place",
+    status_code=status.HTTP_204_NO_CONTENT,
+    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    dependencies=[edit("run_id")],
+)
+def put_beside(run_id: str, body: QueuePlace, service: QueueServiceDep, principal: PrincipalDep) -> None:
+    """Let a run have its turn right before or after another one, by its priority, and by others' where it must."""
+    service.place(run_id, body, principal)
 
 
 @router.post(

@@ -56,6 +56,13 @@ class Priority(Schema):
     priority: int = Field(ge=-MAX_PRIORITY, le=MAX_PRIORITY)
 
 
+class QueuePlace(Schema):
+    """Where in the queue a run is to stand."""
+
+    beside: str = Field(min_length=1, max_length=16, description="Id of another run that waits.")
+    side: Literal["before", "after"] = Field(description="Whether it has its turn right before that one, or right after it.")
+
+
 class WorkersRun(Schema):
     """What a worker trains."""
 

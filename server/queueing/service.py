@@ -16,11 +16,13 @@ from server.http.paging import Window
 from server.jobs.repository import JobRepository
 from server.queueing.activity import strip
 from server.queueing.forecast import Place, Turn, forecast
+from server.queueing.placing import Standing, placed
 from server.queueing.repository import QueueRepository
 from server.queueing.schemas import (
     EDITORS_PRIORITY,
     MAX_PRIORITY,
     QueuePage,
+    QueuePlace,
     WaitingRun,
     WaitsFor,
     Worker,
@@ -108,6 +110,41 @@ class QueueService:
             run = _queued(session, run_id)
             self._give(session, run, priority, principal)
         self._tell(run)
+
+    def place(self, run_id: str, place: QueuePlace, principal: Principal) -> None:
+        """Bring a run to the place before or after another one, by priorities.
+
+        Raises:
+            NotFoundError: there is no such run, or the other one may not be seen.
+            ConflictError: one of them does not wait.
+            ForbiddenError: priorities of others would have to change that one may not change.
+        """
+        with self._services.database.write() as session:
+            run = _queued(session, run_id)
+            other = RunRepository(session).get(place.beside)
+            if not _may_see(other, principal.visible):
+                raise NotFoundError.of("run", place.beside)
+            waiting = {each.id: each for each in RunRepository(session).queued()}
+            if other.id not in waiting or other.id == run.id:
+                raise ConflictError("The other run does not wait any more: look at the queue again.")
+            order = [Standing(each.id, each.priority) for each in self._shares(session).in_turn(waiting.values())]
+            at = [each.run_id for each in order if each.run_id != run.id].index(other.id) + (place.side == "after")
+
+            def allowed(one: str, priority: int) -> bool:
+                most = MAX_PRIORITY if principal.administrates else EDITORS_PRIORITY
+                mine = principal.has("editor", waiting[one].experiment.project_id)
+                return mine and -MAX_PRIORITY <= priority <= max(most, waiting[one].priority)
+
+            given = placed(order, run.id, at, allowed)
+            if given is None:
+                raise ForbiddenError(
+                    "To stand there, priorities would have to change that you may not change: give it a number instead."
+                )
+            moved = [waiting[each] for each in given]
+            for each in moved:
+                self._give(session, each, given[each.id], principal)
+        for each in moved:
+            self._tell(each)
 
     def to_front(self, run_id: str, principal: Principal) -> None:
         """Give a run the next turn.

@@ -171,6 +171,7 @@ TABLE = {
         POST /api/evaluations/{evaluation_id}/cancel
         DELETE /api/evaluations/{evaluation_id}
         DELETE /api/uploads/{upload_id}
+        PUT /api/runs/{run_id}/place
         PUT /api/runs/{run_id}/priority
         POST /api/runs/{run_id}/front
         DELETE /api/reproduction/{campaign_id}

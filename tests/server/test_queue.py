@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from server.database import tables
 from server.queueing.activity import BLOCK_SECONDS, BLOCKS, strip, with_work
 from server.queueing.forecast import Place, Turn, forecast
+from server.queueing.placing import Standing, placed
 from server.runs.repository import RunRepository
 from server.services import Services
 from server.system.repository import WorkerRepository
@@ -137,6 +138,59 @@ def test_moving_to_the_front_overtakes_all_and_no_more(client: TestClient, repor
         assert client.post(f"/api/runs/{third}/front").status_code == 204
         items = client.get("/api/queue").json()["items"]
         assert [(item["id"], item["priority"]) for item in items] == [(third, 8), (second, 7), (first, 0)]
+
+
+def order(client: TestClient) -> list[str]:
+    return [item["id"] for item in client.get("/api/queue").json()["items"]]
+
+
+@pytest.mark.parametrize("side", ["before", "after"])
+@pytest.mark.parametrize("priorities", [(0, 0, 0, 0), (9, 5, 5, 1), (3, 2, 1, 0), (100, 100, 100, 100)])
+def test_a_run_is_put_right_beside_another(
+    client: TestClient, reports: Reports, priorities: tuple[int, ...], side: str
+) -> None:
+    runs = [reports.experiment(f"Number {number}")["runs"][0]["id"] for number in range(4)]
+    for run_id, priority in zip(runs, priorities, strict=True):
+        client.put(f"/api/runs/{run_id}/priority", json={"priority": priority})
+    for moved in runs:
+        for beside in runs:
+            if moved == beside:
+                continue
+            expected = [each for each in order(client) if each != moved]
+            expected.insert(expected.index(beside) + (side == "after"), moved)
+            place = {"beside": beside, "side": side}
+            assert client.put(f"/api/runs/{moved}/place", json=place).status_code == 204
+            assert order(client) == expected
+
+
+def test_where_there_is_room_between_two_nobody_else_is_moved() -> None:
+    queue = [Standing("a", 9), Standing("b", 5), Standing("c", 5), Standing("d", 1)]
+    anything = lambda *_: True  # noqa: E731
+
+    assert placed(queue, "d", 1, anything) == {"d": 6}
+    assert placed(queue, "a", 2, anything) == {"a": 2}
+    assert placed(queue, "b", 1, anything) == {}
+    assert placed(queue, "d", 0, anything) == {"d": 10}
+    assert placed(queue, "a", 3, anything) == {"a": 0}
+    # Between two of one priority those above rise, or those below fall: whichever are fewer.
+    assert placed(queue, "d", 2, anything) == {"d": 6, "b": 7}
+
+
+def test_who_may_not_move_those_on_one_side_moves_the_others_or_is_refused() -> None:
+    queue = [Standing("a", 0), Standing("b", 0), Standing("c", 0), Standing("mine", 0)]
+
+    assert placed(queue, "mine", 1, lambda *_: True) == {"mine": 1, "a": 2}
+    assert placed(queue, "mine", 1, lambda run_id, _: run_id != "a") == {"mine": -1, "b": -2, "c": -2}
+    assert placed(queue, "mine", 1, lambda run_id, _: run_id == "mine") is None
+
+
+def test_a_place_beside_what_does_not_wait_is_refused(client: TestClient, reports: Reports) -> None:
+    run, other = (reports.experiment(name)["runs"][0] for name in ("one", "other"))
+    reports.state(other, "running")
+    path = f"/api/runs/{run['id']}/place"
+
+    for beside, status in ((other["id"], 409), (run["id"], 409), ("nobody", 404)):
+        assert client.put(path, json={"beside": beside, "side": "before"}).status_code == status
 
 
 def test_only_what_waits_has_a_turn(client: TestClient, reports: Reports) -> None:

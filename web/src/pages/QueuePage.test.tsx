@@ -107,6 +107,24 @@ test('a priority is sent by Enter, and the front is one press away', async () =>
   expect(screen.getByRole('button', { name: 'Corridor, seed 3: to the front' })).toBeDisabled()
 })
 
+test('Alt and the arrow keys put a run before or after its neighbour', async () => {
+  const server = startServer({ ...routes, 'PUT /api/runs/r2/place': done, 'PUT /api/runs/r1/place': done })
+  const { user } = open('/queue')
+  const handle = (seed: number) =>
+    screen.getByRole('button', { name: new RegExp(`seed ${seed}: move in the queue`) })
+  await screen.findAllByTestId('waiting-run')
+  handle(4).focus()
+  await user.keyboard('{ArrowUp}{Alt>}{ArrowDown}{ArrowUp}{/Alt}')
+  handle(3).focus()
+  await user.keyboard('{Alt>}{ArrowDown}{/Alt}')
+  await waitFor(() =>
+    expect(server.changes).toEqual([
+      { route: 'PUT /api/runs/r2/place', body: { beside: 'r1', side: 'before' } },
+      { route: 'PUT /api/runs/r1/place', body: { beside: 'r2', side: 'after' } },
+    ]),
+  )
+})
+
 test('a refused priority is said, and taken back', async () => {
   const said = 'Priorities above 100 take an administrator of the installation.'
   startServer({ ...routes, 'PUT /api/runs/r2/priority': refusal(403, said) })

@@ -14,6 +14,8 @@ import { Panel } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { age, count, duration, plural, words } from '../lib/format'
 import { useNow } from '../lib/hooks'
+import { useDrag } from './drag'
+import { Handle } from './Handle'
 import classes from './queue.module.css'
 
 const SIZE = 50
@@ -28,7 +30,12 @@ export function Waiting() {
     { refetchInterval: REFRESH_MS, placeholderData: (before) => before },
   )
   const mayOrder = useAccount().data?.may_launch ?? false
-  const { total = 0, hidden = 0 } = queue.data ?? {}
+  const { total = 0, hidden = 0, items = [] } = queue.data ?? {}
+  const place = $api.useMutation('put', '/api/runs/{run_id}/place', useChange()('move it'))
+  const drag = useDrag(
+    items.map(({ id }) => id),
+    (run_id, body) => place.mutate({ params: { path: { run_id } }, body }),
+  )
   return (
     <Panel
       title="Waiting"
@@ -50,7 +57,7 @@ export function Waiting() {
         empty="Nothing waits: what is launched now begins as soon as a worker is free."
       >
         {queue.data?.items.map((run) => (
-          <WaitingRow key={run.id} run={run} mayOrder={mayOrder} />
+          <WaitingRow key={run.id} run={run} mayOrder={mayOrder} drag={drag} />
         ))}
       </Rows>
       <Pager page={page} size={SIZE} total={total} label="Pages of the queue" onChange={setPage} />
@@ -58,15 +65,26 @@ export function Waiting() {
   )
 }
 
-function WaitingRow({ run, mayOrder }: { run: WaitingRun; mayOrder: boolean }) {
+interface WaitingRowProps {
+  run: WaitingRun
+  mayOrder: boolean
+  drag: ReturnType<typeof useDrag>
+}
+
+function WaitingRow({ run, mayOrder, drag }: WaitingRowProps) {
   const now = useNow()
   const change = useChange()
   const path = { params: { path: { run_id: run.id } } }
   const front = $api.useMutation('post', '/api/runs/{run_id}/front', change('move it to the front'))
   const name = `${run.experiment_name}, seed ${run.seed}`
   return (
-    <Table.Tr data-testid="waiting-run">
-      <Table.Td className={ui.number}>{count(run.position)}</Table.Td>
+    <Table.Tr data-testid="waiting-run" className={classes.waiting} {...drag.rowOf(run.id)}>
+      <Table.Td className={ui.number}>
+        <span className={classes.turn}>
+          {mayOrder && <Handle name={name} drag={drag.handleOf(run.id)} />}
+          {count(run.position)}
+        </span>
+      </Table.Td>
       <Table.Td>
         <Anchor component={Link} to={`/runs/${run.id}`} size="sm">
           {name}
