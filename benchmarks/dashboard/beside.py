@@ -2,13 +2,17 @@
 
     python -m benchmarks.dashboard.beside --runs 50 --points 2000
     python -m benchmarks.dashboard.beside --trackio ~/trackio/bin/python  # where `pip install trackio==0.43.0` has put it
+    python -m benchmarks.dashboard.beside --points 100000 --patience 3600 --data-dir /data/lab --only ours tensorboard
 
-TensorBoard is among the development packages; Trackio has an environment of its own. Each gets the same runs of 20 series.
-Of ours and TensorBoard one run's charts are opened, of all three all runs over one another: drawn is when a person sees the
-first curve. Every page is opened once before it is measured.
+TensorBoard is among the development packages, and is looked at as it samples by itself and with every point; Trackio has an
+environment of its own. Each gets the same runs of 20 series. Of ours and TensorBoard one run's charts are opened, of all
+three all runs over one another: drawn is when a person sees the first curve. Every page is opened once before that.
+What is not there within the patience, or ends its server, is a row that says so. With `--data-dir` the data stays, and is
+taken from there the next time.
 """
 
 import argparse
+import json
 import math
 import os
 import socket
@@ -24,9 +28,10 @@ from typing import Any
 import httpx
 import numpy as np
 import psutil
+from playwright.sync_api import Error as PlaywrightError
 
-from benchmarks.dashboard.browser import Cost, Tabs, tabs
-from benchmarks.dashboard.data import SERIES, Lab, Sizes, make
+from benchmarks.dashboard.browser import PATIENCE_SECONDS, Cost, Tabs, tabs
+from benchmarks.dashboard.data import SERIES, Sizes, make
 from benchmarks.dashboard.server import Server, serving
 from benchmarks.report import finish, parser
 from server.data_export.event_file import event_file
@@ -40,7 +45,9 @@ _CURVES = "document.querySelectorAll('[data-testid=chart] canvas').length"
 _CARD = "document.querySelector('scalar-card') && !document.querySelector('scalar-card mat-spinner') && (LINES)"
 _LINES = "[...document.querySelectorAll('scalar-card line-chart')].some((one) => one.querySelector('canvas, path'))"
 _PLOT = "document.querySelector('canvas')"
-_PATIENCE_SECONDS = 120.0
+# As many trainings as our page compares.
+_MOST_COMPARED = 50
+_CONTENDERS = ("ours", "tensorboard", "tensorboard, all points", "trackio")
 # A server that takes less than so much processor time in so long has nothing left to read.
 _REST_MS = 100.0
 _REST_SECONDS = 4.0
@@ -71,31 +78,60 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = _options(arguments)
     figures: dict[str, object] = {"runs": options.runs, "points": options.points, "series": len(SERIES)}
     with tempfile.TemporaryDirectory(prefix="mapless-beside-") as scratch:
-        folder = Path(scratch)
-        sizes = Sizes(
-            experiments=0, long_experiments=options.runs // _SEEDS, long_points=options.points, checkpoints=1, live=0
-        )
-        lab = make(folder / "ours", sizes)
-        run_ids = _export(folder, lab)
-        print(f"{'':<34}{'server ms':>10}{'drawn ms':>10}{'longest ms':>11}{'tab MB':>8}{'kB':>8}{'server MB':>10}")
-        with serving(folder / "ours") as server, tabs(server) as opened:
-            figures |= _look("ours", server, opened, _ours(lab, run_ids))
-        for name, samples in (("tensorboard", 1_000), ("tensorboard, all points", 0)):
-            command = [sys.executable, "-m", "tensorboard.main", "--logdir", str(folder / "events")]
-            command += ["--samples_per_plugin", f"scalars={samples}"]
-            with _serving([*command, "--port"]) as server, tabs(server) as opened:
-                figures |= _look(name, server, opened, _tensorboard(run_ids))
-        if options.trackio is not None:
-            environment = {**os.environ, "TRACKIO_DIR": str(folder / "trackio"), "HF_HUB_OFFLINE": "1"}
-            fill = [str(options.trackio), "-c", _FILL_TRACKIO, str(folder / "points")]
-            subprocess.run(fill, env=environment, check=True)
-            show = [str(options.trackio), "-c", _SHOW_TRACKIO]
-            with _serving(show, environment) as server, tabs(server) as opened:
-                figures |= _look("trackio", server, opened, {"all runs": ("/?project=lab", _PLOT)})
+        folder = options.data_dir or Path(scratch)
+        run_ids, experiments = _made(folder, options.runs, options.points)
+        print(f"{'':<38}{'server ms':>10}{'drawn ms':>10}{'longest ms':>11}{'tab MB':>8}{'kB':>8}{'server MB':>10}")
+        for name in options.only:
+            figures |= _contender(name, folder, run_ids, experiments, options)
     finish("dashboard beside others", figures, check=options.check)
 
 
-def _export(folder: Path, lab: Lab) -> list[str]:
+def _contender(
+    name: str, folder: Path, run_ids: Sequence[str], experiments: Sequence[str], options: argparse.Namespace
+) -> dict[str, object]:
+    """What one of them costs."""
+    patience: float = options.patience
+    if name == "ours":
+        with serving(folder / "ours") as server, tabs(server, patience) as opened:
+            return _look(name, server, opened, _ours(experiments, run_ids))
+    if name != "trackio":
+        samples = 0 if name.endswith("all points") else 1_000
+        command = [sys.executable, "-m", "tensorboard.main", "--logdir", str(folder / "events")]
+        command += ["--samples_per_plugin", f"scalars={samples}"]
+        with _serving([*command, "--port"], patience) as server, tabs(server, patience) as opened:
+            return _look(name, server, opened, _tensorboard(run_ids))
+    if options.trackio is None:
+        return {}
+    environment = {**os.environ, "TRACKIO_DIR": str(folder / "trackio"), "HF_HUB_OFFLINE": "1"}
+    if not (folder / "trackio").exists():
+        fill = [str(options.trackio), "-c", _FILL_TRACKIO, str(folder / "points")]
+        subprocess.run(fill, env=environment, check=True)
+    show = [str(options.trackio), "-c", _SHOW_TRACKIO]
+    with _serving(show, patience, environment) as server, tabs(server, patience) as opened:
+        return _look(name, server, opened, {"all runs": ("/?project=lab", _PLOT)})
+
+
+def _made(folder: Path, runs: int, points: int) -> tuple[list[str], list[str]]:
+    """The ids of the runs and of their trainings, which are made where they are not there.
+
+    Raises:
+        SystemExit: others are there.
+    """
+    marker, wanted = folder / "made.json", {"runs": runs, "points": points}
+    if not marker.exists():
+        began = time.monotonic()
+        sizes = Sizes(experiments=0, long_experiments=runs // _SEEDS, long_points=points, checkpoints=1, live=0)
+        lab = make(folder / "ours", sizes)
+        made = {**wanted, "run_ids": _export(folder), "experiments": lab.long_experiments}
+        marker.write_text(json.dumps(made))
+        print(f"{lab.points:,} points made and exported in {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
+    told = json.loads(marker.read_text())
+    if {key: told[key] for key in wanted} != wanted:
+        sys.exit(f"{folder} holds {told['runs']} runs of {told['points']} points: name another folder.")
+    return told["run_ids"], told["experiments"]
+
+
+def _export(folder: Path) -> list[str]:
     """The runs as event files and as arrays; returns their names there, which are their ids."""
     database = Database(f"sqlite:///{folder / 'ours' / 'mapless.db'}")
     (folder / "points").mkdir()
@@ -115,11 +151,15 @@ def _export(folder: Path, lab: Lab) -> list[str]:
     return run_ids
 
 
-def _ours(lab: Lab, run_ids: Sequence[str]) -> dict[str, tuple[str, str]]:
-    compared = "&".join(f"experiment={each}" for each in lab.long_experiments)
+def _ours(experiments: Sequence[str], run_ids: Sequence[str]) -> dict[str, tuple[str, str]]:
+    shown = experiments[:_MOST_COMPARED]
+    compared = "&".join(f"experiment={each}" for each in shown)
     return {
         "one run": (f"/runs/{run_ids[0]}", f"{_CURVES} >= 2"),
-        "all runs": (f"/compare?{compared}", f"{_CURVES} >= 3"),
+        "all runs" if len(shown) == len(experiments) else f"{_SEEDS * len(shown)} runs": (
+            f"/compare?{compared}",
+            f"{_CURVES} >= 3",
+        ),
     }
 
 
@@ -131,23 +171,30 @@ def _tensorboard(run_ids: Sequence[str]) -> dict[str, tuple[str, str]]:
 def _look(name: str, server: Server, opened: Tabs, pages: dict[str, tuple[str, str]]) -> dict[str, object]:
     figures: dict[str, object] = {}
     for page, (path, ready) in pages.items():
-        # What a server and a browser do but once is nobody's cost of a look.
-        opened.visit(path, ready)
-        cost: Cost = opened.visit(path, ready)
         label = f"{name}: {page}"
+        try:
+            # What a server and a browser do but once is nobody's cost of a look.
+            opened.visit(path, ready)
+            cost: Cost = opened.visit(path, ready)
+            memory = server.memory_mb()
+        except (TimeoutError, psutil.Error, PlaywrightError) as error:
+            why = str(error).partition("\n")[0]
+            print(f"{label:<38}  {why}", flush=True)
+            figures[f"{label} failed"] = why
+            continue
         print(
-            f"{label:<34}{cost.server_ms:>10.0f}{cost.drawn_ms:>10.0f}{cost.longest_ms:>11.0f}{cost.tab_mb:>8.0f}"
-            f"{cost.kb:>8.0f}{server.memory_mb():>10.0f}",
+            f"{label:<38}{cost.server_ms:>10.0f}{cost.drawn_ms:>10.0f}{cost.longest_ms:>11.0f}{cost.tab_mb:>8.0f}"
+            f"{cost.kb:>8.0f}{memory:>10.0f}",
             flush=True,
         )
         figures |= {f"{label} server_ms": round(cost.server_ms), f"{label} drawn_ms": round(cost.drawn_ms)}
         figures |= {f"{label} longest_ms": round(cost.longest_ms), f"{label} tab_mb": round(cost.tab_mb)}
-        figures |= {f"{label} kb": round(cost.kb), f"{label} server_mb": round(server.memory_mb())}
+        figures |= {f"{label} kb": round(cost.kb), f"{label} server_mb": round(memory)}
     return figures
 
 
 @contextmanager
-def _serving(command: Sequence[str], environment: dict[str, str] | None = None) -> Iterator[Server]:
+def _serving(command: Sequence[str], patience: float, environment: dict[str, str] | None = None) -> Iterator[Server]:
     """Another tool's server on a free port, which is the last of its arguments; ended on leaving."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -155,7 +202,7 @@ def _serving(command: Sequence[str], environment: dict[str, str] | None = None) 
     process = subprocess.Popen([*command, str(port)], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         origin = f"http://127.0.0.1:{port}"
-        deadline = time.monotonic() + _PATIENCE_SECONDS
+        deadline = time.monotonic() + patience
         while True:
             try:
                 httpx.get(origin, timeout=5.0)
@@ -165,7 +212,9 @@ def _serving(command: Sequence[str], environment: dict[str, str] | None = None) 
                     raise
                 time.sleep(0.2)
         server = Server(origin, "", psutil.Process(process.pid))
-        _wait_for_rest(server)
+        began = time.monotonic()
+        _wait_for_rest(server, patience)
+        print(f"read what there is in {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
         yield server
     finally:
         process.terminate()
@@ -176,9 +225,9 @@ def _serving(command: Sequence[str], environment: dict[str, str] | None = None) 
             process.wait()
 
 
-def _wait_for_rest(server: Server) -> None:
+def _wait_for_rest(server: Server, patience: float) -> None:
     """Until a server has read what there is: what it shows before that is not all."""
-    deadline = time.monotonic() + _PATIENCE_SECONDS
+    deadline = time.monotonic() + patience
     before = -math.inf
     while (now := server.cpu_ms()) - before > _REST_MS and time.monotonic() < deadline:
         before = now
@@ -189,6 +238,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     options = parser(__doc__)
     options.add_argument("--runs", type=int, default=50, help="in experiments of five")
     options.add_argument("--points", type=int, default=2_000, help="of each of the 20 series of a run")
+    options.add_argument("--patience", type=float, default=PATIENCE_SECONDS, help="seconds to read all, and to draw a page")
+    options.add_argument("--data-dir", type=Path, help="where the data is made; it stays there")
+    options.add_argument("--only", nargs="+", choices=_CONTENDERS, default=list(_CONTENDERS), help="contenders")
     options.add_argument("--trackio", type=Path, help="a Python that has Trackio")
     return options.parse_args(arguments)
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 from benchmarks.dashboard.server import Server
 
 _FLAGS = ("--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update")
-_PATIENCE_MS = 120_000
+PATIENCE_SECONDS = 120.0
 # A page is at rest once it has asked nothing for so long; what shows runs that report never is, and is given up soon.
 _REST_SECONDS = 1.0
 _RESTLESS_SECONDS = 5.0
@@ -61,11 +61,18 @@ class Cost:
 
 
 class Tabs:
-    """A Chromium that is logged in to a server."""
+    """A Chromium that is logged in to a server.
 
-    def __init__(self, browser: Browser, server: Server) -> None:
+    Args:
+        browser: the Chromium.
+        server: whose pages it opens.
+        patience: seconds within which a page is drawn, or given up.
+    """
+
+    def __init__(self, browser: Browser, server: Server, patience: float = PATIENCE_SECONDS) -> None:
         self._browser = browser
         self._server = server
+        self._patience = patience
         self._cdp = browser.new_browser_cdp_session()
         context = browser.new_context()
         page = context.new_page()
@@ -108,14 +115,17 @@ class Tabs:
         finally:
             page.context.close()
 
-    @staticmethod
-    def drawn(page: Page) -> tuple[float, float]:
-        """When the page was drawn, and its longest task so far, milliseconds."""
+    def drawn(self, page: Page) -> tuple[float, float]:
+        """When the page was drawn, and its longest task so far, milliseconds.
+
+        Raises:
+            TimeoutError: it was given up.
+        """
         # Not Playwright's own waiting, which the pages' content security policy forbids.
-        deadline = time.monotonic() + _PATIENCE_MS / 1000
+        deadline = time.monotonic() + self._patience
         while not page.evaluate("window.__drawn"):
             if time.monotonic() > deadline:
-                raise TimeoutError(f"{page.url} was not drawn within {_PATIENCE_MS / 1000:g} s")
+                raise TimeoutError(f"{page.url} was not drawn within {self._patience:g} s")
             page.wait_for_timeout(20)
         return page.evaluate("window.__drawn"), page.evaluate("window.__longest")
 
@@ -162,8 +172,12 @@ class _Received:
 
 
 @contextmanager
-def tabs(server: Server) -> Iterator[Tabs]:
+def tabs(server: Server, patience: float = PATIENCE_SECONDS) -> Iterator[Tabs]:
     """Debian's Chromium, or any that is on the path, logged in.
+
+    Args:
+        server: whose pages it opens.
+        patience: seconds within which a page is drawn, or given up.
 
     Raises:
         RuntimeError: there is none.
@@ -173,7 +187,7 @@ def tabs(server: Server) -> Iterator[Tabs]:
         raise RuntimeError("no Chromium on the path: install it (Debian, Ubuntu: apt install chromium)")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=executable, args=list(_FLAGS))
-        yield Tabs(browser, server)
+        yield Tabs(browser, server, patience)
         browser.close()
 
 
