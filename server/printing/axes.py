@@ -81,5 +81,5 @@ def _factors(low: float, high: float) -> list[float]:
     inside = [(power, times) for power in powers for times in (1, 2, 5) if low <= times * 10.0**power <= high]
     tens = [10.0**power for power, times in inside if times == 1]
     if len(tens) < 2:
-        return [times * 10.0**power for power, times in inside] or [low, high]
+        return [times * 10.0**power for power, times in inside] if len(inside) > 1 else ticks(low, high)
     return tens[:: math.ceil(len(tens) / (_TICKS + 1))]

@@ -8,6 +8,7 @@ from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles
 from server.estimates import is_rate
 from server.printing.axes import ACROSS, Horizontal
+from server.printing.palette import STYLE, looks_of
 from server.printing.svg import Line, can_be_logarithmic, line_chart
 from server.printing.tables import PrintedTable, TableName, printed
 
@@ -74,7 +75,7 @@ class Report:
             [
                 '<!doctype html><html lang="en"><head><meta charset="utf-8">',
                 '<meta name="viewport" content="width=device-width, initial-scale=1">',
-                f"<title>Comparison: {escape(names)}</title><style>{_STYLE}</style></head><body>",
+                f"<title>Comparison: {escape(names)}</title><style>{_STYLE}{STYLE}</style></head><body>",
                 f"<h1>Comparison</h1><p>{escape(names)}</p>",
                 f'<p class="note">{escape(self.made)} <a href="{escape(self.link)}">{escape(self.link)}</a></p>',
                 *self._warnings(),
@@ -92,18 +93,20 @@ class Report:
         return [f"<h2>Before reading too much into this</h2><ul>{items}</ul>"]
 
     def _profile(self) -> str:
+        looks = looks_of(one.id for one in self.profiles.experiments)
         lines = [
-            Line(_label(one.name, one.seeds), color, one.mean, one.low, one.high)
-            for color, one in enumerate(self.profiles.experiments)
+            Line(_label(one.name, one.seeds), looks[one.id], one.mean, one.low, one.high)
+            for one in self.profiles.experiments
             if one.mean
         ]
         title = "Performance profile: share of attempts that score more"
         return _figure(title, line_chart(title, _SCORE, self.profiles.thresholds, lines, rate=True))
 
     def _curves(self, curves: Curves) -> str:
+        looks = looks_of(one.id for one in curves.experiments)
         lines = [
-            Line(_label(one.name, max(one.count, default=0)), color, one.mean, one.low, one.high)
-            for color, one in enumerate(curves.experiments)
+            Line(_label(one.name, max(one.count, default=0)), looks[one.id], one.mean, one.low, one.high)
+            for one in curves.experiments
         ]
         log_y = curves.name in self.look.log_y
         chart = line_chart(

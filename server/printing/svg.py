@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from html import escape
 
 from server.printing.axes import Horizontal, scale, ticks
+from server.printing.palette import Look
 
-_WIDTH, _HEIGHT = 560, 280
-_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 12, 12, 48
+_WIDTH, _HEIGHT = 570, 280
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 22, 12, 48
 # Pixels of a row of the legend.
 _ROW = 18
-# After Okabe and Ito (2008), as on the pages; after eight they repeat.
-COLORS = ("#0072b2", "#d55e00", "#00895e", "#b8568f", "#a06f00", "#3f9bd1", "#6a4fb3", "#767676")
+# Of a line in the legend: as long as shows its dashes.
+_SAMPLE = 28
 
 Values = Sequence[float | None]
 
@@ -21,7 +22,7 @@ class Line:
     """A curve: its mean, and the interval where it is known; None where there is no value."""
 
     label: str
-    color: int
+    look: Look
     mean: Values
     low: Values
     high: Values
@@ -98,7 +99,7 @@ def _text(left: float, top: float, anchor: str, text: str) -> str:
 
 
 def _line(x: Sequence[float], line: Line, across: Callable[[float], float], up: Callable[[float], float]) -> list[str]:
-    color = COLORS[line.color % len(COLORS)]
+    color = line.look.ink
 
     def points(values: Values) -> list[str]:
         return [f"{across(at):.1f},{up(value):.1f}" for at, value in zip(x, values, strict=True) if value is not None]
@@ -112,16 +113,17 @@ def _line(x: Sequence[float], line: Line, across: Callable[[float], float], up: 
         left, top = mean[0].split(",")
         parts.append(f'<circle cx="{left}" cy="{top}" r="3" fill="{color}"/>')
     else:
-        parts.append(f'<polyline points="{" ".join(mean)}" fill="none" stroke="{color}" stroke-width="2"/>')
+        parts.append(
+            f'<polyline points="{" ".join(mean)}" fill="none" stroke="{color}" stroke-width="2"{line.look.dashes(2)}/>'
+        )
     return parts
 
 
 def _entry(row: int, line: Line) -> str:
     top = _HEIGHT + _ROW * row
-    color = COLORS[line.color % len(COLORS)]
-    return f'<rect x="{_LEFT}" y="{top + 4}" width="14" height="3" fill="{color}"/>' + _text(
-        _LEFT + 20, top + 9, "start", line.label
-    )
+    ends = f'x1="{_LEFT}" x2="{_LEFT + _SAMPLE}" y1="{top + 5}" y2="{top + 5}"'
+    sample = f'<line {ends} stroke="{line.look.ink}" stroke-width="3"{line.look.dashes(2)}/>'
+    return sample + _text(_LEFT + _SAMPLE + 8, top + 9, "start", line.label)
 
 
 def _padded(low: float, high: float, *, log: bool = False) -> tuple[float, float]:

@@ -4,18 +4,29 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from fastapi.testclient import TestClient
 from playwright.sync_api import Browser, BrowserContext, expect
 
 from server.app import create_app
+from server.printing.palette import LIGHT, color_of, looks_of
 from server.settings import Settings
 from tests.browser.conftest import logged_in, running
 from tests.server.harness import BASE_URL, TOKEN, Reports
 from tests.server.test_comparison import measured
 
 pytestmark = pytest.mark.browser
+
+# Lighthouse calls a page's cumulative layout shift good below it.
+GOOD_SHIFT = 0.1
+SHIFTS = """
+window.__shift = 0
+new PerformanceObserver((list) => {
+  for (const each of list.getEntries()) if (!each.hadRecentInput) window.__shift += each.value
+}).observe({ type: 'layout-shift', buffered: true })
+"""
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +38,14 @@ def compared(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iter
         address = thread.submit(fill, directory).result()
     with running([sys.executable, "-m", "server"], directory, workers=1) as service, logged_in(browser, service) as context:
         yield context, address
+
+
+@pytest.fixture(autouse=True)
+def closed(compared: tuple[BrowserContext, str]) -> Iterator[None]:
+    """Every page is closed behind its test: six that listen for changes are as many connections as a browser opens."""
+    yield
+    for page in compared[0].pages:
+        page.close()
 
 
 def fill(directory: Path) -> str:
@@ -147,3 +166,81 @@ def test_charts_over_time_under_way_are_in_the_address(compared: tuple[BrowserCo
     page.reload()
     expect(axis).to_have_value("wall")
     expect(chart).to_have_attribute("data-step", "10800")
+
+
+def test_panels_are_chosen_by_keyboard_kept_in_the_address_and_drawn_when_one_comes_near(
+    compared: tuple[BrowserContext, str],
+) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    button, chosen = page.get_by_role("button", name="Panels"), page.get_by_role("list", name="Panels")
+    expect(page.get_by_role("figure", name="Success rate").first).to_be_visible()
+    button.focus()
+    page.keyboard.press("Enter")
+    expect(chosen.get_by_role("listitem")).to_have_count(4)
+    page.get_by_role("combobox", name="Add a panel").fill("loss")
+    page.get_by_role("option", name="loss/value").click()
+    expect(chosen.get_by_role("listitem")).to_have_count(5)
+    page.keyboard.press("Escape")
+    expect(chosen).to_have_count(0)
+    expect(button).to_be_focused()
+    page.wait_for_url("**panel=loss%2Fvalue")
+
+    # The fifth waits below: idle time does not draw it.
+    page.reload()
+    fifth = page.get_by_role("heading", name="Value loss")
+    expect(page.get_by_role("heading", name="Steps to the target")).to_be_attached()
+    page.wait_for_timeout(3_000)
+    expect(fifth).to_have_count(0)
+    page.get_by_role("heading", name="What differs in their settings").scroll_into_view_if_needed()
+    expect(fifth).to_be_visible()
+
+
+def test_controls_answer_before_the_charts_are_drawn(compared: tuple[BrowserContext, str]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    expect(page.get_by_role("figure", name="Success rate").first).to_be_visible()
+    log = page.get_by_role("checkbox", name="Log horizontal axis")
+    # In the very task of the click; and what is chosen a moment later loses nothing of it.
+    checked = log.evaluate("async (box) => { box.click(); await null; return box.checked }")
+    page.get_by_role("checkbox", name="Log axis of Success rate, evaluation").click()
+    assert checked
+    page.wait_for_url("**xlog=1&ylog=eval%2Fsuccess_rate")
+    expect(log).to_be_checked()
+
+
+def test_an_experiment_has_one_colour_everywhere(compared: tuple[BrowserContext, str]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.goto(address)
+    ids = parse_qs(urlsplit(address).query)["experiment"]
+    looks = looks_of(ids)
+    swatches = page.get_by_test_id("figures").locator("svg[data-color]")
+    expect(swatches).to_have_count(2)
+    assert [each.get_attribute("data-color") for each in swatches.all()] == [str(color_of(each)) for each in ids]
+    legend = page.get_by_role("figure", name="Success rate").first.locator("svg[data-color]")
+    assert [each.get_attribute("data-color") for each in legend.all()] == [str(color_of(each)) for each in ids]
+    page.get_by_role("button", name="Export the chart Performance profile").click()
+    with page.expect_download() as download:
+        page.get_by_role("menuitem", name="Picture (SVG)").click()
+    picture = download.value.path().read_text()
+    assert all(f'stroke="{LIGHT[look.color]}" stroke-width="2"{look.dashes(2)}' in picture for look in looks.values())
+    page.goto("/")
+    for name, each in zip(("Short sight", "Long_sight & 99%"), ids, strict=True):
+        row = page.get_by_role("row").filter(has_text=name)
+        expect(row.locator("svg[data-color]")).to_have_attribute("data-color", str(color_of(each)))
+
+
+@pytest.mark.parametrize("size", [(412, 823), (1280, 900), (1920, 1080)])
+def test_a_comparison_comes_where_it_stays(compared: tuple[BrowserContext, str], size: tuple[int, int]) -> None:
+    context, address = compared
+    page = context.new_page()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.add_init_script(SHIFTS)
+    page.goto(address)
+    expect(page.get_by_test_id("verdicts")).to_be_visible()
+    expect(page.get_by_role("figure", name="Performance profile")).to_be_attached()
+    page.wait_for_timeout(1_500)
+    assert page.evaluate("window.__shift") < GOOD_SHIFT

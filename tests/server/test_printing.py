@@ -2,6 +2,7 @@
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from fastapi.testclient import TestClient
 from httpx import Response
 
 from server.printing.axes import STEPS, elapsed, ticks
+from server.printing.palette import DARK, DASHES, LIGHT, Look, color_of, looks_of
 from server.printing.svg import Line, line_chart
 from server.printing.tables import PrintedTable
 from server.printing.text import comma_separated, latex, markdown
@@ -121,25 +123,25 @@ def test_the_report_is_one_file_without_a_script(
 
 def test_a_line_chart_in_numbers() -> None:
     """From 64 to 548 across, from 232 up to 12: a half is at 122."""
-    line = Line("one", 0, mean=[0.0, None, 0.5], low=[None, None, 0.25], high=[None, None, 1.0])
+    line = Line("one", Look(0), mean=[0.0, None, 0.5], low=[None, None, 0.25], high=[None, None, 1.0])
     chart = line_chart("t", STEPS, [0, 50, 100], [line], rate=True)
     assert '<polyline points="64.0,232.0 548.0,122.0"' in chart
     assert '<polygon points="548.0,12.0 548.0,177.0"' in chart
     assert all(f">{tick}</text>" in chart for tick in ("0%", "100%", "20", "100"))
-    alone = line_chart("t", STEPS, [5], [Line("one", 0, [2.0], [None], [None])], rate=False)
+    alone = line_chart("t", STEPS, [5], [Line("one", Look(0), [2.0], [None], [None])], rate=False)
     assert '<circle cx="306.0" cy="122.0" r="3"' in alone
     assert "No value yet" in line_chart("t", STEPS, [], [], rate=True)
 
 
 def test_logarithmic_axes_of_a_chart_in_numbers() -> None:
     """Across from 1 to 100: 10 is in the middle, at 306. Up from 1 / r to 100 r, r = 100 ** 0.05: 10 is halfway, at 122."""
-    line = Line("one", 0, mean=[1.0, 10.0, 100.0], low=[0.5, -3.0, 90.0], high=[2.0, 20.0, 110.0])
+    line = Line("one", Look(0), mean=[1.0, 10.0, 100.0], low=[0.5, -3.0, 90.0], high=[2.0, 20.0, 110.0])
     chart = line_chart("t", STEPS, [1, 10, 100], [line], rate=False, log_x=True, log_y=True)
     assert " 306.0,122.0 " in chart
     # Where the interval reaches below 0 it ends at the chart's edge.
     assert "306.0,232.0" in chart
     assert all(f">{tick}</text>" in chart for tick in ("1", "10", "100"))
-    zero = Line("one", 0, mean=[0.0, 1.0], low=[None] * 2, high=[None] * 2)
+    zero = Line("one", Look(0), mean=[0.0, 1.0], low=[None] * 2, high=[None] * 2)
     assert line_chart("t", STEPS, [1, 2], [zero], rate=False, log_y=True) == line_chart(
         "t", STEPS, [1, 2], [zero], rate=False
     )
@@ -150,7 +152,7 @@ def test_ticks_are_round_as_what_they_count() -> None:
     assert ticks(0.0, 7_200.0, (900.0, 1_800.0, 3_600.0)) == [0.0, 1_800.0, 3_600.0, 5_400.0, 7_200.0]
     assert ticks(300.0, 40_000.0, logarithmic=True) == [1_000.0, 10_000.0]
     assert ticks(2.0, 8.0, logarithmic=True) == [2.0, 5.0]
-    assert ticks(6.0, 8.0, logarithmic=True) == [6.0, 8.0]
+    assert ticks(6.0, 8.0, logarithmic=True) == ticks(6.0, 8.0)
     assert [elapsed(seconds) for seconds in (0.25, 45, 200, 7_500, 270_000)] == [
         *("0.25 s", "45 s", "3 min 20 s", "2 h 5 min", "3 d 3 h")
     ]
@@ -181,3 +183,32 @@ def test_what_cannot_be_printed(client: TestClient, reports: Reports) -> None:
         assert client.get(f"/api/compare/{path}").status_code == 422
         assert client.get(f"/api/compare/{path}", params={"experiment": "nobody"}).status_code == 404
         assert client.get(f"/api/compare/{path}", params={"experiment": one["id"], "base": "nobody"}).status_code == 400
+
+
+PALETTE = Path(__file__).parents[2] / "web/src/charts/palette.ts"
+
+
+def test_an_experiment_has_the_colour_that_the_pages_give_it() -> None:
+    light, dark = (
+        tuple(re.findall(r"#[0-9a-f]{6}", part)) for part in re.findall(r"= \[(.*?)\]", PALETTE.read_text(), re.DOTALL)[:2]
+    )
+    assert (light, dark) == (LIGHT, DARK)
+    # Worked by the pages' own test, too.
+    assert [color_of(each) for each in ("a", "k3v9x0m2p8q1", "")] == [4, 7, 1]
+
+
+def test_of_one_colour_the_second_is_dashed() -> None:
+    ids = [each for each in map(str, range(200)) if color_of(each) == color_of("0")][:6]
+    looks = looks_of([*ids, ids[0]])
+    assert [looks[each].dash for each in ids] == [0, 1, 2, 3, 0, 1]
+    assert {looks[each].color for each in ids} == {color_of("0")}
+    chart = line_chart("t", STEPS, [0, 1], [Line("two", looks[ids[1]], [0.0, 1.0], [None] * 2, [None] * 2)], rate=True)
+    dashes = " ".join(str(2 * length) for length in DASHES[1])
+    assert chart.count(f'stroke-dasharray="{dashes}"') == 2
+
+
+def test_a_report_has_a_curve_in_its_readers_scheme(client: TestClient, pair: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    report = printed(client, "report", *pair).text
+    place = color_of(pair[0]["id"])
+    assert f"var(--line-{place}, {LIGHT[place]})" in report
+    assert f"--line-{place}: {DARK[place]};" in report.split("prefers-color-scheme: dark")[1]

@@ -5,10 +5,11 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
 import { useNear } from '../lib/near'
-import { type Horizontal, roundTick, STEPS } from './axis'
+import { factors, fitted, type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
-import { lineColor } from './palette'
+import { dashes, lineColor } from './palette'
+import { Swatch } from './Swatch'
 import { aboveZero, allPositive, type ChartData, type Line, lastValue, valueAt } from './series'
 
 const HEIGHT = 220
@@ -33,6 +34,8 @@ interface ChartProps {
   logX?: boolean
   height?: number
   x?: Horizontal
+  /** Whether the legend has the last values while nobody points. */
+  readsLast?: boolean
   /** Where on x the cursor stands; null leaves it to whoever points. */
   at?: number | null
   /** A click's x. */
@@ -52,6 +55,7 @@ export function Chart({
   logX = false,
   height = HEIGHT,
   x = STEPS,
+  readsLast = true,
   at = null,
   onSeek,
 }: ChartProps) {
@@ -79,7 +83,7 @@ export function Chart({
 
   // A plot is made anew when its lines are others; new values of the same lines are only handed over.
   const structure = JSON.stringify([
-    drawn.lines.map((line) => [line.key, line.color, line.thin, !!line.band]),
+    drawn.lines.map((line) => [line.key, line.color, line.dash, line.thin, !!line.band]),
   ])
   const [low, high] = yRange ?? [undefined, undefined]
   const lines = useRef(drawn.lines)
@@ -95,14 +99,16 @@ export function Chart({
     const made = new uPlot(
       {
         // A strip among others says below what x is, where it reads its values.
-        ...appearance(dark, format, x, height >= STRIP),
-        ...seriesOf(lines.current, dark),
+        ...appearance({ dark, format, x, titled: height >= STRIP, logX, logarithmic }),
+        ...seriesOf(lines.current, dark, logarithmic),
         width: element.clientWidth,
         height,
         scales: {
-          x: { time: false, distr: logX ? LOGARITHMIC : LINEAR },
+          x: logX
+            ? { time: false, distr: LOGARITHMIC, range: (_, from, to) => [from, to] }
+            : { time: false, distr: LINEAR },
           y: logarithmic
-            ? { distr: LOGARITHMIC }
+            ? { distr: LOGARITHMIC, range: (_, least, most) => fitted(least ?? 1, most ?? 1) }
             : low !== undefined && high !== undefined
               ? { range: [low, high] }
               : { distr: LINEAR },
@@ -202,6 +208,8 @@ export function Chart({
     plot.current?.setData(newest.current)
   }
 
+  const written = (value: number | null) => (value === null ? '–' : format(value))
+  const atRest = ({ values }: Line) => (readsLast ? written(lastValue(values)) : '')
   const legend = useRef<HTMLDListElement>(null)
   const where = useRef<HTMLSpanElement>(null)
   readout.current = (index) => {
@@ -209,8 +217,7 @@ export function Chart({
     if (!cells) return
     labelled.forEach((line, at) => {
       const cell = cells[at]
-      const value = index === null ? lastValue(line.values) : valueAt(line.values, index)
-      if (cell) cell.textContent = value === null ? '–' : format(value)
+      if (cell) cell.textContent = index === null ? atRest(line) : written(valueAt(line.values, index))
     })
     const step = where.current
     if (step) step.textContent = index === null ? '' : `${x.title} ${x.format(all.x[index] ?? 0)}`
@@ -228,7 +235,6 @@ export function Chart({
       <div className={classes.below}>
         <dl ref={legend} className={classes.legend}>
           {labelled.map((line) => {
-            const value = lastValue(line.values)
             const off = hidden.includes(line.key)
             return (
               <div key={line.key} className={classes.entry}>
@@ -242,11 +248,11 @@ export function Chart({
                       setHidden(off ? hidden.filter((key) => key !== line.key) : [...hidden, line.key])
                     }
                   >
-                    <span className={classes.swatch} style={{ background: lineColor(line.color, dark) }} />
+                    <Swatch color={line.color} dash={line.dash} />
                     {line.label}
                   </button>
                 </dt>
-                <dd>{value === null ? '–' : format(value)}</dd>
+                <dd>{atRest(line)}</dd>
               </div>
             )
           })}
@@ -298,7 +304,11 @@ function toColumns({ x, lines }: ChartData): uPlot.AlignedData {
   return columns as uPlot.AlignedData
 }
 
-function seriesOf(lines: readonly Line[], dark: boolean): { series: uPlot.Series[]; bands: uPlot.Band[] } {
+function seriesOf(
+  lines: readonly Line[],
+  dark: boolean,
+  logarithmic: boolean,
+): { series: uPlot.Series[]; bands: uPlot.Band[] } {
   const series: uPlot.Series[] = [{}]
   const bands: uPlot.Band[] = []
   for (const line of lines) {
@@ -306,12 +316,20 @@ function seriesOf(lines: readonly Line[], dark: boolean): { series: uPlot.Series
     series.push({
       stroke: line.thin ? withAlpha(color, THIN_ALPHA) : color,
       width: line.thin ? 1 : 2,
+      dash: dashes(line.dash ?? 0, line.thin ? 1 : 2),
       spanGaps: true,
       // One point is no line: it is drawn as what it is.
       points: { show: (chart, index) => isAlone(chart.data[index]) },
     })
     if (line.band) {
-      const edge: uPlot.Series = { stroke: 'transparent', width: 0, spanGaps: true, points: { show: false } }
+      const edge: uPlot.Series = {
+        // An interval that reaches far below its mean would take most of a logarithmic axis.
+        auto: !logarithmic,
+        stroke: 'transparent',
+        width: 0,
+        spanGaps: true,
+        points: { show: false },
+      }
       bands.push({ series: [series.length, series.length + 1], fill: withAlpha(color, BAND_ALPHA) })
       series.push({ ...edge }, { ...edge })
     }
@@ -325,12 +343,30 @@ function withAlpha(hex: string, alpha: number): string {
     .padStart(2, '0')}`
 }
 
-function appearance(
-  dark: boolean,
-  format: (value: number) => string,
-  x: Horizontal,
-  titled: boolean,
-): Pick<uPlot.Options, 'axes' | 'padding'> {
+interface Appearance {
+  dark: boolean
+  format: (value: number) => string
+  x: Horizontal
+  /** Whether it says what x is. */
+  titled: boolean
+  logX: boolean
+  logarithmic: boolean
+}
+
+/** Of a logarithmic axis: round numbers from end to end, and every one written. */
+const BY_FACTORS: uPlot.Axis = {
+  splits: (_, __, from, to) => factors(from, to),
+  filter: (_, ticks) => ticks,
+}
+
+function appearance({
+  dark,
+  format,
+  x,
+  titled,
+  logX,
+  logarithmic,
+}: Appearance): Pick<uPlot.Options, 'axes' | 'padding'> {
   const ink = dark ? '#97a1a9' : '#5d6870'
   const grid = { stroke: dark ? '#252b31' : '#eceff0', width: 1 }
   // What is counted is short on the axis, and whole below it.
@@ -349,17 +385,17 @@ function appearance(
         labelSize: 16,
         labelGap: 0,
         grid: { show: false },
-        values: (_, ticks) => ticks.map((tick: number | null) => (tick === null ? '' : written(tick))),
+        values: (_, ticks) => ticks.map(written),
         space: 64,
+        ...(logX ? BY_FACTORS : {}),
       },
       {
         ...axis,
         size: 52,
         gap: 6,
         space: 34,
-        // A logarithmic axis hands over null for the ticks that it leaves blank.
-        values: (_, ticks) =>
-          ticks.map((tick: number | null) => (tick === null ? '' : roundTick(format(tick)))),
+        values: (_, ticks) => ticks.map((tick) => roundTick(format(tick))),
+        ...(logarithmic ? BY_FACTORS : {}),
       },
     ],
   }

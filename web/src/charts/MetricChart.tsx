@@ -26,6 +26,8 @@ interface MetricChartProps {
   height?: number
   /** Steps of the environment without it. */
   x?: Horizontal
+  /** Whether the legend has the last values while nobody points: not where a curve always ends at the same one. */
+  readsLast?: boolean
   /** A line below: what has to be known to read it. */
   foot?: string | null
   /** What stands in place of the curve while it has no point. */

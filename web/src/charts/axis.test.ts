@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { choices, factors, numbers, rounds } from './axis'
+import { choices, factors, fitted, numbers, rounds } from './axis'
 
 test('an axis of numbers has round ticks within its ends', () => {
   expect(rounds(0, 1)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1])
@@ -16,7 +16,15 @@ test('a logarithmic axis has powers of ten, or 1, 2 and 5 of one where those are
   expect(numbers([2, 8], String, { log: true }).ticks.map(({ label }) => label)).toEqual(['2', '5'])
   expect(factors(300, 40_000)).toEqual([1_000, 10_000])
   expect(factors(1e-12, 1e12)).toEqual([1e-12, 1e-7, 1e-2, 1e3, 1e8])
-  expect(factors(6, 8)).toEqual([6, 8])
+  expect(factors(6, 8)).toEqual([6, 6.5, 7, 7.5, 8])
+  expect(factors(6, 6)).toEqual([6])
+})
+
+test('a logarithmic axis ends close to its values, not at the next powers of ten', () => {
+  // 2^(1/20) of a factor of two.
+  expect(fitted(0.3, 0.6)[0]).toBeCloseTo(0.28978)
+  expect(fitted(0.3, 0.6)[1]).toBeCloseTo(0.62116)
+  expect(fitted(5, 5)).toEqual([5 / 1.01, 5 * 1.01])
 })
 
 test('where all values are one, or there are none, they lie in the middle', () => {

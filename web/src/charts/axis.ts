@@ -23,6 +23,9 @@ export const STEPS: Horizontal = { title: 'Steps', format: count }
 /** Beyond this many, ticks would run into one another. */
 const TICKS = 5
 
+/** A factor: one value alone has an axis, too. */
+const LEAST_ROOM = 1.01
+
 /** Ticks are round numbers: "75.0 %" -> "75 %". */
 export const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
 
@@ -67,14 +70,20 @@ export function rounds(low: number, high: number, steps: readonly number[] = [])
   )
 }
 
-/** Powers of ten from `low` to `high`, a few of them; where there are fewer than two, those of 1, 2 and 5 times one. */
+/** What a logarithmic axis shows of values from `low` to `high`: they fill it, but for a twentieth of their factor at either end. */
+export function fitted(low: number, high: number): [number, number] {
+  const room = Math.max((high / low) ** 0.05, LEAST_ROOM)
+  return [low / room, high * room]
+}
+
+/** Powers of ten from `low` to `high`, a few of them; where there are fewer than two, those of 1, 2 and 5 times one, or what is round. */
 export function factors(low: number, high: number): number[] {
   const found: number[] = []
   for (let power = Math.floor(Math.log10(low)); 10 ** power <= high * (1 + 1e-9); power++)
     for (const times of [1, 2, 5]) found.push(Number((times * 10 ** power).toPrecision(12)))
   const inside = found.filter((one) => one >= low * (1 - 1e-9) && one <= high * (1 + 1e-9))
   const powers = inside.filter((one) => Number.isInteger(Math.round(Math.log10(one) * 1e6) / 1e6))
-  if (powers.length < 2) return inside.length > 0 ? inside : [low, high]
+  if (powers.length < 2) return inside.length > 1 ? inside : high > low ? rounds(low, high) : [low]
   const every = Math.ceil(powers.length / (TICKS + 1))
   return powers.filter((_, index) => index % every === 0)
 }

@@ -15,6 +15,8 @@ export const USUAL_PANELS: readonly string[] = [
 
 /** So many are drawn on a page, and printed in a report. */
 export const MOST_PANELS = 24
+/** The others are drawn when one comes near. */
+export const PANELS_AT_ONCE = 4
 /** What the server takes for a metric's name. */
 const LONGEST_NAME = 64
 

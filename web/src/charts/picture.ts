@@ -1,6 +1,6 @@
 /** A chart as it leaves the page: SVG that needs nothing else, and the numbers as CSV. */
 import { factors, type Horizontal, rounds } from './axis'
-import { lineColor } from './palette'
+import { dashes, lineColor } from './palette'
 import { aboveZero, allPositive, type ChartData, type Line, type Values } from './series'
 
 export const WIDTH = 720
@@ -10,6 +10,8 @@ const RIGHT = 16
 const TOP = 36
 const BOTTOM = 48
 const ROW = 18
+/** Of a line, in the legend: as long as shows its dashes. */
+const SAMPLE = 28
 
 export interface PictureOptions {
   title: string
@@ -30,13 +32,16 @@ export function svgOf(whole: ChartData, options: PictureOptions): string {
   const bend = logarithmic ? Math.log10 : straight
   const bendX = logX ? Math.log10 : straight
   const [start, end] = [data.x[0] ?? 0, data.x.at(-1) ?? 0]
-  const seen = data.lines.flatMap((line) => [line.values, line.band?.low ?? [], line.band?.high ?? []].flat())
-  const values = seen.filter((value): value is number => value !== null && (!logarithmic || value > 0))
+  // An interval that reaches far below its mean would take most of a logarithmic axis: it ends at the edge.
+  const seen = data.lines.flatMap(({ values, band }) =>
+    logarithmic ? values : [values, band?.low ?? [], band?.high ?? []].flat(),
+  )
+  const values = seen.filter((value): value is number => value !== null)
   const [low, high] = yRange && !logarithmic ? yRange : padded(values.map(bend))
   const along = scale(bendX(start), bendX(end), LEFT, WIDTH - RIGHT)
   const across = (value: number) => along(bendX(value))
   const rise = scale(low, high, HEIGHT - BOTTOM, TOP)
-  const up = (value: number) => rise(bend(value))
+  const up = (value: number) => rise(logarithmic ? bend(Math.max(value, 10 ** low)) : value)
   const yTicks = logarithmic ? factors(10 ** low, 10 ** high) : ticks(low, high)
   const xTicks = logX && end > start ? factors(start, end) : ticks(start, end, x.rounds)
   const ink = 'fill="#3d464d"'
@@ -57,7 +62,7 @@ export function svgOf(whole: ChartData, options: PictureOptions): string {
     ...data.lines.map((line) => curve(data.x, line, across, up)),
     ...legend.map((line, row) => {
       const top = HEIGHT + ROW * row
-      return `<rect x="${LEFT}" y="${top + 3}" width="16" height="3" fill="${lineColor(line.color, false)}"/><text x="${LEFT + 24}" y="${top + 8}" ${ink}>${escaped(line.label ?? '')}</text>`
+      return `<line x1="${LEFT}" x2="${LEFT + SAMPLE}" y1="${top + 4}" y2="${top + 4}" stroke="${lineColor(line.color, false)}" stroke-width="3"${dashed(line, 2)}/><text x="${LEFT + SAMPLE + 8}" y="${top + 8}" ${ink}>${escaped(line.label ?? '')}</text>`
     }),
     '</svg>',
   ].join('\n')
@@ -87,14 +92,15 @@ export function csvOf(data: ChartData, { title, column = title }: Horizontal): s
 
 function curve(
   x: readonly number[],
-  { color, thin, values, band }: Line,
+  line: Line,
   across: (value: number) => number,
   up: (value: number) => number,
 ): string {
-  const ink = lineColor(color, false)
-  const points = (line: Values) =>
+  const { thin, values, band } = line
+  const ink = lineColor(line.color, false)
+  const points = (of: Values) =>
     x.flatMap((at, index) => {
-      const value = line[index]
+      const value = of[index]
       const y = value === null || value === undefined ? Number.NaN : up(value)
       return Number.isFinite(y) ? [`${fixed(across(at))},${fixed(y)}`] : []
     })
@@ -106,9 +112,14 @@ function curve(
     const [left, top] = first.split(',')
     return `${area}<circle cx="${left}" cy="${top}" r="3" fill="${ink}"/>`
   }
-  const look = thin ? 'stroke-width="1" stroke-opacity="0.4"' : 'stroke-width="2"'
+  const look = `${thin ? 'stroke-width="1" stroke-opacity="0.4"' : 'stroke-width="2"'}${dashed(line, thin ? 1 : 2)}`
   const drawn = [...(first === undefined ? [] : [first]), ...rest].join(' ')
   return `${area}<polyline points="${drawn}" fill="none" stroke="${ink}" ${look}/>`
+}
+
+function dashed({ dash = 0 }: Line, width: number): string {
+  const lengths = dashes(dash, width)
+  return lengths.length > 0 ? ` stroke-dasharray="${lengths.join(' ')}"` : ''
 }
 
 function scale(low: number, high: number, start: number, end: number): (value: number) => number {

@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest'
 import { curves } from '../testing/examples'
 import { MAIN_CHARTS, SECTIONS } from './metrics'
+import { colorOf } from './palette'
 import { aboveZero, alignSeries, allPositive, lastValue, smooth, smoothed, valueAt } from './series'
 import { chartOf, chartOfCurves } from './shape'
 
@@ -83,10 +84,10 @@ test('experiments together: seeds thin, mean bold with its band, N in the legend
   const { x, lines } = chartOfCurves(curves)
   expect(x).toEqual([0, 100, 200])
   expect(lines.map(({ key, label, thin, color }) => [key, label, thin ?? false, color])).toEqual([
-    ['exp1:0', undefined, true, 0],
-    ['exp1:1', undefined, true, 0],
-    ['exp1', 'Corridor, 2 seeds', false, 0],
-    ['exp2', 'Alone, 1 seed', false, 1],
+    ['exp1:0', undefined, true, colorOf('exp1')],
+    ['exp1:1', undefined, true, colorOf('exp1')],
+    ['exp1', 'Corridor, 2 seeds', false, colorOf('exp1')],
+    ['exp2', 'Alone, 1 seed', false, colorOf('exp2')],
   ])
   expect(lines[2]?.band?.low).toEqual([0.1, 0.5, null])
   expect(lines[3]?.band).toBeUndefined()

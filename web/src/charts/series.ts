@@ -9,6 +9,8 @@ export interface Line {
   label?: string
   /** Index into the palette. */
   color: number
+  /** Index into the dashes; a line is drawn through without it. */
+  dash?: number
   /** `thin` lines stand back: a seed behind its mean. */
   thin?: boolean
   values: Values

@@ -2,6 +2,7 @@
 import type { Curves, Profiles, Series } from '../api/types'
 import { plural } from '../lib/format'
 import type { ChartSpec } from './metrics'
+import { type Look, looksOf } from './palette'
 import { alignSeries, type ChartData, type Line } from './series'
 
 /**
@@ -44,30 +45,28 @@ function metricsOf({ metrics, prefix }: ChartSpec, series: readonly Series[]): C
 /**
  * Experiments together: each seed thin, the mean of the seeds bold, and its interval as a band. The legend counts the
  * seeds: how many stand behind the curve at its fullest. `look` names and colours the experiments where their own names
- * and their order should not.
+ * and ids should not.
  */
 export function chartOfCurves(
   curves: Curves,
-  look: (experiment: Curves['experiments'][number], index: number) => { name: string; color: number } = (
-    { name },
-    color,
-  ) => ({ name, color }),
+  look: (experiment: Curves['experiments'][number]) => { name: string } & Look = byId(curves.experiments),
 ): ChartData {
-  const lines = curves.experiments.flatMap((experiment, index): Line[] => {
-    const { name, color } = look(experiment, index)
+  const lines = curves.experiments.flatMap((experiment): Line[] => {
+    const { name, color, dash } = look(experiment)
     const seeds = Math.max(0, ...experiment.count)
     if (seeds === 0) return []
     const single = seeds === 1
     const thin = single
       ? []
       : experiment.seeds.map(
-          ({ seed, values }): Line => ({ key: `${experiment.id}:${seed}`, color, thin: true, values }),
+          ({ seed, values }): Line => ({ key: `${experiment.id}:${seed}`, color, dash, thin: true, values }),
         )
     const drawn = thin.length > 0 && thin.length < seeds ? `, ${thin.length} drawn` : ''
     const mean: Line = {
       key: experiment.id,
       label: `${name}, ${plural(seeds, 'seed')}${drawn}`,
       color,
+      dash,
       values: experiment.mean,
       ...(single ? {} : { band: { low: experiment.low, high: experiment.high } }),
     }
@@ -76,16 +75,26 @@ export function chartOfCurves(
   return { x: lines.length > 0 ? (curves.x ?? curves.steps) : [], lines }
 }
 
+/** Experiments under their names, each in the look that stays with it. */
+function byId(experiments: readonly { id: string; name: string }[]) {
+  const looks = looksOf(experiments.map(({ id }) => id))
+  return ({ id, name }: { id: string; name: string }): { name: string } & Look => ({
+    name,
+    ...(looks.get(id) ?? { color: 0, dash: 0 }),
+  })
+}
+
 /** Performance profiles: the mean over seeds of each training with its interval; x is the score. */
 export function chartOfProfiles({ thresholds, experiments }: Profiles): ChartData {
-  const lines = experiments.flatMap(({ id, name, seeds, mean, low, high }, color): Line[] =>
+  const look = byId(experiments)
+  const lines = experiments.flatMap(({ seeds, mean, low, high, ...one }): Line[] =>
     seeds === 0
       ? []
       : [
           {
-            key: id,
-            label: `${name}, ${plural(seeds, 'seed')}`,
-            color,
+            key: one.id,
+            ...look(one),
+            label: `${one.name}, ${plural(seeds, 'seed')}`,
             values: mean,
             ...(seeds > 1 ? { band: { low, high } } : {}),
           },

@@ -1,5 +1,5 @@
 /** How a page's charts are looked at, kept in its address, so that a link and a reload show the same. */
-import { useCallback } from 'react'
+import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
 import { useSearchParams } from 'react-router'
 import { type Across, isAcross } from './across'
 import { panelsOf } from './panels'
@@ -43,17 +43,25 @@ export function writtenView(before: URLSearchParams, view: ChartView): URLSearch
 
 export type ChangeView = (change: Partial<ChartView>) => void
 
+/** The view in the address, and what changes it: told at once, while the address follows when all charts are drawn. */
 export function useChartView(): [ChartView, ChangeView] {
   const [search, setSearch] = useSearchParams()
+  const [asked, setAsked] = useState<ChartView | null>(null)
+  const kept = useMemo(() => readView(search), [search])
+  // biome-ignore lint/correctness/useExhaustiveDependencies: another address is what was asked for, or what overrules it.
+  useEffect(() => setAsked(null), [search])
+  const view = asked ?? kept
+  const newest = useRef(view)
+  newest.current = view
   const change = useCallback(
-    (part: Partial<ChartView>) =>
-      setSearch((before) => writtenView(before, { ...readView(before), ...part }), {
-        replace: true,
-        preventScrollReset: true,
-      }),
+    (part: Partial<ChartView>) => {
+      newest.current = { ...newest.current, ...part }
+      setAsked(newest.current)
+      setSearch((before) => writtenView(before, newest.current), { replace: true, preventScrollReset: true })
+    },
     [setSearch],
   )
-  return [readView(search), change]
+  return [view, change]
 }
 
 /** Whether a chart's y is logarithmic, and what changes it. */

@@ -7,11 +7,13 @@ interface BelowProps {
   height: number
   /** Made at once: the address asks for something in it. */
   now?: boolean
+  /** Made only when one comes near. */
+  waits?: boolean
   children: ReactNode
 }
 
-export function Below({ height, now = false, children }: BelowProps) {
+export function Below({ height, now = false, waits = false, children }: BelowProps) {
   const place = useRef<HTMLDivElement>(null)
-  const near = useNear(place)
+  const near = useNear(place, waits)
   return near || now ? children : <div ref={place} style={{ height }} />
 }

@@ -45,6 +45,7 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
           format={percent}
           yRange={[0, 1.02]}
           x={SCORE}
+          readsLast={false}
           empty={error && !data ? 'Could not be loaded' : data ? 'Nothing evaluated yet' : ''}
         />
         <div className={classes.column}>

@@ -1,12 +1,15 @@
 /** What may be said of each training beside another: better, worse, equivalent, not told, or refused, and why. */
 import { Group, NativeSelect, NumberInput, Table, Text } from '@mantine/core'
+import { useMemo } from 'react'
 import type { Comparison, ComparisonVerdict } from '../api/types'
+import { looksOf } from '../charts/palette'
+import { ExperimentSwatch } from '../charts/Swatch'
 import { MOST_IN_PAIRS } from '../lib/comparison'
 import { pIs, plural, pValue } from '../lib/format'
 import { TableExport } from './ComparisonExport'
 import classes from './ComparisonVerdicts.module.css'
 import table from './ExperimentTable.module.css'
-import { Panel, Swatch } from './ui'
+import { Panel } from './ui'
 import ui from './ui.module.css'
 
 const MEASURES: Record<ComparisonVerdict['measure'], string> = {
@@ -127,11 +130,11 @@ export function ComparisonVerdicts(props: ComparisonVerdictsProps) {
 
 /** A training's name behind its colour. */
 export function NamedTraining({ comparison, id }: { comparison: Comparison; id: string }) {
-  const color = comparison.experiments.findIndex((one) => one.id === id)
+  const looks = useMemo(() => looksOf(comparison.experiments.map((one) => one.id)), [comparison])
   return (
     <Group gap={8} wrap="nowrap">
-      <Swatch color={color} />
-      {comparison.experiments[color]?.name}
+      <ExperimentSwatch id={id} looks={looks} />
+      {comparison.experiments.find((one) => one.id === id)?.name}
     </Group>
   )
 }

@@ -1,6 +1,6 @@
 /** A metric of one or more experiments: seeds thin, means bold, intervals as bands. */
 import { keepPreviousData } from '@tanstack/react-query'
-import { useMemo } from 'react'
+import { memo, useMemo } from 'react'
 import { $api } from '../api/client'
 import type { Curves } from '../api/types'
 import { ACROSS, isTime } from '../charts/across'
@@ -23,7 +23,7 @@ interface CurveChartProps {
   onView: ChangeView
 }
 
-export function CurveChart({ name, experiments, view, onView }: CurveChartProps) {
+export const CurveChart = memo(function CurveChart({ name, experiments, view, onView }: CurveChartProps) {
   const { across, logX } = view
   const query = {
     ...{ experiment: [...experiments], name, points: POINTS, lines: LINES },
@@ -43,7 +43,7 @@ export function CurveChart({ name, experiments, view, onView }: CurveChartProps)
       empty={error && !data ? 'Could not be loaded' : data ? (leftOut(data) ?? 'No value yet') : ''}
     />
   )
-}
+})
 
 /** On what the means are taken, where that is not simply every step that was reported; null where it is. */
 function gridOf(curves: Curves): string | null {

@@ -1,8 +1,9 @@
 /** The curves of experiments: the metrics that are looked at, each a chart, and how. */
 import { Group, Text } from '@mantine/core'
+import { useDeferredValue } from 'react'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
-import { USUAL_PANELS } from '../charts/panels'
+import { PANELS_AT_ONCE, USUAL_PANELS } from '../charts/panels'
 import { sharedX, useChartView } from '../charts/view'
 import { Below } from './Below'
 import { ChartControls } from './ChartControls'
@@ -15,6 +16,8 @@ const CHART_PX = 310
 
 export function CurvePanels({ experiments }: { experiments: readonly string[] }) {
   const [view, setView] = useChartView()
+  // The controls show what was chosen while the charts are drawn.
+  const shown = useDeferredValue(view)
   const reported = useReported(experiments)
   return (
     <Panel
@@ -29,11 +32,11 @@ export function CurvePanels({ experiments }: { experiments: readonly string[] })
         </Group>
       }
     >
-      <LinkedCharts of={sharedX(view)}>
+      <LinkedCharts of={sharedX(shown)}>
         <div className={charts.grid}>
-          {(view.panels ?? USUAL_PANELS).map((name) => (
-            <Below key={name} height={CHART_PX}>
-              <CurveChart name={name} experiments={experiments} view={view} onView={setView} />
+          {(shown.panels ?? USUAL_PANELS).map((name, place) => (
+            <Below key={name} height={CHART_PX} waits={place >= PANELS_AT_ONCE}>
+              <CurveChart name={name} experiments={experiments} view={shown} onView={setView} />
             </Below>
           ))}
         </div>

@@ -1,13 +1,13 @@
 /** The curves of one run: the main ones, all others by section, and any metric as a panel of one's own. */
 import { Group, Stack, Tabs, VisuallyHidden } from '@mantine/core'
-import { useMemo } from 'react'
+import { memo, useDeferredValue, useMemo } from 'react'
 import type { RunDetail, Series } from '../api/types'
 import { ACROSS, placed } from '../charts/across'
 import { useCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
-import { lookOf, USUAL_PANELS } from '../charts/panels'
+import { lookOf, PANELS_AT_ONCE, USUAL_PANELS } from '../charts/panels'
 import { chartOf } from '../charts/shape'
 import { type ChangeView, type ChartView, logOf, useChartView } from '../charts/view'
 import { Below } from './Below'
@@ -28,6 +28,8 @@ export interface RunCurves {
   /** Every metric's name. */
   reported: readonly string[]
   view: ChartView
+  /** The view in which the charts are drawn, which comes a moment later. */
+  shown: ChartView
   onView: ChangeView
   /** What stands in place of a curve without points. */
   empty: string
@@ -36,7 +38,8 @@ export interface RunCurves {
 export function useRunCurves(run: RunDetail): RunCurves {
   const metrics = useCurves(run.id, POINTS)
   const [view, onView] = useChartView()
-  const { across } = view
+  const shown = useDeferredValue(view)
+  const { across } = shown
   const all = metrics.data?.series ?? NO_SERIES
   const series = useMemo(() => placed(all, across), [all, across])
   const reported = useMemo(() => all.map(({ name }) => name), [all])
@@ -49,7 +52,7 @@ export function useRunCurves(run: RunDetail): RunCurves {
         : uncounted
           ? `${ACROSS[across].label} was not counted when this run trained`
           : 'No value yet'
-  return { series: series ?? NO_SERIES, reported, view, onView, empty }
+  return { series: series ?? NO_SERIES, reported, view, shown, onView, empty }
 }
 
 export function MainCurves({ curves }: { curves: RunCurves }) {
@@ -67,7 +70,7 @@ export function MainCurves({ curves }: { curves: RunCurves }) {
 }
 
 export function AllCurves({ curves }: { curves: RunCurves }) {
-  const { view, onView, reported } = curves
+  const { view, shown, onView, reported } = curves
   return (
     <Panel title="Curves" actions={<ChartControls {...curves} />}>
       <Tabs defaultValue={view.panels === null ? (SECTIONS[0]?.title ?? CHOSEN) : CHOSEN} keepMounted={false}>
@@ -92,8 +95,8 @@ export function AllCurves({ curves }: { curves: RunCurves }) {
             <PanelsButton view={view} onView={onView} names={reported} />
           </Group>
           <div className={grid.grid}>
-            {(view.panels ?? USUAL_PANELS).map((name) => (
-              <Below key={name} height={CHART_PX}>
+            {(shown.panels ?? USUAL_PANELS).map((name, place) => (
+              <Below key={name} height={CHART_PX} waits={place >= PANELS_AT_ONCE}>
                 <OwnChart name={name} curves={curves} />
               </Below>
             ))}
@@ -118,7 +121,13 @@ interface SpecChartProps {
   curves: RunCurves
 }
 
-function SpecChart({ spec, height, curves: { series, view, onView, empty } }: SpecChartProps) {
+function SpecChart({ spec, height, curves: { series, shown, onView, empty } }: SpecChartProps) {
+  return <Drawn {...{ spec, height, series, onView, empty }} view={shown} />
+}
+
+type DrawnProps = Pick<RunCurves, 'series' | 'view' | 'onView' | 'empty'> & Omit<SpecChartProps, 'curves'>
+
+const Drawn = memo(function Drawn({ spec, height, series, view, onView, empty }: DrawnProps) {
   const data = useMemo(() => chartOf(spec, series), [spec, series])
   const { metrics: _, prefix: __, ...look } = spec
   return (
@@ -132,4 +141,4 @@ function SpecChart({ spec, height, curves: { series, view, onView, empty } }: Sp
       empty={empty}
     />
   )
-}
+})

@@ -1,10 +1,9 @@
 /** The small parts that every page is made of. */
-import { Alert, Button, Group, Skeleton, Title, useComputedColorScheme } from '@mantine/core'
+import { Alert, Button, Group, Skeleton, Title } from '@mantine/core'
 import type { CSSProperties, ReactNode } from 'react'
 import { Link } from 'react-router'
 import { isNotFound, messageOf, OfflineError } from '../api/errors'
 import type { ExperimentState, RunState } from '../api/types'
-import { lineColor } from '../charts/palette'
 import { IconAlertCircle, IconAlertTriangle } from './icons'
 import { endsOf, STATES } from './states'
 import classes from './ui.module.css'
@@ -220,12 +219,6 @@ export function ProgressBar({
       <span style={{ width: `${share}%` }} />
     </div>
   )
-}
-
-/** The colour of a chart's line, to find it again in a table. */
-export function Swatch({ color }: { color: number }) {
-  const dark = useComputedColorScheme('light') === 'dark'
-  return <span className={classes.swatch} style={{ background: lineColor(color, dark) }} />
 }
 
 /** Rows of a table that is still loading, as high as the real ones. */

@@ -1,4 +1,4 @@
-/** What lies far below what is seen is made when one comes near, or when the browser has nothing else to do, one by one. */
+/** What lies far below what is seen is made when one comes near; most of it also when the browser has nothing else to do, one by one. */
 import { type RefObject, startTransition, useEffect, useState } from 'react'
 
 /** How far beyond the window is near. */
@@ -25,8 +25,8 @@ function later(ms: number): void {
   setTimeout(() => ('requestIdleCallback' in window ? window.requestIdleCallback(showOne) : showOne()), ms)
 }
 
-/** Whether `ref` is, or once was, near what is seen. */
-export function useNear(ref: RefObject<Element | null>): boolean {
+/** Whether `ref` is, or once was, near what is seen, or there was time for it; with `waits` there never is. */
+export function useNear(ref: RefObject<Element | null>, waits = false): boolean {
   const [near, setNear] = useState(!('IntersectionObserver' in window))
   useEffect(() => {
     const element = ref.current
@@ -37,12 +37,14 @@ export function useNear(ref: RefObject<Element | null>): boolean {
       { rootMargin: MARGIN },
     )
     observer.observe(element)
-    waiting.add(show)
-    later(FIRST_MS)
+    if (!waits) {
+      waiting.add(show)
+      later(FIRST_MS)
+    }
     return () => {
       observer.disconnect()
       waiting.delete(show)
     }
-  }, [near, ref])
+  }, [near, ref, waits])
   return near
 }

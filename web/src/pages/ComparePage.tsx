@@ -5,6 +5,8 @@ import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
+import { looksOf } from '../charts/palette'
+import { ExperimentSwatch } from '../charts/Swatch'
 import { useChartView } from '../charts/view'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
@@ -12,7 +14,7 @@ import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts
 import { CurvePanels } from '../components/CurvePanels'
 import table from '../components/ExperimentTable.module.css'
 import { FigureEstimate } from '../components/MeasuredEstimate'
-import { Message, Notice, Page, Panel, QueryError, Swatch } from '../components/ui'
+import { Message, Notice, Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
@@ -24,6 +26,9 @@ import { Trainings, usePickerView } from '../workbench/Trainings'
 
 /** Success rates that differ by less are equivalent, unless the address says otherwise. */
 const MARGIN = 0.02
+
+/** About what tables and charts are high. */
+const [HEAD_PX, FIGURES_PX, VERDICTS_PX, DISTRIBUTIONS_PX] = [40, 86, 250, 280]
 
 export function ComparePage() {
   useTitle('Compare')
@@ -154,7 +159,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
       title="Compare"
       below={
         <Text size="sm" c="dimmed" mt={4}>
-          {plural(chosen.length, 'training')}, each colour the same everywhere on this page
+          {plural(chosen.length, 'training')}, each in its colour everywhere
         </Text>
       }
       actions={
@@ -185,7 +190,11 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               </Group>
             }
           >
-            {data ? <Figures comparison={data} /> : <Skeleton height={120} m="md" w="auto" />}
+            {data ? (
+              <Figures comparison={data} />
+            ) : (
+              <Skeleton height={HEAD_PX + FIGURES_PX * chosen.length} w="auto" />
+            )}
           </Panel>
           {data && data.verdicts.length > 0 && (
             <ComparisonVerdicts
@@ -198,6 +207,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
             />
           )}
           {data && data.verdicts.length > 0 && <ComparisonDistributions comparison={data} query={query} />}
+          {!data && chosen.length > 1 && <Coming />}
           <CurvePanels experiments={chosen} />
           <Panel
             title="What differs in their settings"
@@ -209,6 +219,20 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
         </Stack>
       )}
     </Page>
+  )
+}
+
+/** What stands between the figures and the curves, while it is reckoned: the curves come where they stay. */
+function Coming() {
+  return (
+    <>
+      <Panel title="Verdicts">
+        <Skeleton height={VERDICTS_PX} />
+      </Panel>
+      <Panel title="Whole distributions">
+        <Skeleton height={DISTRIBUTIONS_PX} />
+      </Panel>
+    </>
   )
 }
 
@@ -225,6 +249,7 @@ function Warnings({ warnings }: { warnings: readonly string[] }) {
 }
 
 function Figures({ comparison }: { comparison: Comparison }) {
+  const looks = looksOf(comparison.experiments.map(({ id }) => id))
   return (
     <Table.ScrollContainer type="native" minWidth={820}>
       <Table className={table.table} data-testid="figures">
@@ -239,11 +264,11 @@ function Figures({ comparison }: { comparison: Comparison }) {
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {comparison.experiments.map((one, color) => (
+          {comparison.experiments.map((one) => (
             <Table.Tr key={one.id}>
               <Table.Td className={table.name}>
                 <Group gap={8} wrap="nowrap">
-                  <Swatch color={color} />
+                  <ExperimentSwatch id={one.id} looks={looks} />
                   <Anchor component={Link} to={`/experiments/${one.id}`} inherit>
                     {one.name}
                   </Anchor>
@@ -276,6 +301,7 @@ function Figures({ comparison }: { comparison: Comparison }) {
 
 function Differences({ comparison }: { comparison: Comparison }) {
   const { experiments, differences } = comparison
+  const looks = looksOf(experiments.map(({ id }) => id))
   const form = $api.useQuery('get', '/api/training/form', undefined, { staleTime: Number.POSITIVE_INFINITY })
   if (experiments.length < 2) {
     return <Message title="One training alone">Choose another to see what differs.</Message>
@@ -291,10 +317,10 @@ function Differences({ comparison }: { comparison: Comparison }) {
         <Table.Thead>
           <Table.Tr>
             <Table.Th>Setting</Table.Th>
-            {experiments.map((one, color) => (
+            {experiments.map((one) => (
               <Table.Th key={one.id}>
                 <Group gap={8} wrap="nowrap">
-                  <Swatch color={color} />
+                  <ExperimentSwatch id={one.id} looks={looks} />
                   {one.name}
                 </Group>
               </Table.Th>

@@ -1,10 +1,11 @@
 /** The runs that wait, in the order of their turns: what for, until when, and how urgent each is. */
-import { ActionIcon, Anchor, NumberInput, Table, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Anchor, Group, NumberInput, Table, Text, Tooltip } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import type { WaitingRun } from '../api/types'
+import { ExperimentSwatch } from '../charts/Swatch'
 import { IconArrowUp } from '../components/icons'
 import { Pager } from '../components/Pager'
 import { ParallelRuns } from '../components/ParallelRuns'
@@ -86,9 +87,12 @@ function WaitingRow({ run, mayOrder, drag }: WaitingRowProps) {
         </span>
       </Table.Td>
       <Table.Td>
-        <Anchor component={Link} to={`/runs/${run.id}`} size="sm">
-          {name}
-        </Anchor>
+        <Group gap={8} wrap="nowrap">
+          <ExperimentSwatch id={run.experiment_id} />
+          <Anchor component={Link} to={`/runs/${run.id}`} size="sm">
+            {name}
+          </Anchor>
+        </Group>
         <div className={classes.waits}>
           {words(run.algorithm)}, {run.step > 0 ? `${count(run.step)} of ` : ''}
           {count(run.total_steps)} steps

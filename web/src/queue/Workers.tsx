@@ -1,10 +1,11 @@
 /** The workers: what each trains and how quickly, on what machine, how busy it was, and what was last heard of it. */
-import { ActionIcon, Anchor, Menu, Table, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Anchor, Group, Menu, Table, Text, Tooltip } from '@mantine/core'
 import type { CSSProperties } from 'react'
 import { Link } from 'react-router'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import type { Worker } from '../api/types'
+import { ExperimentSwatch } from '../charts/Swatch'
 import { IconDots } from '../components/icons'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
@@ -49,9 +50,12 @@ function WorkerRow({ worker, administrates }: { worker: Worker; administrates: b
       <Table.Td>
         {run ? (
           <span className={classes.trained}>
-            <Anchor component={Link} to={`/runs/${run.id}`} size="sm">
-              {run.experiment_name}, seed {run.seed}
-            </Anchor>
+            <Group gap={8} wrap="nowrap">
+              <ExperimentSwatch id={run.experiment_id} />
+              <Anchor component={Link} to={`/runs/${run.id}`} size="sm">
+                {run.experiment_name}, seed {run.seed}
+              </Anchor>
+            </Group>
             <ProgressBar value={run.progress} state="running" label={`Progress of ${run.experiment_name}`} />
             <span className={classes.words}>
               {percent(run.progress)}

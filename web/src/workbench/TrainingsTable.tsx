@@ -8,6 +8,7 @@ import { useVirtualizer } from '@tanstack/react-virtual'
 import { type CSSProperties, type KeyboardEvent, useEffect, useRef, useState } from 'react'
 import { Link, useNavigate } from 'react-router'
 import type { Group, ListedExperiment } from '../api/types'
+import { ExperimentSwatch } from '../charts/Swatch'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconChevronDown, IconChevronRight, IconStar, IconStarFilled } from '../components/icons'
 import { summaryOf } from '../lib/experiments'
@@ -259,6 +260,7 @@ function TrainingCells({
         className={classes.name}
       >
         {onStar && <Star experiment={experiment} onStar={onStar} />}
+        <ExperimentSwatch id={experiment.id} />
         <Anchor component={Link} to={pageOf(experiment)} inherit title={experiment.name}>
           {experiment.name}
         </Anchor>
@@ -298,6 +300,7 @@ function CardCells({ experiment, view, now, ticked, onTick, onStar }: TrainingCe
       </div>
       <div className={classes.card}>
         <div>
+          <ExperimentSwatch id={experiment.id} />
           <Anchor component={Link} to={pageOf(experiment)} inherit>
             {experiment.name}
           </Anchor>

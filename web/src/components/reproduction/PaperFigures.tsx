@@ -77,7 +77,7 @@ function Figure({ figure, metric, active, rows }: FigureProps) {
     return data
       ? chartOfCurves(data, ({ id, name }) => {
           const method = methods.get(id) ?? name
-          return { name: method, color: Math.max(0, COLORS.indexOf(method)) }
+          return { name: method, color: Math.max(0, COLORS.indexOf(method)), dash: 0 }
         })
       : { x: [], lines: [] }
   }, [data, rows])
