@@ -4,6 +4,7 @@ import base64
 import sys
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from playwright.sync_api import APIRequestContext, Browser, BrowserContext, Page, expect
@@ -55,8 +56,23 @@ def ask(api: APIRequestContext) -> None:
     file = {"name": "wall.json", "content": base64.b64encode(wall.model_dump_json().encode()).decode()}
     arena = api.post("/api/arenas/imported", data={"files": [file], "keep": True}).json()["config"]
     question = {"policies": [{"source": "baseline", "name": "go-to-goal"}], "suites": [{"by": "arena", "arena": arena}]}
-    asked = api.post("/api/evaluations", data=question)
-    assert asked.ok, asked.text()
+    created(api, "/api/evaluations", question)
+    created(api, "/api/alerts/rules", {"event": "ended", "channel": "browser"})
+
+
+def search(api: APIRequestContext) -> str:
+    """The id of a study; the server asks for its trial within seconds, while the other pages are looked at."""
+    sizes = {"kind": "range", "path": "algorithm.learning_rate", "low": 1e-4, "high": 1e-2, "log": True}
+    training = {"steps": 2_000, "evaluation": {"every_steps": 2_000}}
+    body = {"name": "Step sizes", "training": training, "settings": [sizes], "trials": 1}
+    return str(created(api, "/api/studies", body)["id"])
+
+
+def created(api: APIRequestContext, path: str, body: dict[str, Any]) -> Any:
+    """What has come of a request."""
+    answer = api.post(path, data=body)
+    assert answer.ok, answer.text()
+    return answer.json()
 
 
 def measured(api: APIRequestContext) -> str:
@@ -71,7 +87,10 @@ def measured(api: APIRequestContext) -> str:
 
 
 def pages(lab: Lab) -> list[tuple[str, str, str]]:
-    """Every page: its address, what is on it once it is whole, and the button that opens something over it ("" for none)."""
+    """Every page: its address, what is on it once it is whole, and what is pressed for something over it ("" for nothing).
+
+    Buttons and tabs by their names; one after the other where they are parted by " > ".
+    """
     compared = f"/compare?experiment={lab.experiments[0]}&experiment={lab.long_experiments[0]}"
     return [
         ("/", "[data-testid=experiment]", "Actions for Long 0"),
@@ -80,18 +99,20 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
         (f"/experiments/{lab.long_experiments[0]}", "[data-testid=chart] canvas", "Seeds"),
         (f"/runs/{lab.many}", "[data-testid=checkpoint]", ""),
         (compared, "[data-testid=figures]", ""),
+        (compared, "[data-testid=chart] canvas", "Panels"),
         ("/compare", "[data-testid=experiment]", ""),
         ("/policies", "[data-testid=policy]", ""),
         ("/policies/complex", "[data-testid=episode]", "Download Complex arena"),
         ("/arenas", "text=A wall", "Delete A wall"),
         ("/arenas/draw", "text=All is well", "Start from…"),
-        ("/alerts", "h1", ""),
+        ("/alerts", "[data-testid=rule]", ""),
         ("/studies", "h1", ""),
         ("/queue", "[data-testid=job]", ""),
         ("/evaluations", "[data-testid=evaluation]", ""),
         ("/leaderboards", "[data-testid=entry]", ""),
         ("/reproduction", "[data-testid=claim]", ""),
         ("/storage", "[data-testid=stored]", "Clean up Long 0"),
+        ("/storage", "[data-testid=stored]", "Clean up Long 0 > Curves"),
         ("/account", "h1", ""),
         ("/projects", "h1", ""),
         ("/projects/default", "h1", ""),
@@ -121,12 +142,55 @@ def test_axe_finds_nothing_on_any_page(lab: tuple[Lab, BrowserContext]) -> None:
     page = context.new_page()
     page.emulate_media(reduced_motion="reduce")
     found: list[str] = []
-    for path, whole, opens in [*pages(made), (f"/evaluations/{evaluation}", "[data-testid=episode]", "")]:
+    study = search(context.request)
+    ground = created(context.request, "/api/playgrounds", {"policy": {"source": "shipped", "name": "simple"}})
+    later = [
+        (f"/evaluations/{evaluation}", "[data-testid=episode]", ""),
+        (f"/playground/{ground['id']}", "[data-testid=tally]", ""),
+        ("/playground", "text=Let it drive", ""),
+        (f"/studies/{study}", "[data-testid=trial]", ""),
+        ("/policies/complex?suite=complex-200&replay=8", "[role=dialog] [data-testid=chart] canvas", ""),
+    ]
+    for path, whole, opens in [*pages(made), *later]:
         page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
         page.goto(path)
         expect(page.locator(whole).first).to_be_visible()
-        if opens:
-            page.get_by_role("button", name=opens).first.click()
+        for name in filter(None, opens.split(" > ")):
+            page.get_by_role("button", name=name).or_(page.get_by_role("tab", name=name)).first.click()
         found += faults(page)
     page.close()
     assert not found, "\n".join(found)
+
+
+def test_axe_finds_nothing_where_one_logs_in(lab: tuple[Lab, BrowserContext], browser: Browser) -> None:
+    _, known = lab
+    page = known.new_page()
+    page.goto("/")
+    origin = page.url
+    page.close()
+    stranger = browser.new_context(base_url=origin)
+    page = stranger.new_page()
+    page.goto("/")
+    expect(page.get_by_role("heading", level=1)).to_be_visible()
+    found = list(faults(page))
+    stranger.close()
+    assert not found, "\n".join(found)
+
+
+def test_the_menu_of_a_policy_gives_the_focus_back(lab: tuple[Lab, BrowserContext]) -> None:
+    _, context = lab
+    page = context.new_page()
+    page.goto("/policies/complex")
+    button = page.get_by_role("button", name="Download Complex arena")
+    for opens in ("Enter", "Space"):
+        button.focus()
+        page.keyboard.press(opens)
+        expect(page.get_by_role("menuitem").first).to_be_focused()
+        page.keyboard.press("Escape")
+        expect(page.get_by_role("menuitem")).to_have_count(0)
+        expect(button).to_be_focused()
+    button.click()
+    with page.expect_download():
+        page.get_by_role("menuitem", name="Checkpoint").click()
+    expect(button).to_be_focused()
+    page.close()
