@@ -10,7 +10,7 @@ export default mergeConfig(
       // The pages show local times; tests pin the zone so that they read the same everywhere.
       env: { TZ: 'UTC' },
       restoreMocks: true,
-      testTimeout: 30_000,
+      testTimeout: 60_000,
       css: false,
     },
   }),
