@@ -24,6 +24,7 @@ from sim.config import (
     RangesPart,
     SpeedsPart,
     TaskConfig,
+    TrailPart,
     part_key,
 )
 from sim.config.observation import part_size
@@ -169,6 +170,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return (ObservationNumber("yaw", "heading / pi", -1.0, 1.0, "pi rad"),)
         case DeviationPart():
             return (ObservationNumber("heading deviation", f"|bearing| / pi, {_BEARING}", 0.0, 1.0, "pi rad"),)
+        case TrailPart():
+            return tuple(_trail(part, task))
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -185,6 +188,19 @@ def _ranges(part: RangesPart, task: TaskConfig) -> Iterator[ObservationNumber]:
             yield ObservationNumber(f"nearness {k}", f"{near:g} / max({nearest}, {near:g})", 0.0, 1.0)
         else:
             yield ObservationNumber(f"range {k}", f"{nearest} / {limit:g}", 0.0, 1.0, f"{limit:g} m")
+
+
+def _trail(part: TrailPart, task: TaskConfig) -> Iterator[ObservationNumber]:
+    crumbs, limit = "the crumbs in sight in this sector", task.lidar.range
+    kinds = (
+        ("trail nearness", f"1 - d / {limit:g} m, d = distance of the nearest of {crumbs}; 0 where there is none"),
+        ("trail crumbs", f"n / (n + 5), n = number of {crumbs}"),
+        ("trail freshness", f"10 / (10 + m), m = crumbs dropped since the newest of {crumbs}; 0 where there is none"),
+    )
+    for name, formula in kinds:
+        for k in range(part.sectors):
+            yield ObservationNumber(f"{name} {k}", formula, 0.0, 1.0)
+    yield ObservationNumber("trail length", "n / (n + 40), n = crumbs dropped in this attempt", 0.0, 1.0)
 
 
 def pack_parts(task: TaskConfig) -> dict[str, object]:
@@ -207,6 +223,7 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
         "part_options": options,
         "batches": observation.batches * len(task.lidar.mount.places),
         "rays_per_batch": task.lidar.rays // (observation.batches or 1),
+        "trail_sectors": next((part.sectors for part in observation.parts if isinstance(part, TrailPart)), 0),
         "frames": observation.frames,
         "parts": len(observation.parts),
         "part_sizes": np.pad([part_size(part, *sizes) for part in observation.parts], room),

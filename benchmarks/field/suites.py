@@ -12,7 +12,7 @@ from sim.config import FamilyName
 from sim.suites import Suite, SuiteRules, load_suite, suite_in, suite_places
 from workers.shipped.field import Part
 
-FAMILIES: tuple[FamilyName, ...] = tuple(name for name in get_args(FamilyName) if name != "mixed")
+FAMILIES: tuple[FamilyName, ...] = tuple(name for name in get_args(FamilyName) if name not in ("mixed", "varied"))
 FROZEN: dict[Part, tuple[str, ...]] = {"barn": ("barn-jackal-120",), "people": ("people-500", "heedless-500")}
 
 PIECE = 100

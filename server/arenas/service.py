@@ -36,6 +36,7 @@ _FAMILIES: tuple[tuple[str, FamilyName], ...] = (
     ("Narrow passages", "passages"),
     ("Thicket of pillars", "thicket"),
     ("Clutter and thickets", "mixed"),
+    ("Another family on every map", "varied"),
 )
 _POOLS: tuple[tuple[str, GeneratedArenaConfig | AddedArenaPool], ...] = (
     *((title, GeneratedArenaConfig(name=name)) for title, name in _FAMILIES),

@@ -49,6 +49,7 @@ from sim.config.observation import (
     ObservationPart,
     RangesPart,
     SpeedsPart,
+    TrailPart,
     part_key,
     preset_parts,
 )
@@ -163,6 +164,7 @@ __all__ = [
     "TimeTerm",
     "Timed",
     "TimeoutTerm",
+    "TrailPart",
     "WaffleConfig",
     "Walker",
     "Waypoint",

@@ -12,7 +12,7 @@ from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ArenaFamily
 
 ArenaName = Literal["simple", "complex"]
-FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed"]
+FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed", "varied"]
 
 
 class ArenaConfig(Frozen):
@@ -81,7 +81,7 @@ class GeneratedArenaConfig(ArenaPool):
         "clutter",
         title="Arena",
         description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
-        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed.",
+        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them.",
     )
 
 

@@ -13,7 +13,7 @@ from sim.config.base import ADVANCED, Frozen
 from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ObservationPart as AddedPart
 from sim.extending.parts import check_numbers
-from sim.kernels.room import MAX_FRAMES, MAX_PARTS
+from sim.kernels.room import MAX_FRAMES, MAX_PARTS, TRAIL_KINDS
 
 MAX_NUMBERS = 4_000
 """Numbers of one observation, at most: all rays of a full scanner at all moments, and some more."""
@@ -122,6 +122,21 @@ class DeviationPart(Frozen):
     frames: int = _frames()
 
 
+class TrailPart(Frozen):
+    """Where it has been in this attempt: crumbs that it drops every 0.24 m, those in sight, as it remembers them."""
+
+    name: Literal["trail"] = Field("trail", title="Trail")
+    sectors: int = Field(
+        30,
+        ge=4,
+        le=120,
+        title="Sectors",
+        description="Of the full turn around it, three numbers each: how near, how many, how fresh.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
 class AddedObservationPart(AddedPart):
     """A part that an extension has added."""
 
@@ -134,7 +149,15 @@ class AddedObservationPart(AddedPart):
 
 
 BuiltInPart = (
-    RangesPart | SpeedsPart | ActionsPart | DistancePart | DirectionPart | BearingPart | HeadingPart | DeviationPart
+    RangesPart
+    | SpeedsPart
+    | ActionsPart
+    | DistancePart
+    | DirectionPart
+    | BearingPart
+    | HeadingPart
+    | DeviationPart
+    | TrailPart
 )
 
 if TYPE_CHECKING:
@@ -250,6 +273,8 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return actions
         case BearingPart(encoding="sine_cosine"):
             return 2
+        case TrailPart():
+            return TRAIL_KINDS * part.sectors + 1
         case AddedObservationPart():
             return len(part.numbers())
         case _:

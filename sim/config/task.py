@@ -59,7 +59,12 @@ class TaskConfig(Frozen):
         description="Steps per target before the attempt times out.",
         json_schema_extra=ADVANCED,
     )
-
+    arrival_ends: bool = Field(
+        False,
+        title="An arrival ends the episode",
+        description="The robot then starts anew, in another map where there are more; else it goes on to its next target.",
+        json_schema_extra=ADVANCED,
+    )
     command_delay: int = Field(
         0,
         ge=0,

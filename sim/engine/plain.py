@@ -28,11 +28,13 @@ from sim.config import (
     RewardTerm,
     SpeedsPart,
     TaskConfig,
+    TrailPart,
 )
 from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
+from sim.engine.plain_trail import PlainTrail
 from sim.engine.rewards import constants, evaluate, parameters_of, program_of
 from sim.extending.observing import Sight
 from sim.extending.parts import RewardTerm as AddedTerm
@@ -114,6 +116,8 @@ class PlainWorld:
         self._paths = Paths([arena], task.passable_clearance) if task.reward.weight("path_progress") else None
         self.path = self.last_path = self._path()
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
+        self._trail = PlainTrail(task.lidar)
+        self._trail.drop(pose[:2])
         self._seen: list[list[NDArray[np.float64]]] = []
         self._added_parts = AddedParts(task)
         if task.observation.frames > 1:
@@ -160,6 +164,7 @@ class PlainWorld:
     def observe(self, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
         """The task's observation after a step: what it sees now before what it saw earlier, see `sim.observations`."""
         parts = self.task.observation.parts
+        self._trail.drop(self.body.position)
         now = [self._part(part, ranges) for part in parts]
         self._seen = [now, *(self._seen or [now] * self.task.observation.frames)][: self.task.observation.frames]
         return np.concatenate(
@@ -189,6 +194,8 @@ class PlainWorld:
                 return np.array([heading % math.tau / math.tau if part.scaling == "turn" else heading / math.pi])
             case DeviationPart():
                 return np.array([abs(bearing) / math.pi])
+            case TrailPart():
+                return self._trail.seen(ranges, (*self.body.position, heading), part.sectors)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

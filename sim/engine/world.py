@@ -40,6 +40,7 @@ from sim.kernels.records import (
     ROBOT,
 )
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
+from sim.kernels.trail import TRAIL_ROOM
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.observations import observation_size
 from sim.streams import ENVIRONMENT, Stream
@@ -146,6 +147,7 @@ class World:
         self._formulas = formulas = Formulas(task, robots)
         self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, self.arenas, robots)
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
+        sees_trail = any(part.name == "trail" for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -167,6 +169,8 @@ class World:
             drift=np.zeros((robots if drifts else 0, 3)),
             pending=np.zeros((robots, longest_delay(task), action_size), dtype=np.float32),
             commands=np.zeros((robots if sees_actions else 0, action_size), dtype=np.float32),
+            trail=np.zeros((robots if sees_trail else 0, TRAIL_ROOM, 2), dtype=np.float32),
+            crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )

@@ -43,7 +43,13 @@ class NavigationEnv(gymnasium.Env[Floats, Floats]):
         self.observation_space, self.action_space = single_spaces(self.task)
         self._action_size = action_layout(self.task.robot).size
         # The next episode waits for `reset`: pose and picture of a last step are those of the episode that it ends.
-        self._world = World(self.task, build_task_arenas(self.task), 1, arrival_ends=self._ARRIVAL_ENDS, restart="reset")
+        self._world = World(
+            self.task,
+            build_task_arenas(self.task),
+            1,
+            arrival_ends=self._ARRIVAL_ENDS or self.task.arrival_ends,
+            restart="reset",
+        )
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin a new episode.

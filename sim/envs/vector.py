@@ -85,7 +85,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     }
 
     _ARRIVAL_ENDS: ClassVar[bool] = False
-    """Whether an arrival ends the episode."""
+    """Whether an arrival ends the episode whatever the task says."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             build_task_arenas(self.task),
             num_envs,
             seed=seed,
-            arrival_ends=self._ARRIVAL_ENDS,
+            arrival_ends=self._ARRIVAL_ENDS or self.task.arrival_ends,
             restart=_RESTARTS[mode],
         )
         robots = self._world.robots

@@ -108,6 +108,9 @@ class Robots(NamedTuple):
         drift: (N, 3) how far the believed pose is from the true one; (0, 3) where it never is.
         pending: (N, delay, A) actions that wait to be followed, the next one first; none where nothing is delayed.
         commands: (N, A) what was commanded last, whenever it is followed; (0, A) where nobody sees it.
+        trail: (N, TRAIL_ROOM, 2) x, y of the crumbs of this attempt, where the robot believed to be when it dropped them,
+            crumb n in row n modulo the room; (0, TRAIL_ROOM, 2) where nobody sees them.
+        crumbs: (N,) how many were dropped; (0,) likewise.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
@@ -131,5 +134,7 @@ class Robots(NamedTuple):
     drift: Doubles
     pending: Floats
     commands: Floats
+    trail: Floats
+    crumbs: Integers
     held_ranges: Floats
     scan_ages: Integers

@@ -61,15 +61,19 @@ def begin_episode(i, robots, geometry, p):
         robots.pending[i] = ZERO
     if robots.commands.shape[0]:
         robots.commands[i] = ZERO
+    if robots.crumbs.shape[0]:
+        robots.crumbs[i] = 0
     if robots.scan_ages.shape[0]:
         robots.scan_ages[i] = 0
 
 
 @kernel()
 def find_itself(i, robots):
-    """Let robot i know its pose: with a new target, odometry starts anew."""
+    """Let robot i know its pose: with a new target, odometry starts anew, and its trail."""
     if robots.drift.shape[0]:
         robots.drift[i] = 0.0
+    if robots.crumbs.shape[0]:
+        robots.crumbs[i] = 0
 
 
 @kernel()

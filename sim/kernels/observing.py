@@ -15,8 +15,10 @@ from sim.kernels.records import (
     OMNIDIRECTIONAL,
     RANGES_PART,
     SPEEDS_PART,
+    TRAIL_PART,
 )
 from sim.kernels.sensing import FAST, nearest_of
+from sim.kernels.trail import see_trail
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -92,6 +94,8 @@ def observe(i, robots, geometry, p):
         distance = np.float32(math.sqrt(dx * dx + dy * dy))
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
     bearing = bearing_of(dx, dy, heading)
+    if p.part_places[TRAIL_PART] >= 0:
+        see_trail(i, robots.targets[i, 0] - dx, robots.targets[i, 1] - dy, heading, robots, geometry, p)
     if p.part_places[DISTANCE_PART] >= 0:
         if p.part_options[DISTANCE_PART]:
             out[i, p.part_places[DISTANCE_PART]] = distance / (distance + ONE)

@@ -10,7 +10,7 @@ CELL = 0.1
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
 
-PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation")
+PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation", "trail")
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
 (
@@ -22,6 +22,7 @@ PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing",
     BEARING_PART,
     HEADING_PART,
     DEVIATION_PART,
+    TRAIL_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2
@@ -103,6 +104,7 @@ PARAMETERS = np.dtype(
         ("part_options", "i4", (len(PART_KINDS),)),  # see `sim.observations.pack_parts`
         ("batches", "i4"),
         ("rays_per_batch", "i4"),
+        ("trail_sectors", "i4"),
         ("frames", "i4"),  # moments at which anything is seen
         ("parts", "i4"),  # of the observation
         ("part_sizes", "i4", (MAX_PARTS,)),  # numbers of each at one moment

@@ -8,3 +8,6 @@ MAX_FRAMES = 8
 
 MAX_TERMS = 16
 """Terms of one reward, at most."""
+
+TRAIL_KINDS = 3
+"""Numbers of each sector in which a trail is seen."""

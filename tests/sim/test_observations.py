@@ -25,6 +25,7 @@ from sim.config import (
     RangesPart,
     SpeedsPart,
     TaskConfig,
+    TrailPart,
     preset_parts,
 )
 from sim.engine.plain import PlainWorld
@@ -192,6 +193,7 @@ parts = st.tuples(
     st.builds(BearingPart, encoding=st.sampled_from(["angle", "sine_cosine"]), frames=frames),
     st.builds(HeadingPart, scaling=st.sampled_from(["signed", "turn"]), frames=frames),
     st.builds(DeviationPart, frames=frames),
+    st.builds(TrailPart, sectors=st.sampled_from([4, 30]), frames=frames),
 )
 
 
@@ -209,7 +211,7 @@ def test_any_list_of_parts_is_what_the_plain_twin_sees(arena: Arena, seed: int, 
     plain = PlainWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]))
     layout = observation_layout(task)
     low, high = (np.array([getattr(number, end) for number in layout.numbers]) for end in ("low", "high"))
-    ranges = np.array([block.key == "ranges" for block in layout.blocks for _ in block.numbers])
+    by_rays = np.array([block.key in ("ranges", "trail") for block in layout.blocks for _ in block.numbers])
     # Angles may round to either side of a half turn.
     period = np.array([1.0 if number.unit == "2 pi rad" else 2.0 for number in layout.numbers])
     for linear, angular in rng.uniform([0.3, -1.0], 1.0, (12, 2)).astype(np.float32).tolist():
@@ -220,8 +222,9 @@ def test_any_list_of_parts_is_what_the_plain_twin_sees(arena: Arena, seed: int, 
         ours = world.robots.observations[0]
         assert ((ours >= low) & (ours <= high)).all()
         difference = np.abs(ours - expected.observation)
-        assert np.count_nonzero(difference[ranges] > 1e-3) <= 3  # a ray that grazes an edge falls on either side of it
-        assert (np.minimum(difference, np.abs(period - difference))[~ranges] < 1e-4).all()
+        # A ray that grazes an edge falls on either side of it, and with it the three numbers of a crumb beside the edge.
+        assert np.count_nonzero(difference[by_rays] > 1e-3) <= 3
+        assert (np.minimum(difference, np.abs(period - difference))[~by_rays] < 1e-4).all()
 
 
 def test_a_baseline_drives_by_any_observation_that_tells_where_the_target_is() -> None:

@@ -72,7 +72,7 @@ def check_export(
     by_scene = run_graph(by_scan, {name: scene[name] for name in scan_inputs(shipped.specification)} | memory)
     seen = observe(
         shipped.specification, scene[RANGES], scene[POSE], scene[TARGET], scene[LAST_ACTION], scene[SPEEDS],
-        added={part.kind: scene[part.kind] for part in shipped.specification.parts if part.added},
+        added={part.kind: scene[part.kind] for part in shipped.specification.parts if part.brought},
     )  # fmt: skip
     seen = np.concatenate((seen, scene[PREVIOUS]), axis=1)
     policy_difference = max(
@@ -111,7 +111,7 @@ def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats
         PREVIOUS: rng.uniform(0.0, 1.0, (_ROWS, len(specification.carried))),
     }
     # Only now, so that what is drawn before them is what it is without them.
-    scene |= {part.kind: rng.uniform(-1.0, 1.0, (_ROWS, part.size)) for part in specification.parts if part.added}
+    scene |= {part.kind: rng.uniform(-1.0, 1.0, (_ROWS, part.size)) for part in specification.parts if part.brought}
     cast = {name: values.astype(np.float32) for name, values in scene.items()}
     cast[RANGES] = np.minimum(cast[RANGES], np.float32(specification.range))
     return cast

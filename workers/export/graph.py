@@ -5,9 +5,10 @@
 | observation | `observation` (n, size) as the manifest describes it         | `action`, `velocity`                |
 | scan        | what the observation is made of, of `ranges` (n, scan),     | `observation`, `action`, `velocity` |
 |             | `pose` (n, 3), `target` (n, 2), `speeds` (n, A) and         |                                     |
-|             | `last_action` (n, A); an extension's part (n, numbers) by   |                                     |
-|             | its name; where earlier moments are seen `previous`, see    |                                     |
-|             | `Specification.carried`                                     |                                     |
+|             | `last_action` (n, A); `trail` (n, numbers), which a robot's |                                     |
+|             | program keeps (`ros2/mapless_navigator/trail.py`), and an   |                                     |
+|             | extension's part (n, numbers) by its name; where earlier    |                                     |
+|             | moments are seen `previous`, see `Specification.carried`    |                                     |
 
 A policy that remembers has one more input, `memory` (n, m), zeros where a robot begins, and one more output, `next_memory`,
 which is the next step's. The nodes of a network that ships are those of its formula; another's are what PyTorch makes of
@@ -79,12 +80,12 @@ def scan_inputs(specification: Specification) -> dict[str, int]:
     kinds = {part.kind for part in specification.parts}
     actions = len(specification.action_limits)
     inputs = {RANGES: specification.scan_size} if kinds & {"ranges", "inverse_ranges"} else {}
-    added = {part.kind: part.size for part in specification.parts if part.added}
-    if kinds - added.keys() - {"ranges", "inverse_ranges", "speeds", "actions"}:
+    brought = {part.kind: part.size for part in specification.parts if part.brought}
+    if kinds - brought.keys() - {"ranges", "inverse_ranges", "speeds", "actions"}:
         inputs |= {POSE: 3, TARGET: 2}
     inputs |= {SPEEDS: actions} if "speeds" in kinds else {}
     inputs |= {LAST_ACTION: actions} if "actions" in kinds else {}
-    inputs |= added
+    inputs |= brought
     return inputs | ({PREVIOUS: len(specification.carried)} if specification.carried else {})
 
 
@@ -158,7 +159,7 @@ class _Graph:
         columns = [
             self._seen(specification, part)
             if part.kind in ("ranges", "inverse_ranges")
-            else (part.kind if part.added else told[part.kind]())
+            else (part.kind if part.brought else told[part.kind]())
             for part in specification.parts
         ]
         earlier = (PREVIOUS,) if specification.carried else ()

@@ -24,12 +24,17 @@ sys.path.insert(0, "ros2/mapless_navigator")  # without ROS: these modules need 
 
 from mapless_navigator.observation import Frames, observe
 from mapless_navigator.policy import Policy
-
+IMPORTS
 policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
+pose = [0.0, 0.0, 0.0]  # x, y, heading
 frames = Frames(policy.specification)  # of one robot, from start to target
-observation = frames.push(observe(policy.specification, ranges, [[0.0, 0.0, 0.0]], [[2.0, 1.0]], [[ZEROS]]ADDED))
+TRAILobservation = frames.push(observe(policy.specification, ranges, [pose], [[2.0, 1.0]], [[ZEROS]]ADDED))
 STEPprint(f"FORMAT")
+"""
+
+_TRAIL = """\
+trail = Trail(policy.specification)  # likewise
 """
 
 _NUMPY_STEP = """\
@@ -92,10 +97,7 @@ def _onnx_example(specification: Specification) -> str:
         TARGET: "np.array([[2.0, 1.0]], np.float32),",
         SPEEDS: "np.zeros((1, COUNT), np.float32),  # as measured, over their limits, or the `action` of the step before",
         LAST_ACTION: "np.zeros((1, COUNT), np.float32),  # the `action` of the step before",
-        **{
-            part.kind: f"np.zeros((1, {part.size}), np.float32),  # as its extension makes it"
-            for part in _added_parts(specification)
-        },
+        **{part.kind: f"{_at_first(part)},  # as {_maker(part)} makes it" for part in _brought_parts(specification)},
         MEMORY: f"np.zeros((1, {specification.memory}), np.float32),  # of a robot that begins",
         PREVIOUS: f"np.zeros((1, {len(specification.carried)}), np.float32),  # see below",
     }
@@ -119,10 +121,16 @@ def _filled(example: str, specification: Specification) -> str:
         "omnidirectional": ("linear", "lateral", "angular"),
         "ackermann": ("linear", "steering"),
     }[specification.drive]
-    added = {part.kind: [[0.0] * part.size] for part in _added_parts(specification)}
+    added = {
+        part.kind: "[trail.see(ranges[0], pose)]" if part.kind == "trail" else str([[0.0] * part.size])
+        for part in _brought_parts(specification)
+    }
+    brought = ", ".join(f'"{kind}": {numbers}' for kind, numbers in added.items())
     return (
         example.replace("NAMES", ", ".join(names))
-        .replace("ADDED", f", added={added}" if added else "")
+        .replace("ADDED", f", added={{{brought}}}" if added else "")
+        .replace("IMPORTS", "from mapless_navigator.trail import Trail\n" if "trail" in added else "")
+        .replace("TRAIL", _TRAIL if "trail" in added else "")
         .replace("FORMAT", ", ".join(f"{{{name}:.3f}} {units[name]}" for name in names))
         .replace("ZEROS", ", ".join(["0.0"] * len(names)))
         .replace("COUNT", str(len(names)))
@@ -177,6 +185,21 @@ def _contract(manifest: Manifest, specification: Specification) -> str:
 |---|---|---|---|
 {rows}
 """
+
+
+def _brought_parts(specification: Specification) -> tuple[Part, ...]:
+    return tuple(part for part in specification.parts if part.brought)
+
+
+def _at_first(part: Part) -> str:
+    """What a robot that has not moved brings, as code."""
+    if part.added:
+        return f"np.zeros((1, {part.size}), np.float32)"
+    return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / 41"
+
+
+def _maker(part: Part) -> str:
+    return "its extension" if part.added else "`mapless_navigator/trail.py`"
 
 
 def _added_parts(specification: Specification) -> tuple[Part, ...]:

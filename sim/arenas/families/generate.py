@@ -15,6 +15,7 @@ from sim.arenas.families.mixed import mixed
 from sim.arenas.families.partition import corridors, rooms
 from sim.arenas.families.passages import passages
 from sim.arenas.families.thicket import thicket
+from sim.arenas.families.varied import varied
 from sim.arenas.families.warehouse import warehouse
 from sim.arenas.geometry import Arena
 from sim.config import MAX_MAPS, FamilyName
@@ -31,6 +32,7 @@ FAMILIES: Final[dict[FamilyName, Callable[[Plan], None]]] = {
     "passages": passages,
     "thicket": thicket,
     "mixed": mixed,
+    "varied": varied,
 }
 
 SIZE = 10.0

@@ -29,6 +29,7 @@ from sim.config import (
     RidgebackConfig,
     SpeedsPart,
     TaskConfig,
+    TrailPart,
 )
 from workers.checkpoints import read_policy
 from workers.config import ConvNetwork, GruNetwork, MlpNetwork, Network, ResBlockNetwork
@@ -71,6 +72,7 @@ TASKS = [
         )
     ),
     TaskConfig(observation=ObservationConfig(parts=(SpeedsPart(), RangesPart()))),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(sectors=8, frames=2)))),
 ]
 
 
@@ -89,6 +91,7 @@ TASKS = [
         "two LiDARs",
         "parts",
         "no target",
+        "trail",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
@@ -174,14 +177,19 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
 
 
 @pytest.mark.parametrize("network", [ResBlockNetwork(), ConvNetwork(), GruNetwork(units=8)], ids=lambda one: str(one.name))
-@pytest.mark.parametrize("frames", [1, 4])
+@pytest.mark.parametrize(
+    "observation",
+    [
+        ObservationConfig.preset("improved"),
+        ObservationConfig.preset("improved", frames=4),
+        ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart())),
+    ],
+    ids=["one moment", "four moments", "trail"],
+)
 def test_readme_examples_run_and_agree(
-    make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, frames: int
+    make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, observation: ObservationConfig
 ) -> None:
-    unpacked = unpack(
-        make_checkpoint(network, TaskConfig(observation=ObservationConfig.preset("improved", frames=frames))),
-        tmp_path,
-    )
+    unpacked = unpack(make_checkpoint(network, TaskConfig(observation=observation)), tmp_path)
     readme = (unpacked / "README.md").read_text()
     assert ("`next_memory`" in readme) == isinstance(network, GruNetwork)
     numpy_example, onnx_example = (part.split("```")[0] for part in readme.split("```python\n")[1:])

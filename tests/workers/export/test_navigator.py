@@ -12,6 +12,7 @@ from sim.config import (
     AckermannDrive,
     AnyDrive,
     ArenaConfig,
+    BearingPart,
     BurgerConfig,
     DifferentialDrive,
     DoubleMount,
@@ -19,14 +20,18 @@ from sim.config import (
     LidarConfig,
     ObservationConfig,
     OmnidirectionalDrive,
+    RangesPart,
     SingleMount,
     TaskConfig,
+    TrailPart,
 )
 from sim.envs.vector import NavigationVectorEnv
 from workers.export.bundle import export_checkpoint
 from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, State
 from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles
 from workers.export.ros2.mapless_navigator.policy import Policy, read_safetensors
+
+TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart()))
 
 
 @pytest.fixture
@@ -103,6 +108,7 @@ def test_what_is_too_near_is_measured_from_the_middle_of_the_body(
 @pytest.mark.parametrize(
     ("frames", "drive"),
     [
+        (0, DifferentialDrive()),  # sees its trail
         (1, DifferentialDrive()),
         (3, DifferentialDrive()),
         (1, DifferentialDrive(reverse=0.5)),
@@ -115,7 +121,7 @@ def test_it_commands_what_the_policy_does_in_the_simulator(
 ) -> None:
     task = TaskConfig(
         arena=ArenaConfig(name="complex"),
-        observation=ObservationConfig.preset("improved", frames=frames),
+        observation=ObservationConfig.preset("improved", frames=frames) if frames else TRAIL,
         robot=BurgerConfig(drive=drive),
     )
     exported = export_checkpoint(make_checkpoint(task=task))

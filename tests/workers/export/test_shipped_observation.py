@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.config import ArenaConfig, LidarConfig, ObservationConfig, TaskConfig
+from sim.config import ArenaConfig, BearingPart, LidarConfig, ObservationConfig, RangesPart, TaskConfig, TrailPart
 from sim.envs.vector import NavigationVectorEnv
 from sim.lidar import ray_angles as simulated_ray_angles
 from workers.export.bundle import export_checkpoint
 from workers.export.check import run_graph
 from workers.export.ros2.mapless_navigator.observation import Frames, Scan, observe, ray_angles, resample, wrap
-from workers.export.ros2.mapless_navigator.policy import Specification
+from workers.export.ros2.mapless_navigator.policy import PolicyFileError, Specification
+from workers.export.ros2.mapless_navigator.trail import Trail
 
 TASKS = {
     "improved": TaskConfig(arena=ArenaConfig(name="complex")),
@@ -81,6 +82,33 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
             last = np.zeros((1, 2), np.float32)
             starts += 1
     assert starts > 1
+
+
+def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path]) -> None:
+    listed = (RangesPart(batches=30), BearingPart(), TrailPart())
+    task = TaskConfig(arena=ArenaConfig(name="complex"), observation=ObservationConfig(parts=listed))
+    exported = export_checkpoint(make_checkpoint(task=task))
+    env = NavigationVectorEnv(task, 1, seed=5)
+    observations, _ = env.reset(seed=5)
+    rng, trail = np.random.default_rng(5), Trail(exported.specification)
+    ways = unequal = 0
+    for _ in range(300):
+        known = env.ranges, env.poses, env.targets, np.zeros((1, 2))
+        seen = {"trail": trail.see(env.ranges[0], env.poses[0])[None]}
+        made = observe(exported.specification, *known, added=seen)
+        # A crumb on the edge of a sector, or of what a ray meets, falls on either side.
+        unequal += int(np.abs(made - observations).max() > 1e-4)
+        scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets} | seen
+        by_scan = run_graph(exported.by_scan, {name: np.array(array, np.float32) for name, array in scene.items()})
+        np.testing.assert_allclose(by_scan["observation"], made, rtol=0, atol=1e-5)
+        observations, _, _, _, _ = env.step(rng.uniform((0.3, -1.0), (1.0, 1.0), (1, 2)).astype(np.float32))
+        if env.outcomes[0]:
+            trail.clear()
+            ways += 1
+    assert unequal <= 3
+    assert ways > 1
+    with pytest.raises(PolicyFileError, match="sees its trail"):
+        observe(exported.specification, *known)
 
 
 @pytest.mark.parametrize("name", TASKS)

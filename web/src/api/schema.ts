@@ -6275,10 +6275,10 @@ export interface components {
             /** Movers */
             movers?: components["schemas"]["MoversConfig-Input"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
+            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -6312,10 +6312,10 @@ export interface components {
             /** Movers */
             movers: components["schemas"]["MoversConfig-Output"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, or clutter and thickets mixed. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "warehouse";
+            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -7981,7 +7981,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"])[];
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"])[];
         };
         /**
          * ObservationConfig
@@ -7992,7 +7992,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"])[];
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"])[];
         };
         /**
          * OdometryConfig
@@ -11779,6 +11779,12 @@ export interface components {
              */
             arrival_distance: number;
             /**
+             * An arrival ends the episode
+             * @description The robot then starts anew, in another map where there are more; else it goes on to its next target.
+             * @default false
+             */
+            arrival_ends: boolean;
+            /**
              * Collision distance
              * @description Metres from the body's middle within which what a ray meets is a collision; touching it always is.
              * @default 0.2
@@ -11831,6 +11837,12 @@ export interface components {
              * @default 0.2
              */
             arrival_distance: number;
+            /**
+             * An arrival ends the episode
+             * @description The robot then starts anew, in another map where there are more; else it goes on to its next target.
+             * @default false
+             */
+            arrival_ends: boolean;
             /**
              * Collision distance
              * @description Metres from the body's middle within which what a ray meets is a collision; touching it always is.
@@ -12267,6 +12279,52 @@ export interface components {
              * @default -1
              */
             weight: number;
+        };
+        /**
+         * TrailPart
+         * @description Where it has been in this attempt: crumbs that it drops every 0.24 m, those in sight, as it remembers them.
+         */
+        "TrailPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "trail";
+            /**
+             * Sectors
+             * @description Of the full turn around it, three numbers each: how near, how many, how fresh.
+             * @default 30
+             */
+            sectors: number;
+        };
+        /**
+         * TrailPart
+         * @description Where it has been in this attempt: crumbs that it drops every 0.24 m, those in sight, as it remembers them.
+         */
+        "TrailPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "trail";
+            /**
+             * Sectors
+             * @description Of the full turn around it, three numbers each: how near, how many, how fresh.
+             * @default 30
+             */
+            sectors: number;
         };
         /**
          * TrainingConfig

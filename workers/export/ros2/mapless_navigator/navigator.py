@@ -12,6 +12,7 @@ import numpy as np
 
 from .observation import Frames, Reals, Scan, observe, refuse_unknown, resample, wrap
 from .policy import Floats, Policy, Specification
+from .trail import Trail
 
 
 class State(Enum):
@@ -113,7 +114,7 @@ class Navigator:
 
     def __init__(self, policy: Policy, safety: Safety, make_added: MakeAdded | None = None) -> None:
         if make_added is None:
-            refuse_unknown(policy.specification)
+            refuse_unknown(policy.specification, ("trail",))
         self._policy, self._safety, self._make_added = policy, safety, make_added
         self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
         self._yaws = (safety.sensor_yaw, safety.second_sensor_yaw)[: len(self._scans)]
@@ -124,6 +125,8 @@ class Navigator:
         self._too_near = False
         self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
         self._frames = Frames(policy.specification)
+        sees_trail = any(part.kind == "trail" for part in policy.specification.parts)
+        self._trail = Trail(policy.specification) if sees_trail else None
         self._memory = policy.memory(1)
 
     def set_scan(self, at: float, scan: Scan, lidar: int = 0) -> None:
@@ -138,7 +141,10 @@ class Navigator:
         self._velocities = velocities
 
     def set_goal(self, x: float, y: float) -> None:
-        """Where to go."""
+        """Where to go; further from the last goal than arriving allows, the way to it begins here."""
+        moved = self._goal is None or math.dist(self._goal, (x, y)) > self._safety.goal_tolerance
+        if self._trail is not None and moved:
+            self._trail.clear()
         self._goal, self._arrived = (x, y), False
 
     def cancel(self) -> None:
@@ -194,7 +200,10 @@ class Navigator:
             self._last_action[None].astype(float),
             self._speeds()[None].astype(float),
         )
-        moment = observe(specification, *known, added=self._make_added(*known) if self._make_added else None)
+        added = dict(self._make_added(*known)) if self._make_added else {}
+        if self._trail is not None:
+            added["trail"] = self._trail.see(ranges, pose)[None]
+        moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)
 
     def _speeds(self) -> Floats:

@@ -14,6 +14,7 @@
 | `heading`              | heading / pi                                                               |
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
+| `trail`                | where it has been, see `trail.py`: whoever calls brings them along         |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
@@ -69,13 +70,14 @@ def observe(
         targets: (n, 2) x, y in metres, in the same frame.
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
-        added: the numbers (n, size) of each part that an extension makes, by its kind; `manifest.json` explains them.
+        added: the numbers (n, size) of each part that an extension makes, by its kind, and those of `trail` (`Trail.see`);
+            `manifest.json` explains them.
 
     Returns:
         (n, numbers of the newest moment).
 
     Raises:
-        PolicyFileError: the policy sees a part of an extension, and its numbers are not given.
+        PolicyFileError: the policy sees its trail or a part of an extension, and the numbers are not given.
     """
     refuse_unknown(specification, () if added is None else tuple(added))
     pose, target = np.asarray(poses, np.float64), np.asarray(targets, np.float64)
@@ -110,12 +112,16 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
 
     Args:
         specification: the policy's.
-        known: kinds of extensions' parts that the caller makes.
+        known: kinds of the parts that the caller makes.
 
     Raises:
         PolicyFileError: there is such a part; says which.
     """
     for part in specification.parts:
+        if part.kind == "trail" and part.kind not in known:
+            raise PolicyFileError(
+                "this policy sees its trail: give what Trail.see tells to observe(added={'trail': [numbers]})"
+            )
         if part.added and part.kind not in known:
             raise PolicyFileError(
                 f"this policy sees {part.kind!r}, {part.size} number{'s'[: part.size != 1]} that code of the extension "

@@ -38,6 +38,7 @@ KINDS = (
     "heading",
     "heading_turn",
     "deviation",
+    "trail",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
@@ -64,6 +65,11 @@ class Part:
     def added(self) -> bool:
         """Whether an extension's code makes it, which this program does not have."""
         return "." in self.kind
+
+    @property
+    def brought(self) -> bool:
+        """Whether its numbers are no function of scan, pose, target and commands of one moment: whoever asks brings them."""
+        return self.added or self.kind == "trail"
 
 
 @dataclass(frozen=True)

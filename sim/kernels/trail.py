@@ -1,0 +1,108 @@
+"""Where a robot has been in its attempt: crumbs that it drops on its way, and which of them are in sight.
+
+A robot without a map that sees them can tell a door that it came through from one that it has not tried, as ants do
+(Svennebring and Koenig 2004, "Building Terrain-Covering Ant Robots").
+"""
+
+import math
+
+import numpy as np
+
+from sim.kernels.options import kernel
+from sim.kernels.records import TRAIL_PART
+from sim.kernels.sensing import FAST
+
+TRAIL_ROOM = 256
+"""Crumbs that a robot remembers, the newest ones."""
+
+TRAIL_SPACING = 0.24
+"""Metres from the last crumb at which the next one is dropped; no multiple of what a robot usually drives in a step."""
+
+SEEN_BEHIND = 0.1
+"""Metres by which a crumb may lie behind what its ray meets and count as in sight; nearer ones than this lie underfoot."""
+
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
+PI = np.float32(math.pi)
+TWO_PI = np.float32(2.0 * math.pi)
+_SPACING = np.float32(TRAIL_SPACING)
+_BEHIND = np.float32(SEEN_BEHIND)
+_SEVERAL = np.float32(5.0)
+_LATELY = np.float32(10.0)
+_LONG = np.float32(40.0)
+
+
+@kernel(fastmath=FAST)
+def _drop(i, x, y, robots):
+    """Let robot i drop a crumb where the last one is far enough; returns how many it has dropped."""
+    trail = robots.trail
+    dropped = robots.crumbs[i]
+    if dropped > 0:
+        last = (dropped - 1) % TRAIL_ROOM
+        dx = x - trail[i, last, 0]
+        dy = y - trail[i, last, 1]
+        if dx * dx + dy * dy < _SPACING * _SPACING:
+            return dropped
+    trail[i, dropped % TRAIL_ROOM, 0] = x
+    trail[i, dropped % TRAIL_ROOM, 1] = y
+    robots.crumbs[i] = dropped + 1
+    return dropped + 1
+
+
+@kernel(fastmath=FAST)
+def _ray_towards(angle, angles, yaw):
+    """The ray of the first LiDAR that points nearest to an angle against the heading; -1 where none does."""
+    rays = angles.shape[0]
+    turned = angle - yaw
+    if turned < angles[0] - math.pi / rays:
+        turned += 2.0 * math.pi
+    step = angles[1] - angles[0]
+    ray = np.int64(math.floor((turned - angles[0]) / step + 0.5))
+    if ray == rays and step * rays > 2.0 * math.pi - 1e-6:
+        return 0
+    return ray if 0 <= ray < rays else -1
+
+
+@kernel(fastmath=FAST)
+def see_trail(i, x, y, heading, robots, geometry, p):
+    """Drop a crumb and write what robot i sees of its trail, sector by sector from right to left, beginning behind it.
+
+    Args:
+        i: the robot.
+        x: metres, where it believes to be.
+        y: likewise.
+        heading: likewise, radians.
+        robots: `sim.kernels.bundles.Robots`; `trail`, `crumbs` and `observations` are written.
+        geometry: `sim.kernels.bundles.Geometry`.
+        p: a row of PARAMETERS.
+    """
+    dropped = _drop(i, x, y, robots)
+    trail = robots.trail
+    out = robots.observations
+    sectors = p.trail_sectors
+    nearness = p.part_places[TRAIL_PART]
+    count = nearness + sectors
+    freshness = count + sectors
+    for k in range(nearness, freshness + sectors):
+        out[i, k] = ZERO
+    out[i, freshness + sectors] = np.float32(dropped) / (np.float32(dropped) + _LONG)
+    cos = np.float32(math.cos(heading))
+    sin = np.float32(math.sin(heading))
+    # The oldest first, so that the newest of a sector is the last to say how fresh it is.
+    for number in range(max(0, dropped - TRAIL_ROOM), dropped):
+        dx = trail[i, number % TRAIL_ROOM, 0] - x
+        dy = trail[i, number % TRAIL_ROOM, 1] - y
+        squared = dx * dx + dy * dy
+        if squared < _BEHIND * _BEHIND or squared >= p.range * p.range:
+            continue
+        distance = np.float32(math.sqrt(squared))
+        angle = np.float32(math.atan2(cos * dy - sin * dx, cos * dx + sin * dy))
+        ray = _ray_towards(angle, geometry.ray_angles, p.mounts[0, 2])
+        if ray >= 0 and robots.ranges[i, ray] < distance - _BEHIND:
+            continue
+        k = min(np.int64((angle + PI) / TWO_PI * np.float32(sectors)), sectors - 1)
+        out[i, nearness + k] = max(out[i, nearness + k], ONE - distance / p.range)
+        out[i, count + k] += ONE
+        out[i, freshness + k] = _LATELY / (_LATELY + np.float32(dropped - 1 - number))
+    for k in range(count, freshness):
+        out[i, k] = out[i, k] / (out[i, k] + _SEVERAL)
