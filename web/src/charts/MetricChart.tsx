@@ -1,15 +1,19 @@
 /** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
 import { Checkbox, Group, Slider, Title } from '@mantine/core'
-import { type ReactNode, useMemo, useState } from 'react'
+import { lazy, type ReactNode, Suspense, useMemo, useState } from 'react'
 import { compact } from '../lib/format'
 import { type Horizontal, STEPS } from './axis'
-import { Chart } from './Chart'
 import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
 import { type ChartData, smoothed } from './series'
 import type { LogSwitch } from './view'
 
 const MOST_SMOOTHING = 0.99
+/** Below a chart, about. */
+const LEGEND_PX = 24
+/** Asked for at once, but nothing waits for it: the page is there before its charts. */
+const code = import('./Chart')
+const Chart = lazy(async () => ({ default: (await code).Chart }))
 
 interface MetricChartProps {
   title: string
@@ -97,20 +101,22 @@ export function MetricChart({
         </Group>
       </div>
       {data.x.length === 0 ? (
-        <div className={classes.empty} style={{ height: height + 24 }}>
+        <div className={classes.empty} style={{ height: height + LEGEND_PX }}>
           {empty}
         </div>
       ) : (
-        <Chart
-          data={shown}
-          label={title}
-          logarithmic={log?.on ?? false}
-          logX={logX}
-          height={height}
-          format={format}
-          x={x}
-          {...rest}
-        />
+        <Suspense fallback={<div style={{ height: height + LEGEND_PX }} />}>
+          <Chart
+            data={shown}
+            label={title}
+            logarithmic={log?.on ?? false}
+            logX={logX}
+            height={height}
+            format={format}
+            x={x}
+            {...rest}
+          />
+        </Suspense>
       )}
       {foot && <p className={classes.foot}>{foot}</p>}
     </div>

@@ -4,7 +4,7 @@ import type { Checkpoint } from '../api/types'
 import { byInterest } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
-import { ReplayDialog } from './replay/ReplayDialog'
+import { Replay } from './replay/Replay'
 
 /** Nothing of an evaluation ever changes. */
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -22,7 +22,7 @@ export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
     <>
       <EpisodesQuery query={episodes} onReplay={setEpisode} />
       {episode !== null && (
-        <ReplayDialog
+        <Replay
           of={`checkpoint:${checkpoint.id}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}

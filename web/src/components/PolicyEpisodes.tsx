@@ -6,7 +6,7 @@ import type { ShippedPolicy } from '../api/types'
 import { byInterest } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
-import { ReplayDialog } from './replay/ReplayDialog'
+import { Replay } from './replay/Replay'
 import { Panel } from './ui'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -42,7 +42,7 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
     >
       <EpisodesQuery key={suite} query={episodes} onReplay={setEpisode} />
       {episode !== null && (
-        <ReplayDialog
+        <Replay
           of={`policy:${policy.name}:${suite}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}

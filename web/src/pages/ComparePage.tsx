@@ -1,7 +1,7 @@
 /** Experiments side by side: curves, final figures with what stands behind them, and what differs in their settings. */
 import { Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useState } from 'react'
+import { lazy, useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
@@ -19,10 +19,13 @@ import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
 import { settingText } from '../form/settingText'
-import { MAX_COMPARED } from '../lib/comparison'
 import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
-import { Trainings, usePickerView } from '../workbench/Trainings'
+
+/** The list of trainings is larger than all else here, and most come with a choice made. */
+const Picker = lazy(async () => ({
+  default: (await import('../components/ComparisonPicker')).ComparisonPicker,
+}))
 
 /** Success rates that differ by less are equivalent, unless the address says otherwise. */
 const MARGIN = 0.02
@@ -78,59 +81,6 @@ export function ComparePage() {
       onBase={(next) => keep('base', next, chosen[0] ?? '')}
       onChange={() => setPicking(true)}
     />
-  )
-}
-
-interface PickerProps {
-  chosen: readonly string[]
-  onChoose: (ids: readonly string[]) => void
-  onStart: () => void
-  onDone: () => void
-}
-
-function Picker({ chosen, onChoose, onStart, onDone }: PickerProps) {
-  const tooMany = chosen.length > MAX_COMPARED
-  const [view, setView] = usePickerView()
-  return (
-    <Page
-      title="Compare"
-      below={
-        <Text size="sm" c="dimmed" mt={4}>
-          Tick the trainings to lay side by side.
-        </Text>
-      }
-      actions={
-        <Button
-          disabled={chosen.length === 0 || tooMany}
-          title={tooMany ? `At most ${MAX_COMPARED} can be laid side by side` : undefined}
-          onClick={onDone}
-        >
-          {chosen.length === 0 ? 'Compare' : `Compare ${chosen.length}`}
-        </Button>
-      }
-    >
-      <Trainings
-        view={view}
-        onView={setView}
-        ticked={chosen}
-        onTick={(ids) => {
-          onStart()
-          onChoose(ids)
-        }}
-        empty={
-          <Message
-            title="Nothing to compare yet"
-            actions={
-              <Button component={Link} to="/new">
-                New training
-              </Button>
-            }
-          >
-            Launch two trainings that differ in one setting, each with five seeds.
-          </Message>
-        }
-      />
-    </Page>
   )
 }
 

@@ -8,7 +8,7 @@ import { suiteTitle } from '../components/evaluations/choices'
 import { isOpen, Progress, titleOf } from '../components/evaluations/EvaluationTable'
 import { WaysMap } from '../components/evaluations/WaysMap'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
-import { ReplayDialog } from '../components/replay/ReplayDialog'
+import { Replay } from '../components/replay/Replay'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import { byInterest } from '../lib/episodes'
 import { percent, significant } from '../lib/format'
@@ -158,7 +158,7 @@ function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
         <EpisodesQuery query={episodes} onReplay={setEpisode} />
       </Panel>
       {episode !== null && (
-        <ReplayDialog
+        <Replay
           of={`evaluation:${evaluation.id}`}
           episode={episode}
           order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
