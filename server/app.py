@@ -46,6 +46,7 @@ from server.monitoring import endpoints as monitoring
 from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
 from server.monitoring.timing import RequestTimesMiddleware
+from server.outage import Outage
 from server.people import endpoints as people
 from server.people.oidc import endpoints as oidc
 from server.playground import endpoints as playground
@@ -157,7 +158,8 @@ def create_services(settings: Settings) -> Services:
     secrets = load_secrets(settings)
     database = Database(settings.resolved_database_url)
     upgrade(database, settings.database_wait_seconds)
-    files = FileStore(settings.resolved_files_url, settings.max_checkpoint_bytes)
+    url = settings.resolved_files_url
+    files = FileStore(url, settings.max_checkpoint_bytes, Outage(f"The store {url}"))
     arenas = ArenaStore(settings.arenas_dir)
     results = ResultStore(settings.replays_dir, settings.max_replay_bytes)
     return Services(settings=settings, secrets=secrets, database=database, files=files, arenas=arenas, results=results)

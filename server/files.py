@@ -51,13 +51,14 @@ class FileStore:
     Args:
         url: a directory, or an fsspec URL.
         max_bytes: of one archive.
+        outage: is told when the store goes and comes back; None where its errors are all that anybody needs.
 
     Raises:
         UnusableStoreError: the URL's kind of store is not known here.
         OSError: it can't be reached or made. All methods raise this too, `StoreAwayError` where it is no directory.
     """
 
-    def __init__(self, url: str, max_bytes: int) -> None:
+    def __init__(self, url: str, max_bytes: int, outage: Outage | None = None) -> None:
         try:
             self._filesystem, self._root = fsspec.core.url_to_fs(url)
         except (ImportError, ValueError) as error:
@@ -66,7 +67,7 @@ class FileStore:
         self._max_bytes = max_bytes
         self._limiter = CapacityLimiter(_THREADS)
         self._local = isinstance(self._filesystem, LocalFileSystem)
-        self._outage = Outage(f"The store {url}")
+        self._outage = outage
         with self._answering():
             self._filesystem.makedirs(self._root, exist_ok=True)
 
@@ -183,9 +184,11 @@ class FileStore:
         except Exception as error:
             if self._local or isinstance(error, (FileNotFoundError, ServiceError)):
                 raise
-            self._outage.gone(str(error))
+            if self._outage is not None:
+                self._outage.gone(str(error))
             raise StoreAwayError(f"The store {self._url} can't be used: {error}", retry_after=RETRY_AFTER) from error
-        self._outage.back()
+        if self._outage is not None:
+            self._outage.back()
 
     def _sync(self, file: IO[bytes]) -> None:
         file.flush()

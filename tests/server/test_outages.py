@@ -137,7 +137,7 @@ def test_a_broker_that_is_away_is_said_once_and_looked_for(caplog: pytest.LogCap
 
 def test_a_store_that_is_away_is_said_once(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     caplog.set_level(logging.INFO, "server")
-    store = FileStore("memory://outage", 1_000)
+    store = FileStore("memory://outage", 1_000, Outage("The store memory://outage"))
     there = store._filesystem.ls
 
     def nobody(*_: object, **__: object) -> None:

@@ -115,7 +115,12 @@ function Progress({ study }: { study: Study }) {
       {study.judgement && (
         <Text size="sm" component="div" data-testid="judgement">
           Judged on {study.judgement.seeds.length} seeds that the search never saw:{' '}
-          <Anchor component={Link} to={`/experiments/${study.judgement.experiment_id}`} inherit>
+          <Anchor
+            component={Link}
+            to={`/experiments/${study.judgement.experiment_id}`}
+            inherit
+            underline="always"
+          >
             trial {study.judgement.trial}
           </Anchor>{' '}
           {study.judgement.success ? (

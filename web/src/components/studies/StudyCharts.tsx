@@ -1,5 +1,5 @@
 /** What a study's trials show: how the best grew, which settings mattered, which values did well, and at what cost. */
-import { Text } from '@mantine/core'
+import { Box, Text } from '@mantine/core'
 import { useNavigate } from 'react-router'
 import { numbers } from '../../charts/axis'
 import { ParallelCoordinates } from '../../charts/ParallelCoordinates'
@@ -69,9 +69,9 @@ export function StudyCharts({ study, titles }: { study: Study; titles: readonly 
         ))}
       </div>
       <Panel title="What went together">
-        <div className={classes.parallel}>
+        <Box className={classes.parallel} role="region" aria-label="What went together" tabIndex={0}>
           <Parallel study={study} titles={titles} onOpen={open} />
-        </div>
+        </Box>
       </Panel>
     </>
   )
