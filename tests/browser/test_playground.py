@@ -52,7 +52,7 @@ def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) ->
     expect(page.get_by_test_id("outcome")).not_to_contain_text(f"{straight:g} s", timeout=SOON)
 
     ways = []
-    page.get_by_text("5×", exact=True).click()
+    # As fast as it drives, so that a busy machine sees it pass, too.
     page.get_by_role("button", name="Go on").click()
     while "0 arrived" in page.get_by_test_id("tally").inner_text():
         robot = context.request.get(address).json()["robot"]

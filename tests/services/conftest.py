@@ -7,6 +7,7 @@ import pytest
 import redis
 
 from tests.conftest import require_service
+from tests.services.ceph import ObjectStore, object_store
 from tests.services.stack import Service
 
 # Databases of a Redis on its standard port that tests may have; the first one that is empty is taken.
@@ -28,6 +29,13 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     service.start_worker()
     yield service
     service.close()
+
+
+@pytest.fixture(scope="session")
+def ceph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
+    """One for all tests: fsspec keeps the address that it was told first."""
+    with object_store(tmp_path_factory.mktemp("ceph")) as store:
+        yield store
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
@@ -22,16 +22,10 @@ from server.keeping.move_checkpoints import move_checkpoints
 from server.keeping.restore import restore
 from server.settings import Settings
 from tests.server.installations import Writer, blocks, everything, installation, quiet, store
-from tests.services.ceph import ObjectStore, object_store
+from tests.services.ceph import ObjectStore
 from tests.services.stack import ROLLOUT, Service, assert_one_unbroken_curve, until
 
 pytestmark = pytest.mark.services
-
-
-@pytest.fixture(scope="module")
-def ceph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
-    with object_store(tmp_path_factory.mktemp("ceph")) as ceph:
-        yield ceph
 
 
 @pytest.fixture

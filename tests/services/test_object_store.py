@@ -2,7 +2,7 @@
 
 import asyncio
 import hashlib
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
@@ -10,18 +10,12 @@ import pytest
 from server.errors import CorruptUploadError, NotFoundError
 from server.files import FileStore, StoredFile
 from server.ids import new_id
-from tests.services.ceph import ObjectStore, object_store
+from tests.services.ceph import ObjectStore
 from tests.services.stack import ROLLOUT, Service, assert_one_unbroken_curve, until
 
 MEGABYTE = 10**6
 
 pytestmark = pytest.mark.services
-
-
-@pytest.fixture(scope="module")
-def ceph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
-    with object_store(tmp_path_factory.mktemp("ceph")) as store:
-        yield store
 
 
 @pytest.fixture
