@@ -178,7 +178,8 @@ class World:
         self._looks_back = bool(self._added_parts) or bool(self._path_progress)
         starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
-        self._is_usual = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
+        usual_drive = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
+        self._is_usual = usual_drive and not sees_trail
         self._action_size = action_size
         self._parameters["replica_stride"] = len(self.arenas)
         self._parameters["closing"] = (

@@ -94,8 +94,6 @@ def observe(i, robots, geometry, p):
         distance = np.float32(math.sqrt(dx * dx + dy * dy))
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
     bearing = bearing_of(dx, dy, heading)
-    if p.part_places[TRAIL_PART] >= 0:
-        see_trail(i, robots.targets[i, 0] - dx, robots.targets[i, 1] - dy, heading, robots, geometry, p)
     if p.part_places[DISTANCE_PART] >= 0:
         if p.part_options[DISTANCE_PART]:
             out[i, p.part_places[DISTANCE_PART]] = distance / (distance + ONE)
@@ -122,10 +120,24 @@ def observe(i, robots, geometry, p):
         out[i, p.part_places[DEVIATION_PART]] = abs(bearing) / PI
 
 
+@kernel(fastmath=FAST)
+def observe_trail(i, robots, geometry, p):
+    """Write what robot i sees of its trail now; apart from `observe`, which it would slow for all who see none."""
+    if p.part_places[TRAIL_PART] < 0:
+        return
+    x = robots.poses[i, 0]
+    y = robots.poses[i, 1]
+    heading = robots.poses[i, 2]
+    if p.drifts:
+        x += np.float32(robots.drift[i, 0])
+        y += np.float32(robots.drift[i, 1])
+        heading = wrapped(heading + np.float32(robots.drift[i, 2]))
+    see_trail(i, x, y, heading, robots, geometry, p)
+
+
 @kernel(fastmath=FAST, inline="always")
-def observe_first(i, robots, geometry, p):
-    """Write what robot i sees first in an episode, which stands for what it saw earlier too."""
-    observe(i, robots, geometry, p)
+def repeat_first(i, robots, p):
+    """Let what robot i sees first in an episode stand for what it saw earlier too."""
     for part in range(p.parts):
         for age in range(1, p.part_frames[part]):
             for k in range(p.part_sizes[part]):

@@ -8,7 +8,7 @@ import numpy as np
 from sim.kernels.commands import twist
 from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
 from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
-from sim.kernels.observing import observe, observe_first
+from sim.kernels.observing import observe, observe_trail, repeat_first
 from sim.kernels.options import kernel
 from sim.kernels.random import uniform
 from sim.kernels.records import (
@@ -172,7 +172,9 @@ def reset_robots(which, poses, targets, robots, geometry, parameters, state):
         _sense_as_mounted(i, robots, geometry, p)
         if p.perceives:
             perceive(i, robots, p)
-        observe_first(i, robots, geometry, p)
+        observe(i, robots, geometry, p)
+        observe_trail(i, robots, geometry, p)
+        repeat_first(i, robots, p)
 
 
 @kernel(inline="always")
@@ -405,6 +407,8 @@ def _steps(*, usual: bool) -> Any:
                 _draw_target(i, robots, geometry, p)
                 find_itself(i, robots)
             observe(i, robots, geometry, p)
+            if not usual:
+                observe_trail(i, robots, geometry, p)
             if ended:
                 for k in range(robots.observations.shape[1]):
                     robots.final_observations[i, k] = robots.observations[i, k]
@@ -419,7 +423,10 @@ def _steps(*, usual: bool) -> Any:
                     _sense_as_mounted(i, robots, geometry, p)
                 if p.perceives:
                     perceive(i, robots, p)
-                observe_first(i, robots, geometry, p)
+                observe(i, robots, geometry, p)
+                if not usual:
+                    observe_trail(i, robots, geometry, p)
+                repeat_first(i, robots, p)
             if overwritten:
                 placed[count] = i
                 count += 1
@@ -429,7 +436,8 @@ def _steps(*, usual: bool) -> Any:
 
 
 step_usual_robots = _steps(usual=True)
-"""Everything that follows the physics of a step, for a differential drive whose only LiDAR looks ahead from its middle."""
+"""Everything that follows the physics of a step, for a differential drive whose only LiDAR looks ahead from its middle, and
+who sees no trail."""
 
 step_any_robots = _steps(usual=False)
-"""The same for every drive and every mount."""
+"""The same for every drive and every mount, trails included."""
