@@ -172,7 +172,7 @@ function Card({ title, isNew = false, view, error, config, action, children }: C
         {view ? arenaFacts(view) : ' '}
       </Text>
       {children}
-      <Group gap={6} mt="auto" grow>
+      <Group gap={6} mt="auto" grow preventGrowOverflow={false}>
         <Button component={Link} to={trainOn(config)} variant="default" size="xs">
           Train on it
         </Button>
