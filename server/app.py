@@ -14,6 +14,7 @@ from server.alerts.sending import keep_alerting
 from server.arenas import endpoints as gallery
 from server.arenas.store import ArenaStore
 from server.audit import endpoints as audit
+from server.bags import endpoints as bags
 from server.checkpoints import endpoints as checkpoints
 from server.checkpoints.archives import keep_swept
 from server.comparison import endpoints as comparison
@@ -36,6 +37,7 @@ from server.http.abandoned import AbandonedRequestsMiddleware
 from server.http.prefix import PathPrefixMiddleware
 from server.http.problems import UNAUTHORIZED, install_error_handlers
 from server.http.slow_clients import SlowClientMiddleware
+from server.http.switchboard import Switchboard
 from server.jobs import endpoints as jobs
 from server.jobs.results import ResultStore
 from server.leaderboards import endpoints as leaderboards
@@ -122,6 +124,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     field.router,
     suites.router,
     uploads.router,
+    bags.router,
     storage.router,
     curve_thinning.router,
     monitoring.router,
@@ -190,6 +193,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.readiness = ReadinessProbe(services)
     services.instruments.registry.register(StateCollector(services))
     pages.mount_pages(app, services.settings.web_dist, services.settings.path_prefix)
+    app.router.middleware_stack = Switchboard(app.router)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
     app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
@@ -248,5 +252,7 @@ def _routes(max_body_size: int | None) -> list[BaseRoute]:
     builder = FastAPI(responses=UNAUTHORIZED, max_body_size=max_body_size, openapi_url=None)
     for router in ROUTERS:
         check_permissions(router)
-        builder.include_router(router)
+        for route in router.routes:
+            # Each by itself, so that a request is compared with those only that it may be for.
+            builder.include_router(APIRouter(routes=[route]))
     return builder.routes

@@ -102,6 +102,12 @@ class UnusableArenaError(ServiceError):
     status = 422
 
 
+class UnusableBagError(ServiceError):
+    """A robot's recording can't be read, or lacks what is asked of it."""
+
+    status = 422
+
+
 class MisplacedError(ServiceError):
     """Something can't be where a playground's owner wants it, or is not there."""
 

@@ -78,7 +78,7 @@ class Lane:
 class Lanes:
     """The lanes of a service.
 
-    Filming an episode takes half a core's second. The database takes one writer at a time, so that a few threads serve all
+    The database takes one writer at a time, so that a few threads serve all
     workers.
     """
 

@@ -79,7 +79,8 @@ class Services:
         return {experiment_id: project_id for experiment_id, (project_id,) in found.items()}
 
 
-def _services(connection: HTTPConnection) -> Services:
+# A coroutine, as every dependency that only hands over what is there: plain functions run on a thread each.
+async def _services(connection: HTTPConnection) -> Services:
     services: Services = connection.app.state.services
     return services
 

@@ -65,6 +65,13 @@ class PpoConfig(Frozen):
         description="Divide rewards by a running standard deviation of the return.",
         json_schema_extra=ADVANCED,
     )
+    critic_sees: Literal["observation", "path"] = Field(
+        "observation",
+        title="Critic sees",
+        description="With the path it is told the shortest path's length and direction besides what the robot sees, and "
+        "judges better where targets are out of sight. The policy is told nothing.",
+        json_schema_extra=ADVANCED,
+    )
 
     @field_validator("rollout_steps")
     @classmethod

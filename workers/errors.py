@@ -11,6 +11,7 @@ WorkerError (a sim.errors.MaplessError)
 ├── FrameError             bytes are no frame of the live view
 ├── ExportError            a policy cannot be taken to another format
 ├── UnknownPolicyError     there is no such shipped policy
+├── BagError               a robot's recording can't be read, or lacks what is needed
 ├── EpisodesTooLongError   episodes do not fit into memory to be replayed
 ├── LocalError             something is wrong with this worker or its machine, not with the run
 │   ├── NoDeviceError          it does not have the device that the training asks for
@@ -73,6 +74,10 @@ class ExportError(WorkerError):
 
 class UnknownPolicyError(WorkerError):
     """There is no shipped policy of that name, or none that was measured on that suite."""
+
+
+class BagError(WorkerError):
+    """A robot's recording can't be read, or lacks what is asked of it."""
 
 
 class ForeignPolicyError(WorkerError):

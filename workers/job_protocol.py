@@ -1,11 +1,14 @@
 """What a job worker and the server say to one another: bodies of HTTP requests (pydantic only).
 
-A *job* is what somebody asks for beside trainings: a view of a finished policy, a replay, an export, an evaluation. It is
-claimed, leased and fenced as a run is (`workers.protocol`); what comes out of it is one file, checked by size and SHA-256.
+A *job* is what somebody asks for beside trainings: a view of a finished policy, a replay, a film, an export, an evaluation,
+the reading of a robot's recording. It is claimed, leased and fenced as a run is (`workers.protocol`); what comes out is
+one file, checked by size and SHA-256.
 
 worker                                            server
   | POST  /jobs/claim            JobClaimRequest ---> |  waits for a job to come; 204 where none did
   | GET   /jobs/{id}/archive                     ---> |  the policy's archive, where the job has one
+  | GET   /jobs/{id}/recordings/{n}              ---> |  of a film: what its n-th policy did
+  | GET   /jobs/{id}/bag                         ---> |  the robot's recording, where the job reads one
   | POST  /jobs/{id}/report      JobReport       ---> |  renews the lease; 409 where the job is no longer wanted
   | POST  /jobs/{id}/frames      frames          ---> |  of a view, each after its length; answered as a report
   | POST  /jobs/{id}/seen        PlaySeen        ---> |  of a playground; answered as a report
@@ -19,14 +22,16 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from sim.config import AnyArenaConfig, ArenaFile, Frozen, TaskConfig
+from workers.bags.results import TopicChoice
+from workers.film_protocol import Film
 from workers.play_protocol import PlayOrders
 from workers.protocol import Extensions, Text, WorkerName
 from workers.reporting import EvaluationResult, Figure, WatchRequest
 
-JobKind = Literal["view", "play", "replay", "export", "evaluate"]
+JobKind = Literal["view", "play", "replay", "film", "bag", "export", "evaluate"]
 """What may be asked for; those that somebody waits for come first."""
 
-KINDS: tuple[JobKind, ...] = ("view", "play", "replay", "export", "evaluate")
+KINDS: tuple[JobKind, ...] = ("view", "play", "replay", "film", "bag", "export", "evaluate")
 """In the order in which they are taken up: who looks never waits behind what goes on unwatched."""
 
 Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[a-z0-9-]+$")]
@@ -172,11 +177,37 @@ class ReplayJob(Frozen):
     suite: SuiteChoice = OWN_SUITE
 
 
+class FilmJob(Frozen):
+    """Make a film of recordings that are kept (`workers.replays.films`)."""
+
+    kind: Literal["film"] = "film"
+    film: Film
+
+
 class ExportJob(Frozen):
     """The deployment bundle, compared with torch."""
 
     kind: Literal["export"] = "export"
     policy: ArchivedPolicy
+
+
+class BagJob(Frozen):
+    """Read a robot's recording; the file is a `BagReading`, or with a policy a `BagBeside`, as JSON.
+
+    Attributes:
+        bag: its id.
+        bag_sha256: of its file.
+        topics: that are read.
+        policy: that is held beside what the robot did; None to read the recording alone.
+        title: of the policy.
+    """
+
+    kind: Literal["bag"] = "bag"
+    bag: Identifier
+    bag_sha256: str
+    topics: TopicChoice = TopicChoice()
+    policy: PlayedPolicy | None = None
+    title: str = ""
 
 
 class EvaluateJob(Frozen):
@@ -189,8 +220,8 @@ class EvaluateJob(Frozen):
 
 WatchedJob = ViewJob | PlayJob
 """What lasts for as long as somebody looks, and brings no file."""
-JobSpec = Annotated[ViewJob | PlayJob | ReplayJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
-JOB_SPEC: TypeAdapter[ViewJob | PlayJob | ReplayJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
+JobSpec = Annotated[ViewJob | PlayJob | ReplayJob | FilmJob | BagJob | ExportJob | EvaluateJob, Field(discriminator="kind")]
+JOB_SPEC: TypeAdapter[ViewJob | PlayJob | ReplayJob | FilmJob | BagJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
 
 
 class Measurement(Frozen):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
@@ -160,7 +161,7 @@ class _Received:
         request = event["request"]
         assert isinstance(request, Mapping)
         # The change stream never ends, and the status is asked for every few seconds.
-        if not str(request["url"]).endswith(("/api/events", "/api/status")):
+        if urlsplit(str(request["url"])).path not in ("/api/events", "/api/status"):
             self._open[str(event["requestId"])] = True
             self._last = time.monotonic()
 

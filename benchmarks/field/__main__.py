@@ -4,7 +4,8 @@ python -m benchmarks.field --check                            # all of it: hours
 python -m benchmarks.field --size 100 --only families --families maze rooms
 python -m benchmarks.field --only people --baselines "dynamic window" MPPI --policies
 python -m benchmarks.field --seeds seeds                      # seeds/1/clutter/policy.zip ...: other training seeds, too
-python -m benchmarks.field --minutes 0 --write                # what is kept goes into the package and the docs
+python -m benchmarks.field --minutes 0 --write                # what is kept goes into the package and the docs, where what
+                                                              # is kept nowhere any more stays as it is
 
 Every success stands with the exact 95 % interval over scenarios, that of a policy with several training seeds with one over
 seeds. Each scenario of a family has a map of its own, of seeds that no training, no suite and no choice of a recipe has met.
@@ -95,6 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found = rows(iter(kept))
     measured = Field(command="python -m benchmarks.field", date=datetime.now(UTC).date().isoformat(), rows=found)
     if options.write:
+        measured = measured.in_place_of(Field.model_validate_json(FIELD.read_bytes()))
         FIELD.write_text(measured.model_dump_json(indent=1) + "\n")
         DOCS.write_text(written(DOCS.read_text(), measured))
     print(tables(measured))

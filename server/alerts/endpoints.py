@@ -24,7 +24,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/alerts", tags=["alerts"])
 
 
-def _service(services: ServicesDep) -> AlertService:
+async def _service(services: ServicesDep) -> AlertService:
     return AlertService(services)
 
 

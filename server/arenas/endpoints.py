@@ -24,7 +24,7 @@ from sim.config import ArenaConfig, ArenaName
 router = APIRouter(prefix="/api/arenas", tags=["arenas"])
 
 
-def _service(services: ServicesDep) -> ArenaService:
+async def _service(services: ServicesDep) -> ArenaService:
     return ArenaService(services)
 
 

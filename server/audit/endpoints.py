@@ -19,7 +19,7 @@ router = APIRouter(prefix="/api/audit", tags=["audit"])
 _CSV: Responses = {200: {"content": {"text/csv": {"schema": {"type": "string"}}}}}
 
 
-def _filter(
+async def _filter(
     actor: Annotated[str | None, Query(max_length=120)] = None,
     action: Annotated[str | None, Query(max_length=40, description="KIND.DEED, or all of a KIND.")] = None,
     target: Annotated[str | None, Query(max_length=64, description="Id of what it was done to.")] = None,

@@ -22,7 +22,7 @@ _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "str
 LISTED_FROM = ("experiments", "checkpoints", "evaluations")
 
 
-def _service(services: ServicesDep) -> CheckpointService:
+async def _service(services: ServicesDep) -> CheckpointService:
     return CheckpointService(services)
 
 

@@ -14,7 +14,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/experiments/{experiment_id}/curve-thinning", tags=["storage"])
 
 
-def _service(services: ServicesDep) -> CurveThinningService:
+async def _service(services: ServicesDep) -> CurveThinningService:
     return CurveThinningService(services)
 
 

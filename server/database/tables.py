@@ -612,6 +612,20 @@ class UploadedPolicy(Base):
     graph: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
 
 
+class Bag(Base):
+    """What a robot recorded, as somebody uploaded it: MCAP, rosbag2's SQLite, or an archive of these."""
+
+    __tablename__ = "bags"
+
+    id: Mapped[str] = mapped_column(String(16), primary_key=True)
+    project_id: Mapped[str] = mapped_column(ForeignKey("projects.id"), index=True)
+    name: Mapped[str] = mapped_column(String(120))
+    sha256: Mapped[str] = mapped_column(String(64))
+    size: Mapped[int] = mapped_column(Integer)
+    created_at: Mapped[float] = mapped_column(Float, default=time.time, index=True)
+    content: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+
+
 class OwnSuite(Base):
     """Scenarios that people put together: `sha256` and `name` of arenas that bring a start and a target."""
 

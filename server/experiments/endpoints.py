@@ -24,7 +24,7 @@ from workers.presets import PRESETS
 router = APIRouter(tags=["experiments"])
 
 
-def _service(services: ServicesDep) -> ExperimentService:
+async def _service(services: ServicesDep) -> ExperimentService:
     return ExperimentService(services)
 
 

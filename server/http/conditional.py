@@ -65,7 +65,7 @@ def _ordered(made_of: object) -> object:
     return sorted(made_of) if isinstance(made_of, frozenset) else made_of
 
 
-def _kept(
+async def _kept(
     response: Response,
     tags: Annotated[
         str | None, Header(alias="If-None-Match", max_length=1_000, description="Tags of answers that one has.")

@@ -47,13 +47,13 @@ class Part(Window):
         self.response.headers[TOTAL_HEADER] = str(total)
 
 
-def _window(
+async def _window(
     limit: Annotated[int, Query(ge=1, le=MAX_PAGE, description="Items at most.")] = _USUAL_PAGE, offset: Offset = 0
 ) -> Window:
     return Window(limit, offset)
 
 
-def _part(
+async def _part(
     response: Response,
     limit: Annotated[int, Query(ge=1, le=MAX_PART, description="Items at most.")] = MAX_PART,
     offset: Offset = 0,

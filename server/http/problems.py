@@ -31,6 +31,10 @@ REPLAY_FAILED: Responses = {
     500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
     503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
 }
+BAG_UNUSABLE: Responses = {
+    422: {"model": ErrorBody, "description": "Can't be read, or lacks what is asked of it: the reason is in the detail"},
+    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
+}
 NOT_INSTALLED: Responses = {501: {"model": ErrorBody, "description": "Needs a part that is not installed"}}
 BUSY: Responses = {
     503: {"model": ErrorBody, "description": "Too many wait already: Retry-After says when to come again"},

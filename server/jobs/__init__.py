@@ -1,1 +1,1 @@
-"""Jobs: what people ask for beside trainings, done by workers. Views, replays, exports, evaluations."""
+"""Jobs: what people ask for beside trainings, done by workers. Views, replays, films, exports, evaluations."""

@@ -2,7 +2,7 @@
 
 from workers.job_protocol import JobKind
 
-_SUFFIXES: dict[JobKind, str] = {"replay": ".npz", "export": ".zip"}
+_SUFFIXES: dict[JobKind, str] = {"replay": ".npz", "bag": ".json", "export": ".zip"}
 
 
 def result_name(kind: JobKind, key: str) -> str:

@@ -25,7 +25,7 @@ def needed_by(session: Session, spec: Mapping[str, Any]) -> tuple[UsedExtension,
 
 def needed_by_each(session: Session, specs: Sequence[Mapping[str, Any]]) -> list[tuple[UsedExtension, ...]]:
     """The same of several, in one query."""
-    ids = {spec["policy"]["id"] for spec in specs if spec["policy"]["source"] == "checkpoint"}
+    ids = {policy["id"] for spec in specs if (policy := spec.get("policy")) and policy["source"] == "checkpoint"}
     query = (
         select(tables.Checkpoint.id, tables.Experiment.training)
         .join(tables.Run, tables.Run.id == tables.Checkpoint.run_id)
@@ -38,12 +38,12 @@ def needed_by_each(session: Session, specs: Sequence[Mapping[str, Any]]) -> list
 
 def _needed(spec: Mapping[str, Any], trainings: Mapping[str, Mapping[str, Any]]) -> tuple[UsedExtension, ...]:
     needed: dict[str, UsedExtension] = {}
-    policy, suite = spec["policy"], spec.get("suite") or {}
+    policy, suite = spec.get("policy"), spec.get("suite") or {}
     family, dot, _ = str((suite.get("arena") or {}).get("name", "")).partition(".")
     for extension in installed().extensions if dot else ():
         if extension.name == family:
             needed[family] = UsedExtension(name=family, version=extension.version, source=extension.source)
-    if policy["source"] == "checkpoint":
+    if policy and policy["source"] == "checkpoint":
         used = _USED.validate_python(trainings.get(policy["id"], {}).get("extensions", ()))
         needed |= {extension.name: extension for extension in used}
     return tuple(needed[name] for name in sorted(needed))

@@ -3,18 +3,21 @@
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from typing import BinaryIO
 
 from pydantic import ValidationError
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from server.arenas.store import ArenaStore
+from server.bags.repository import BagRepository
 from server.database import tables
 from server.errors import BusyError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository
 from server.http.paging import Window
 from server.ids import new_id
 from server.jobs.asked import Asked
+from server.jobs.names import result_name
 from server.jobs.needed import needed_by, needed_by_each
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.schemas import JobPage
@@ -30,9 +33,11 @@ from workers.job_protocol import (
     JOB_SPEC,
     KINDS,
     ArenaSuite,
+    BagJob,
     BaselineName,
     CheckpointPolicy,
     EvaluateJob,
+    FilmJob,
     JobClaim,
     JobClaimRequest,
     JobEnd,
@@ -207,15 +212,52 @@ class JobService:
             FencedError: the attempt is over.
             NotFoundError: the archive is gone.
         """
-        policy = JOB_SPEC.validate_python(self.current(job_id, attempt).spec).policy
+        spec = JOB_SPEC.validate_python(self.current(job_id, attempt).spec)
+        if isinstance(spec, FilmJob):
+            raise NotFoundError("A film is made of recordings: it has no archive.")
+        policy = spec.policy
         if isinstance(policy, CheckpointPolicy):
             return self._services.files.read(policy.id)
         if isinstance(policy, UploadedPolicy):
             with self._services.database.read() as session:
                 return iter([UploadRepository(session).graph(policy.id)])
+        if policy is None:
+            raise NotFoundError("This job needs no policy.")
         if isinstance(policy, BaselineName):
             raise NotFoundError(f"The baseline {policy.name} has no archive.")
         return iter([find(policy.name).archive.read_bytes()])
+
+    def recording(self, job_id: str, attempt: int, number: int) -> BinaryIO:
+        """What a film's policy of that number did, open: removed meanwhile, it can be read to its end.
+
+        Raises:
+            FencedError: the attempt is over.
+            NotFoundError: it is not kept any more, or the job needs none of that number.
+        """
+        spec = JOB_SPEC.validate_python(self.current(job_id, attempt).spec)
+        if not isinstance(spec, FilmJob) or not 0 <= number < len(spec.film.policies):
+            raise NotFoundError(f"Job {job_id} needs no recording {number}.")
+        policy = spec.film.policies[number]
+        path = self._services.results.find(result_name("replay", policy.recording))
+        try:
+            if path is not None:
+                return path.open("rb")
+        except FileNotFoundError:
+            pass  # it went in this moment
+        raise NotFoundError(f"What {policy.title} did is not kept any more.")
+
+    def bag(self, job_id: str, attempt: int) -> bytes:
+        """The robot's recording that the job reads.
+
+        Raises:
+            FencedError: the attempt is over.
+            NotFoundError: the recording was deleted, or the job reads none.
+        """
+        spec = JOB_SPEC.validate_python(self.current(job_id, attempt).spec)
+        if not isinstance(spec, BagJob):
+            raise NotFoundError("This job reads no recording.")
+        with self._services.database.read() as session:
+            return BagRepository(session).get(spec.bag).content
 
     def end(self, job_id: str, attempt: int, end: JobEnd) -> None:
         """The worker has said its last word; said again, because the answer got lost, it changes nothing.

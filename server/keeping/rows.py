@@ -49,8 +49,8 @@ _TYPES: dict[Kind, TypeEngine[Any]] = {
     "json": Text(),
 }
 _ALEMBICS = "alembic_version"
-# An uploaded policy has up to 16 MiB.
-_READ_AT_ONCE = 16
+# A robot's recording has up to 32 MiB.
+_READ_AT_ONCE = 8
 _WRITE_AT_ONCE = 500
 _WRITE_BYTES = 4 * 2**20
 _MODULUS = 2**256

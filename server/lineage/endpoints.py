@@ -15,7 +15,7 @@ from server.services import ServicesDep
 router = APIRouter(tags=["lineage"])
 
 
-def _service(services: ServicesDep) -> LineageService:
+async def _service(services: ServicesDep) -> LineageService:
     return LineageService(services)
 
 

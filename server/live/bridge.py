@@ -19,7 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from server.live.page import VISER_PROTOCOL
-from server.scene.gate import KEY
+from workers.scene.gate import KEY
 
 # A camera's pose takes about 300 bytes.
 _MAX_MESSAGE = 4096

@@ -17,11 +17,11 @@ from server.live.hub import TooManyViewsError
 from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
 from server.live.watched import CHECKPOINT_PREFIX, Watched, checkpoint_view, policy_view, watched
-from server.scene.themes import Theme
 from server.security.permissions import SIGNED_IN, view
 from server.security.principal import principal_of
 from server.services import Services, ServicesDep
 from sim.errors import ArenaError
+from workers.scene.themes import Theme
 
 router = APIRouter(tags=["live"])
 

@@ -21,14 +21,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from server.live.scoreboard import Score
 from server.live.settings import RECEIVING_SECONDS, LiveSettings, LiveStatus
-from server.scene.themes import Theme
 from sim.config import TaskConfig
 from sim.errors import MaplessError
 from workers.frames import Frame
 from workers.reporting import WatchRequest
+from workers.scene.themes import Theme
 
 if TYPE_CHECKING:
-    from server.scene.stage import Stage
+    from workers.scene.stage import Stage
 
 _T = TypeVar("_T")
 

@@ -6,7 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from server.scene.themes import Theme
+from workers.scene.themes import Theme
 
 VISER_PROTOCOL = f"viser-v{importlib.metadata.version('viser')}"
 """The WebSocket sub-protocol by which viser's client and server know that they are of one version."""

@@ -5,8 +5,8 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel
 
-from server.scene.continuity import continues, ended
 from workers.frames import Frame, ViewMode
+from workers.scene.continuity import continues, ended
 
 # More robots than this are summed up rather than listed.
 _LISTED = 8

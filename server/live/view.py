@@ -7,14 +7,14 @@ import time
 from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
 from server.live.scoreboard import Score, Scoreboard, ViewState
 from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
-from server.scene.camera import CameraRig
-from server.scene.quiet import start_viser, stop_viser
-from server.scene.scene import Scene
-from server.scene.stage import Stage
-from server.scene.themes import Theme
 from sim.config import MAX_MOVERS, ArenaPool, TaskConfig
 from workers.errors import FrameError
 from workers.frames import Frame
+from workers.scene.camera import CameraRig
+from workers.scene.quiet import start_viser, stop_viser
+from workers.scene.scene import Scene
+from workers.scene.stage import Stage
+from workers.scene.themes import Theme
 
 logger = logging.getLogger(__name__)
 

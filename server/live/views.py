@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING
 
 from server.live.hub import View
 from server.live.settings import LiveSettings
-from server.scene.themes import Theme
 from sim.config import TaskConfig
+from workers.scene.themes import Theme
 
 if TYPE_CHECKING:
-    from server.scene.stage import Stage
+    from workers.scene.stage import Stage
 
 
 def open_view(task: TaskConfig, theme: Theme, settings: LiveSettings, stage: "Stage | None" = None) -> View:

@@ -13,11 +13,11 @@ from server.playground.registry import PLAY_PREFIX
 from server.policies.service import find, shipped_hash
 from server.runs.repository import RunRepository
 from server.runs.states import FINISHED
-from server.scene.stage import Stage
 from server.services import Services
 from sim.arenas import with_maps_of
 from sim.config import TaskConfig
 from workers.job_protocol import CheckpointPolicy, ShippedPolicyName, ViewJob
+from workers.scene.stage import Stage
 
 POLICY_PREFIX = "policy-"
 """Of what is no run: no run's id has a hyphen."""

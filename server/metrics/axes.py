@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator
 from hashlib import blake2b
 
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
@@ -10,6 +12,8 @@ from server.database import tables
 from server.metrics.points import Axis, Points
 
 _AXES_A_QUERY = 500
+# Decoded ones that are remembered within a transaction: those of a run's last chunks are asked for again and again.
+_MAX_REMEMBERED = 64
 
 
 class AxisRepository:
@@ -19,6 +23,7 @@ class AxisRepository:
         self._session = session
         # Those that this transaction knows to be there.
         self._kept: set[tuple[str, str]] = set()
+        self._decoded: dict[tuple[str, str], Axis] = {}
 
     def keep(self, run_id: str, points: Points) -> str:
         """The id of the axis on which the points lie, which is written where it is new."""
@@ -39,6 +44,16 @@ class AxisRepository:
             else:
                 yield chunk, Points.decode_parts(axes[chunk.run_id, chunk.axis], chunk.points, chunk.count)
 
+    def steps(self, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, NDArray[np.int64]]]:
+        """The chunks with the steps of their points, in order, without a look at any value."""
+        found = list(chunks)
+        axes = self._axes({(chunk.run_id, chunk.axis) for chunk in found if chunk.axis is not None})
+        for chunk in found:
+            if chunk.axis is None:
+                yield chunk, Points.decode(chunk.points, chunk.count).steps
+            else:
+                yield chunk, axes[chunk.run_id, chunk.axis].steps[: chunk.count]
+
     def drop_unused(self, run_id: str) -> None:
         """Forget the axes of a run on which nothing lies any more."""
         used = select(tables.MetricChunk.axis).where(
@@ -50,12 +65,15 @@ class AxisRepository:
 
     def _axes(self, keys: set[tuple[str, str]]) -> dict[tuple[str, str], Axis]:
         axis = tables.MetricAxis
-        wanted = sorted(keys)
-        axes: dict[tuple[str, str], Axis] = {}
+        axes = {key: self._decoded[key] for key in keys if key in self._decoded}
+        wanted = sorted(keys - axes.keys())
         for start in range(0, len(wanted), _AXES_A_QUERY):
             some = wanted[start : start + _AXES_A_QUERY]
             query = select(axis.run_id, axis.id, axis.data).where(tuple_(axis.run_id, axis.id).in_(some))
             axes |= {(run_id, key): Axis.decode(data) for run_id, key, data in self._session.execute(query)}
+        # An axis is called by what it is: what is remembered is true for as long as it is asked for.
+        for key in wanted[: _MAX_REMEMBERED - len(self._decoded)]:
+            self._decoded[key] = axes[key]
         return axes
 
 

@@ -117,6 +117,18 @@ class Buckets:
         values = (each.astype("<f4").tobytes() for each in (self.low, self.mean, self.high))
         return zlib.compress(b"".join((steps, *counts, *values)), _LEVEL)
 
+    @staticmethod
+    def steps_in(data: bytes, count: int) -> NDArray[np.int64]:
+        """The steps of the first `count` of the buckets that `encode` wrote, which stand before all else.
+
+        Raises:
+            ValueError: `data` holds fewer.
+        """
+        raw = zlib.decompressobj().decompress(data, 8 * count) if count else b""
+        if len(raw) < 8 * count:
+            raise ValueError(f"{len(raw)} bytes are not the steps of {count} buckets")
+        return np.cumsum(np.frombuffer(raw, "<i8"))
+
     @classmethod
     def decode(cls, data: bytes, count: int) -> "Buckets":
         """The first `count` of the buckets that `encode` wrote.

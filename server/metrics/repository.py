@@ -133,9 +133,8 @@ class MetricRepository:
         straddling = select(tables.MetricChunk).where(
             tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step > step
         )
-        for chunk, points in self._axes.decoded(self._session.scalars(straddling)):
+        for chunk, kept in self._axes.steps(self._session.scalars(straddling)):
             # Counting them out is enough: packing a run's last chunks anew would take many times as long.
-            kept = points.steps
             chunk.count = int(np.searchsorted(kept, step, side="right"))
             chunk.last_step = int(kept[chunk.count - 1])
         self._session.flush()

@@ -33,7 +33,7 @@ class SummaryRepository:
         for summary in self.of([run_id]):
             if summary.last_step <= step:
                 continue
-            steps = Buckets.decode(summary.data, summary.buckets).steps
+            steps = Buckets.steps_in(summary.data, summary.buckets)
             summary.buckets = int(np.searchsorted(steps, step, side="right"))
             if summary.buckets == 0:
                 self._session.delete(summary)

@@ -47,19 +47,19 @@ _NO_CONTENT = status.HTTP_204_NO_CONTENT
 Browser = Annotated[str, Header(alias="User-Agent", include_in_schema=False)]
 
 
-def _accounts(services: ServicesDep) -> AccountService:
+async def _accounts(services: ServicesDep) -> AccountService:
     return AccountService(services)
 
 
-def _people(services: ServicesDep) -> PeopleService:
+async def _people(services: ServicesDep) -> PeopleService:
     return PeopleService(services)
 
 
-def _invitations(services: ServicesDep) -> InvitationService:
+async def _invitations(services: ServicesDep) -> InvitationService:
     return InvitationService(services)
 
 
-def _sign_in(services: ServicesDep) -> SignInService:
+async def _sign_in(services: ServicesDep) -> SignInService:
     return SignInService(services)
 
 

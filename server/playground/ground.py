@@ -26,7 +26,6 @@ from server.playground.schemas import (
     Standing,
     Thing,
 )
-from server.scene.stage import StagePicture
 from sim.arenas import free_distance
 from sim.arenas.document import to_arena
 from sim.config import ArenaFile, Box, Circle, ImportedArenaConfig, Start, Target, TaskConfig
@@ -45,6 +44,7 @@ from workers.play_protocol import (
     PutTarget,
     Steps,
 )
+from workers.scene.stage import StagePicture
 
 _T = TypeVar("_T")
 _DECIMALS = 3

@@ -16,7 +16,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
 
-def _service(services: ServicesDep) -> ProjectService:
+async def _service(services: ServicesDep) -> ProjectService:
     return ProjectService(services)
 
 

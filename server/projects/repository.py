@@ -91,6 +91,11 @@ class ProjectRepository:
         row = tables.UploadedPolicy
         return self._grouped(select(row.id, row.project_id).where(row.id.in_(upload_ids)))
 
+    def of_bags(self, bag_ids: Collection[str]) -> dict[str, set[str]]:
+        """The project of each of the robots' recordings that there are, as a set."""
+        row = tables.Bag
+        return self._grouped(select(row.id, row.project_id).where(row.id.in_(bag_ids)))
+
     def of_studies(self, study_ids: Collection[str]) -> dict[str, set[str]]:
         """The project of each of the studies that there are, as a set."""
         row = tables.Study

@@ -15,7 +15,7 @@ from server.services import ServicesDep
 router = APIRouter(tags=["queue"])
 
 
-def _service(services: ServicesDep) -> QueueService:
+async def _service(services: ServicesDep) -> QueueService:
     return QueueService(services)
 
 

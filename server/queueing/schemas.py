@@ -47,7 +47,7 @@ class QueuePage(Page[WaitingRun]):
     """A part of the queue, in the order of its turns."""
 
     hidden: int = Field(description="Runs that wait in projects that one may not see.")
-    jobs: int = Field(description="Views, replays, exports and evaluations that wait for a worker of jobs.")
+    jobs: int = Field(description="Views, replays, films, exports and evaluations that wait for a worker of jobs.")
 
 
 class Priority(Schema):

@@ -1,27 +1,29 @@
 """Routes of replays: driving a scenario again by one policy or several, its numbers, and the page that plays it."""
 
-import asyncio
 from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request
-from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
 from server.http.paging import PartDep
 from server.http.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
 from server.live.page import HEADERS
 from server.replays import lapse, repository, service
-from server.replays.recordings import progress_of, recording_of
+from server.replays.films import episode_film, film_of, film_progress
+from server.replays.page import replay_page
+from server.replays.recordings import progress_of, recordings_of
 from server.replays.references import Reference, references
-from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, Lapse, Replay, ReplayProgress
+from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, FilmProgress, Lapse, Replay, ReplayProgress
 from server.replays.service import Part
 from server.replays.subject import Subject
 from server.replays.subjects import subject_of
-from server.scene.themes import Theme
 from server.security.permissions import SIGNED_IN, VIEW_REPLAYED, view
 from server.security.principal import PrincipalDep
 from server.services import Services, ServicesDep
+from workers.film_protocol import FilmForm
+from workers.scene.themes import Theme
 
 router = APIRouter(tags=["replays"])
 
@@ -53,18 +55,8 @@ class Replayed:
         """
         subjects = await self.subjects()
         service.check_episode(subjects, episode)
-        tasks = [asyncio.create_task(recording_of(self._services, subject)) for subject in subjects]
-        try:
-            recordings = await asyncio.gather(*tasks)
-        finally:
-            # Where one fails, or the client has left, nobody waits for the others.
-            for task in tasks:
-                task.cancel()
+        recordings = await recordings_of(self._services, subjects)
         return [Part(*each) for each in zip(self.references, subjects, recordings, strict=True)]
-
-    async def all(self) -> list[Part]:
-        """As `parts`, whichever episode it is about."""
-        return await self.parts(0)
 
     async def one(self, episode: int) -> Replay:
         """An episode of the first of them."""
@@ -144,15 +136,54 @@ async def replay_series(replayed: ReplayedDep, episode: int, services: ServicesD
 
 @router.get(
     "/api/replays/{subjects}/{episode}/mcap",
-    response_class=Response,
+    response_class=FileResponse,
     responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"application/octet-stream": {}}}},
     dependencies=[VIEW_REPLAYED],
 )
-async def replay_messages(replayed: ReplayedDep, episode: int, services: ServicesDep) -> Response:
+async def replay_messages(replayed: ReplayedDep, episode: int, services: ServicesDep) -> FileResponse:
     """The episode as an MCAP file of ROS 2 messages: scans, odometry, commands, the goal, and transforms."""
-    parts = await replayed.parts(episode)
-    data = await services.lanes.replays.run(service.recorded_as_messages, parts, episode)
-    return Response(data, media_type="application/octet-stream", headers=_attached(parts, episode, "mcap"))
+    return await _taken_away(replayed, episode, services, "mcap", "application/octet-stream")
+
+
+@router.get(
+    "/api/replays/{subjects}/{episode}/mp4",
+    response_class=FileResponse,
+    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"video/mp4": {}}}},
+    dependencies=[VIEW_REPLAYED],
+)
+async def replay_video(replayed: ReplayedDep, episode: int, services: ServicesDep, theme: Theme = "light") -> FileResponse:
+    """The episode from above as a film of a minute at most: MP4, H.264; of several policies the others are ghosts."""
+    return await _taken_away(replayed, episode, services, "mp4", "video/mp4", theme)
+
+
+@router.get(
+    "/api/replays/{subjects}/{episode}/gif",
+    response_class=FileResponse,
+    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"image/gif": {}}}},
+    dependencies=[VIEW_REPLAYED],
+)
+async def replay_gif(replayed: ReplayedDep, episode: int, services: ServicesDep, theme: Theme = "light") -> FileResponse:
+    """The episode from above as a GIF of half a minute at most, smaller than the MP4."""
+    return await _taken_away(replayed, episode, services, "gif", "image/gif", theme)
+
+
+async def _taken_away(
+    replayed: Replayed, episode: int, services: Services, form: FilmForm, media_type: str, theme: Theme = "light"
+) -> FileResponse:
+    subjects = await replayed.subjects()
+    service.check_episode(subjects, episode)
+    path = await film_of(services, episode_film(subjects, episode, form, theme), subjects)
+    return FileResponse(path, media_type=media_type, headers=_attached(subjects, episode, form))
+
+
+@router.get("/api/replays/{subjects}/{episode}/progress", responses=NOT_FOUND | CONFLICT, dependencies=[VIEW_REPLAYED])
+async def film_made(
+    replayed: ReplayedDep, episode: int, services: ServicesDep, form: FilmForm = "scene", theme: Theme = "light"
+) -> FilmProgress:
+    """How far a film of the episode is made, while the film itself is waited for."""
+    subjects = await replayed.subjects()
+    service.check_episode(subjects, episode)
+    return await film_progress(services, episode_film(subjects, episode, form, theme))
 
 
 async def _of_a_run(run_id: str, services: ServicesDep) -> Replayed:
@@ -163,10 +194,10 @@ LapseDep = Annotated[Replayed, Depends(_of_a_run)]
 
 
 @router.get("/api/runs/{run_id}/lapse", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[view("run_id")])
-async def time_lapse(run_id: str, replayed: LapseDep) -> Lapse:
+async def time_lapse(run_id: str, replayed: LapseDep, services: ServicesDep) -> Lapse:
     """A run's learning: the same scenarios, driven again by its checkpoints; some seconds for each that was not seen yet."""
-    parts = await replayed.all()
-    return lapse.described(run_id, [part.subject.step for part in parts], parts)
+    subjects = await replayed.subjects()
+    return lapse.described(run_id, subjects, await recordings_of(services, subjects))
 
 
 @router.get("/api/runs/{run_id}/lapse/progress", responses=NOT_FOUND, dependencies=[view("run_id")])
@@ -182,15 +213,15 @@ async def play_time_lapse(
     """The player of a run's time lapse; see `play`."""
     if request.query_params.keys() - {_DOWNLOAD}:
         return RedirectResponse(request.url.path)
-    parts = await replayed.all()
-    steps = [part.subject.step for part in parts]
-    title = parts[-1].subject.title
+    subjects = await replayed.subjects()
+    # What was read of the recordings is let go while the film is made.
+    film, caption = lapse.filmed(subjects, await recordings_of(services, subjects), theme)
+    path = await film_of(services, film, subjects)
     headers = dict(HEADERS)
     if _DOWNLOAD in request.query_params:
-        name = parts[-1].subject.file_name.removesuffix(".zip")
+        name = subjects[-1].file_name.removesuffix(".zip")
         headers["Content-Disposition"] = f'attachment; filename="{name}-time-lapse.html"'
-    page = await services.lanes.replays.run(lapse.filmed, title, steps, parts, theme)
-    return HTMLResponse(page, headers=headers)
+    return HTMLResponse(await services.lanes.replays.run(replay_page, theme, path, caption), headers=headers)
 
 
 @router.get("/replays/{subjects}/{episode}/{theme}/", include_in_schema=False, dependencies=[VIEW_REPLAYED])
@@ -198,12 +229,14 @@ async def play(replayed: ReplayedDep, request: Request, episode: int, theme: The
     """The player, with the scenario inside. What viser's client would do besides is cut off."""
     if request.query_params.keys() - {_DOWNLOAD}:
         return RedirectResponse(request.url.path)
-    parts = await replayed.parts(episode)
-    headers = HEADERS | (_attached(parts, episode, "html") if _DOWNLOAD in request.query_params else {})
-    page = await services.lanes.replays.run(service.filmed, parts, episode, theme)
-    return HTMLResponse(page, headers=headers)
+    caption = service.captioned(await replayed.parts(episode), episode)
+    subjects = await replayed.subjects()
+    path = await film_of(services, episode_film(subjects, episode, "scene", theme), subjects)
+    headers = HEADERS | (_attached(subjects, episode, "html") if _DOWNLOAD in request.query_params else {})
+    return HTMLResponse(await services.lanes.replays.run(replay_page, theme, path, caption), headers=headers)
 
 
-def _attached(parts: Sequence[Part], episode: int, suffix: str) -> dict[str, str]:
-    name = parts[0].subject.file_name.removesuffix(".zip") + (f"-and-{len(parts) - 1}-more" if len(parts) > 1 else "")
+def _attached(subjects: Sequence[Subject], episode: int, suffix: str) -> dict[str, str]:
+    others = f"-and-{len(subjects) - 1}-more" if len(subjects) > 1 else ""
+    name = subjects[0].file_name.removesuffix(".zip") + others
     return {"Content-Disposition": f'attachment; filename="{name}-episode{episode}.{suffix}"'}

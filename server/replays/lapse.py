@@ -7,18 +7,17 @@ import numpy as np
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.spread import spread
 from server.errors import NotFoundError
-from server.replays.page import LapseCaption, replay_page
+from server.replays.films import filmed_policy
+from server.replays.page import LapseCaption
 from server.replays.references import Reference
 from server.replays.schemas import Lapse, LapseChapter
-from server.replays.service import Part
+from server.replays.subject import Subject
 from server.runs.repository import RunRepository
-from server.scene.themes import Theme
 from server.services import Services
+from workers.film_protocol import MAX_CHAPTERS, MAX_ROBOTS, FilmedChapter, LapseFilm
 from workers.replays.recording import Recording
+from workers.scene.themes import Theme
 
-MOST_CHECKPOINTS = 8
-"""In a time lapse, evenly apart, the first and the last among them."""
-MOST_ROBOTS = 8
 _LONGEST_SECONDS = 6.0
 # The picture at the end of each chapter.
 _PAUSE_SECONDS = 1.5
@@ -36,63 +35,56 @@ def checkpoints_of(services: Services, run_id: str) -> list[Reference]:
     if not steps:
         raise NotFoundError("No checkpoint of this run was evaluated yet: there is nothing to look back at.")
     alike = [step for step in steps if step.suite_hash == steps[-1].suite_hash]
-    return [Reference("checkpoint", step.id) for step in spread(alike, MOST_CHECKPOINTS)]
+    return [Reference("checkpoint", step.id) for step in spread(alike, MAX_CHAPTERS)]
 
 
-def described(run_id: str, steps: Sequence[int], parts: Sequence[Part]) -> Lapse:
+def described(run_id: str, subjects: Sequence[Subject], recordings: Sequence[Recording]) -> Lapse:
     """What a time lapse shows, and when."""
-    scenarios = _scenarios(parts[0].recording)
+    scenarios = _scenarios(recordings[0])
     return Lapse(
-        suite=parts[0].subject.recorded.suite,
+        suite=subjects[0].recorded.suite,
         scenarios=len(scenarios),
         page=f"/replays/lapses/{run_id}/",
         chapters=[
-            LapseChapter(step=step, success=_success(part.recording), begins=begins)
-            for step, part, (begins, _) in zip(steps, parts, _times(parts, scenarios), strict=True)
+            LapseChapter(step=subject.step, success=_success(recording), begins=begins)
+            for subject, recording, (begins, _) in zip(
+                subjects, recordings, _times(subjects, recordings, scenarios), strict=True
+            )
         ],
     )
 
 
-def filmed(title: str, steps: Sequence[int], parts: Sequence[Part], theme: Theme) -> str:
-    """The time lapse's player as HTML that needs nothing else; takes some seconds."""
-    # viser takes a second to import, so nobody pays for it before somebody looks.
-    from server.replays.film import Filmed
-    from server.replays.lapse_film import Chapter, film_lapse
-
-    scenarios = _scenarios(parts[0].recording)
-    times = _times(parts, scenarios)
-    chapters = [
-        Chapter(
-            [
-                Filmed(part.recording.track(scenario), part.recording.evaluation.episodes[scenario], part.subject.task)
-                for scenario in scenarios
-            ],
-            begins,
-            lasts,
-        )
-        for part, (begins, lasts) in zip(parts, times, strict=True)
-    ]
+def filmed(subjects: Sequence[Subject], recordings: Sequence[Recording], theme: Theme) -> tuple[LapseFilm, LapseCaption]:
+    """The film of a time lapse, and what stands over its picture."""
+    scenarios = _scenarios(recordings[0])
+    times = _times(subjects, recordings, scenarios)
+    chapters = tuple(
+        FilmedChapter(policy=filmed_policy(subject), begins=begins, lasts=lasts)
+        for subject, (begins, lasts) in zip(subjects, times, strict=True)
+    )
     said = [
-        (begins, f"Step {step:,}: {_success(part.recording):.0%} of all arrive")
-        for step, part, (begins, _) in zip(steps, parts, times, strict=True)
+        (begins, f"Step {subject.step:,}: {_success(recording):.0%} of all arrive")
+        for subject, recording, (begins, _) in zip(subjects, recordings, times, strict=True)
     ]
-    caption = LapseCaption(title, parts[0].subject.recorded.suite, len(scenarios), said)
-    return replay_page(theme, film_lapse(chapters, theme), caption.html())
+    caption = LapseCaption(subjects[-1].title, subjects[0].recorded.suite, len(scenarios), said)
+    return LapseFilm(theme=theme, scenarios=tuple(scenarios), chapters=chapters), caption
 
 
 def _scenarios(recording: Recording) -> list[int]:
     """Some in one arena: the one in which most begin."""
     arenas = recording.arena_indices
     most = int(np.bincount(arenas).argmax())
-    return spread(np.flatnonzero(arenas == most).tolist(), MOST_ROBOTS)
+    return spread(np.flatnonzero(arenas == most).tolist(), MAX_ROBOTS)
 
 
-def _times(parts: Sequence[Part], scenarios: Sequence[int]) -> list[tuple[float, float]]:
+def _times(
+    subjects: Sequence[Subject], recordings: Sequence[Recording], scenarios: Sequence[int]
+) -> list[tuple[float, float]]:
     """When each chapter begins, and how long it lasts, seconds: as long as its longest episode, or less, by going faster."""
     found, begins = [], 0.0
-    for part in parts:
-        steps = max(part.recording.evaluation.episodes[scenario].steps for scenario in scenarios)
-        lasts = min(_LONGEST_SECONDS, steps * part.subject.task.control_period)
+    for subject, recording in zip(subjects, recordings, strict=True):
+        steps = max(recording.evaluation.episodes[scenario].steps for scenario in scenarios)
+        lasts = min(_LONGEST_SECONDS, steps * subject.task.control_period)
         found.append((round(begins, 3), lasts))
         begins += lasts + _PAUSE_SECONDS
     return found

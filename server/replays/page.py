@@ -8,30 +8,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.live.page import asset, viser_page
-from server.scene.themes import Theme, css_colour
 from workers.reporting import EpisodeResult
+from workers.scene.themes import Theme, css_colour
 
 _DIRECTORY = Path(__file__).parent / "assets"
 _OUTCOMES = {"arrival": "Arrived", "collision": "Collided", "timeout": "Timed out"}
 _UNFAITHFUL = "Driven again, it ended otherwise than recorded: this processor rounds otherwise."
 
 
-def replay_page(theme: Theme, recording: bytes, caption: str) -> str:
+def replay_page(theme: Theme, recording: Path, caption: "Caption | LapseCaption") -> str:
     """The page.
 
     Args:
         theme: light or dark, as the recording is.
         recording: a `.viser` file.
-        caption: what it shows, as HTML.
+        caption: what it shows.
     """
-    data = base64.b64encode(recording).decode("ascii")
+    data = base64.b64encode(recording.read_bytes()).decode("ascii")
     dark = str(theme == "dark").lower()
     head = (
         f"<style>{asset('display.css')}{_asset('replay.css')}</style><script>{_asset('replay.js')}</script>"
         # By these names viser's client finds a recording that comes along with its page.
         f'<script>window.__VISER_EMBED_DATA__="{data}";window.__VISER_EMBED_CONFIG__={{darkMode:{dark}}};</script>'
     )
-    return viser_page(theme, head, caption)
+    return viser_page(theme, head, caption.html())
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Evaluations driven once more: by a worker on demand, and kept for a while."""
 
+import asyncio
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,6 +47,21 @@ async def recording_of(services: Services, subject: Subject) -> Recording:
             f"The suite {subject.recorded.suite} has changed since this evaluation: its episodes can't be driven again."
         )
     return recording
+
+
+async def recordings_of(services: Services, subjects: Sequence[Subject]) -> list[Recording]:
+    """What several did, driven again side by side.
+
+    Raises:
+        ReplayFailedError: see `recording_of`, also for more.
+    """
+    tasks = [asyncio.create_task(recording_of(services, subject)) for subject in subjects]
+    try:
+        return await asyncio.gather(*tasks)
+    finally:
+        # Where one fails, or the client has left, nobody waits for the others.
+        for task in tasks:
+            task.cancel()
 
 
 def recording_key(subject: Subject) -> str:

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
 from server.errors import NotFoundError
+from workers.film_protocol import MAX_TOGETHER
 
 Kind = Literal["checkpoint", "evaluation", "policy"]
-
-MAX_TOGETHER = 6
-"""Policies in one replay: as many as have colours that are told apart at a glance."""
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,13 @@ class ReplayProgress(Schema):
     share: float = Field(description="Of the work, 0 to 1.")
 
 
+class FilmProgress(Schema):
+    """How far a film is made."""
+
+    ready: bool = Field(description="It is there.")
+    share: float = Field(description="Of the work, 0 to 1; 0 while it waits for its turn, or for the episodes to be driven.")
+
+
 class LapseChapter(Schema):
     """What one checkpoint of a time lapse does."""
 

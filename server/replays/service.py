@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.errors import ConflictError, NotFoundError
-from server.replays.page import Caption, Driver, replay_page
+from server.replays.page import Caption, Driver
 from server.replays.references import Reference
 from server.replays.schemas import EpisodeReplay, EpisodeSeries, PolicySeries, Replay, ReplayedPolicy
 from server.replays.series import series_of, times
 from server.replays.subject import Subject
-from server.scene.themes import Theme, css_colour
 from workers.replays.recording import Recording
+from workers.scene.themes import css_colour
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,8 @@ def charted(parts: Sequence[Part], episode: int) -> EpisodeSeries:
     return EpisodeSeries(policies=found)
 
 
-def filmed(parts: Sequence[Part], episode: int, theme: Theme) -> str:
-    """The scenario's player as HTML that needs nothing else; takes about half a second for each policy."""
-    # viser takes a second to import, so nobody pays for it before somebody looks.
-    from server.replays.film import Filmed, film
-
+def captioned(parts: Sequence[Part], episode: int) -> Caption:
+    """What stands over the picture of a scenario."""
     results = [part.recording.evaluation.episodes[episode] for part in parts]
     drivers = [
         Driver(
@@ -103,17 +100,7 @@ def filmed(parts: Sequence[Part], episode: int, theme: Theme) -> str:
         )
         for part, result in zip(parts, results, strict=True)
     ]
-    reels = [
-        Filmed(part.recording.track(episode), result, part.subject.task) for part, result in zip(parts, results, strict=True)
-    ]
-    return replay_page(theme, film(reels, theme), Caption(parts[0].subject.recorded.suite, episode, drivers).html())
-
-
-def recorded_as_messages(parts: Sequence[Part], episode: int) -> bytes:
-    """The scenario as an MCAP file of ROS 2 messages."""
-    from server.replays.messages import as_mcap
-
-    return as_mcap([(part.subject, part.recording.track(episode)) for part in parts], episode)
+    return Caption(parts[0].subject.recorded.suite, episode, drivers)
 
 
 def _faithful(part: Part, episode: int) -> bool:

@@ -16,7 +16,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/reproduction", tags=["reproduction"])
 
 
-def _service(services: ServicesDep) -> ReproductionService:
+async def _service(services: ServicesDep) -> ReproductionService:
     return ReproductionService(services)
 
 

@@ -14,7 +14,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 
-def _service(services: ServicesDep) -> RunService:
+async def _service(services: ServicesDep) -> RunService:
     return RunService(services)
 
 

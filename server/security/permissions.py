@@ -154,6 +154,7 @@ _OF: dict[str, tuple[str, _Find]] = {
     "campaign_id": ("campaign", ProjectRepository.of_campaigns),
     "campaign": ("campaign", ProjectRepository.of_campaigns),
     "upload_id": ("uploaded policy", ProjectRepository.of_uploads),
+    "recording_id": ("recording", ProjectRepository.of_bags),
     "evaluation_id": ("evaluation", ProjectRepository.of_evaluations),
     "study_id": ("study", ProjectRepository.of_studies),
 }

@@ -98,4 +98,8 @@ def principal_of(connection: HTTPConnection) -> Principal:
     return principal
 
 
-PrincipalDep = Annotated[Principal, Depends(principal_of)]
+async def _principal(connection: HTTPConnection) -> Principal:
+    return principal_of(connection)
+
+
+PrincipalDep = Annotated[Principal, Depends(_principal)]

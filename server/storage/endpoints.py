@@ -16,7 +16,7 @@ from server.storage.service import StorageService
 router = APIRouter(tags=["storage"])
 
 
-def _service(services: ServicesDep) -> StorageService:
+async def _service(services: ServicesDep) -> StorageService:
     return StorageService(services)
 
 

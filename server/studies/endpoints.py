@@ -15,7 +15,7 @@ from server.studies.service import StudyService
 router = APIRouter(prefix="/api/studies", tags=["studies"])
 
 
-def _service(services: ServicesDep) -> StudyService:
+async def _service(services: ServicesDep) -> StudyService:
     return StudyService(services)
 
 

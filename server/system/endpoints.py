@@ -15,7 +15,7 @@ from server.system.schemas import DrainRequest, Readiness, Status, Version
 router = APIRouter(tags=["system"])
 
 
-def _readiness(request: Request) -> ReadinessProbe:
+async def _readiness(request: Request) -> ReadinessProbe:
     probe: ReadinessProbe = request.app.state.readiness
     return probe
 

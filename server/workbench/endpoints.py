@@ -36,18 +36,18 @@ router = APIRouter(tags=["workbench"])
 _MAX_COLUMNS = 40
 
 
-def _service(services: ServicesDep) -> WorkbenchService:
+async def _service(services: ServicesDep) -> WorkbenchService:
     return WorkbenchService(services)
 
 
 WorkbenchServiceDep = Annotated[WorkbenchService, Depends(_service)]
 
 
-def _actions(services: ServicesDep) -> ActionService:
+async def _actions(services: ServicesDep) -> ActionService:
     return ActionService(services)
 
 
-def _views(services: ServicesDep) -> ViewService:
+async def _views(services: ServicesDep) -> ViewService:
     return ViewService(services)
 
 

@@ -41,7 +41,7 @@ from workers.protocol import (
 router = APIRouter(prefix="/api/worker", tags=["worker"], include_in_schema=False)
 
 
-def _service(services: ServicesDep) -> WorkerService:
+async def _service(services: ServicesDep) -> WorkerService:
     return WorkerService(services)
 
 

@@ -5,10 +5,10 @@ import contextlib
 import hashlib
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, BinaryIO
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import StreamingResponse
@@ -29,9 +29,10 @@ router = APIRouter(prefix="/api/worker/jobs", tags=["worker"], include_in_schema
 
 MAX_RESULT_BYTES = 512 * 2**20
 """Of one recording or bundle."""
+_BLOCK = 256 * 1024
 
 
-def _service(services: ServicesDep) -> JobService:
+async def _service(services: ServicesDep) -> JobService:
     return JobService(services)
 
 
@@ -82,6 +83,39 @@ async def get_archive(
         await lane.run(service.end, job_id, attempt, JobEnd(outcome="failed", error=error.message))
         raise
     return StreamingResponse(lane.each(blocks), media_type="application/zip")
+
+
+@router.get("/{job_id}/recordings/{number}", dependencies=[WORK])
+async def get_recording(
+    job_id: str, number: int, attempt: AttemptQuery, service: JobServiceDep, services: ServicesDep
+) -> StreamingResponse:
+    """What a film's policy of that number did."""
+    lane = services.lanes.jobs
+    try:
+        file = await lane.run(service.recording, job_id, attempt, number)
+    except NotFoundError as error:
+        # Whoever asked for the film has it driven again.
+        await lane.run(service.end, job_id, attempt, JobEnd(outcome="failed", error=error.message))
+        raise
+    return StreamingResponse(lane.each(_blocks(file)), media_type="application/octet-stream")
+
+
+def _blocks(file: BinaryIO) -> Iterator[bytes]:
+    with file:
+        while block := file.read(_BLOCK):
+            yield block
+
+
+@router.get("/{job_id}/bag", dependencies=[WORK])
+async def get_bag(job_id: str, attempt: AttemptQuery, service: JobServiceDep, services: ServicesDep) -> Response:
+    """The robot's recording that the job reads."""
+    lane = services.lanes.jobs
+    try:
+        content = await lane.run(service.bag, job_id, attempt)
+    except NotFoundError as error:
+        await lane.run(service.end, job_id, attempt, JobEnd(outcome="failed", error=error.message))
+        raise
+    return Response(content, media_type="application/octet-stream")
 
 
 @router.post("/{job_id}/report", dependencies=[WORK])

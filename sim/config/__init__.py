@@ -56,6 +56,8 @@ from sim.config.observation import (
 from sim.config.open_union import OpenUnion
 from sim.config.reward import (
     AlignmentTerm,
+    ArrivalTerm,
+    CollisionTerm,
     FormulaTerm,
     PathProgressTerm,
     PeopleTerm,
@@ -111,11 +113,13 @@ __all__ = [
     "ArenaFile",
     "ArenaName",
     "ArenaPool",
+    "ArrivalTerm",
     "BearingPart",
     "Box",
     "BurgerConfig",
     "CentredMount",
     "Circle",
+    "CollisionTerm",
     "DeviationPart",
     "DifferentialDrive",
     "DirectionPart",

@@ -76,10 +76,15 @@ class Paths:
         Where no path leads there, it is the straight line.
         """
         given = (*map(float, place), *map(float, target), index)
-        length, cell = kernels.path_length(*given, -1, self.grids, self.fields, self.owners)
+        length, _, _, cell = kernels.shortest_way(*given, -1, self.grids, self.fields, self.owners)
         if length < 0.0:
-            length, _ = kernels.path_length(*given, self.slot(index, cell), self.grids, self.fields, self.owners)
+            length, *_ = kernels.shortest_way(*given, self.slot(index, cell), self.grids, self.fields, self.owners)
         return float(length)
+
+    def slot_towards(self, index: int, target: Sequence[float]) -> int:
+        """The row of the field of a target (x, y)."""
+        *_, cell = kernels.shortest_way(*target, *target, index, -1, self.grids, self.fields, self.owners)
+        return self.slot(index, cell)
 
     def slot(self, index: int, cell: int) -> int:
         """The row of the field of a target's cell; a new one takes the place of the one made longest ago."""
@@ -94,12 +99,18 @@ class Paths:
 
 
 class PathProgress:
-    """The term `path_progress` of a task's reward for so many robots; there may be none."""
+    """The term `path_progress` of a task's reward for so many robots; there may be none.
 
-    def __init__(self, task: TaskConfig, arenas: Sequence[Arena], robots: int) -> None:
+    Args:
+        task: whose reward.
+        paths: of its arenas, where there is one.
+        robots: how many.
+    """
+
+    def __init__(self, task: TaskConfig, paths: Paths | None, robots: int) -> None:
         found = [(column, term) for column, term in enumerate(task.reward.terms) if isinstance(term, PathProgressTerm)]
         self._terms = [(column, np.float32(term.weight)) for column, term in found]
-        self._paths = Paths(arenas, task.passable_clearance) if found else None
+        self._paths = paths if found else None
         self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
         self._lengths, self._now = np.zeros(robots), np.zeros(robots)
 
@@ -130,4 +141,4 @@ class PathProgress:
         for i in self._missing[: kernels.path_lengths(which, *given)].tolist():
             index, target = int(robots.records["map"][i]), robots.targets[i].tolist()
             self._now[i] = paths.length(index, robots.poses[i, :2].tolist(), target)
-            self._slots[i] = paths.slot(index, kernels.path_length(*target, *target, index, -1, *given[2:5])[1])
+            self._slots[i] = paths.slot_towards(index, target)

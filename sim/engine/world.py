@@ -15,9 +15,10 @@ from sim.config import RandomisationConfig, TaskConfig
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
+from sim.engine.guidance import Guidance
 from sim.engine.movers import Movers
 from sim.engine.parameters import pack_parameters
-from sim.engine.paths import PathProgress
+from sim.engine.paths import PathProgress, Paths
 from sim.engine.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.engine.rewards import Formulas, reads_changes
 from sim.engine.shapes import pack_shapes
@@ -80,6 +81,7 @@ class World:
         restart: when the next episode begins.
         respawn: False saves looking for free space where every pose and target is given: robots then stay where they end,
             and all copies of an arena have the same movers.
+        guides: whether `guidance` is kept.
 
     Raises:
         ArenaError: the robot does not fit into an arena.
@@ -89,6 +91,7 @@ class World:
         arenas: the pool.
         robots: the arrays of all robots, overwritten by every step.
         movers: what moves beside them.
+        guidance: what they would have to know of the shortest paths; None unless asked for.
     """
 
     def __init__(
@@ -102,6 +105,7 @@ class World:
         arrival_ends: bool = False,
         restart: Restart = "same step",
         respawn: bool = True,
+        guides: bool = False,
     ) -> None:
         self.task = task
         self.arenas = tuple(arenas)
@@ -145,7 +149,10 @@ class World:
         )
         numbers, action_size = observation_size(task), action_layout(task.robot).size
         self._formulas = formulas = Formulas(task, robots)
-        self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, self.arenas, robots)
+        pays_for_paths = bool(task.reward.weight("path_progress"))
+        paths = Paths(self.arenas, task.passable_clearance) if guides or pays_for_paths else None
+        self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, paths, robots)
+        self.guidance = Guidance(task, paths, robots) if guides and paths else None
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         sees_trail = any(part.name == "trail" for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
@@ -175,7 +182,7 @@ class World:
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
         # What extensions see of a step that ends an episode, and how far it was, has to be seen before the next one begins.
-        self._looks_back = bool(self._added_parts) or bool(self._path_progress)
+        self._looks_back = bool(self._added_parts) or bool(self._path_progress) or guides
         starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         usual_drive = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
@@ -235,6 +242,11 @@ class World:
         space.put_all()
         self._see_added_parts(everybody, begins=True)
         self._path_progress.begin(self.robots, everybody)
+        self._guide(everybody)
+
+    def _guide(self, which: NDArray[np.bool_]) -> None:
+        if self.guidance is not None:
+            self.guidance.look(self.robots, which)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -351,16 +363,20 @@ class World:
         self._space.put(np.flatnonzero(which).astype(np.int32))
         self._see_added_parts(which, begins=True)
         self._path_progress.begin(self.robots, which)
+        self._guide(which)
 
     def _look_back(self) -> None:
         """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
         self._path_progress.begin(robots, robots.outcomes == ARRIVAL)
+        self._guide(robots.records["parked"] == 0)
         ended = robots.terminations | robots.truncations
         if not ended.any():
             return
         robots.final_observations[ended] = robots.observations[ended]
+        if self.guidance is not None:
+            self.guidance.keep(robots, ended)
         if self._restart == "same step":
             results = [robots.rewards, robots.terms, robots.terminations, robots.truncations, robots.outcomes]
             results += [robots.records[name] for name in ("steps", "attempt_reward", "path_length", "min_clearance")]
@@ -483,3 +499,4 @@ class World:
             target[...] = state[name]
         self._space.put_all()
         self._path_progress.begin(self.robots, np.ones(len(self), np.bool_))
+        self._guide(np.ones(len(self), np.bool_))

@@ -66,6 +66,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             overwrites.
         autoreset_mode: when the next episode of a robot begins: in the step that ended one, or, as Gymnasium's own vector
             environments do, in the one after it, whose action makes no difference and whose reward is 0.
+        guides: whether `guidance` is kept, for critics that are told the way.
 
     Raises:
         pydantic.ValidationError: a value of the task is wrong.
@@ -96,6 +97,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         render_mode: str | None = None,
         copy: bool = True,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        guides: bool = False,
     ) -> None:
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, not {num_envs}")
@@ -118,6 +120,7 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             seed=seed,
             arrival_ends=self._ARRIVAL_ENDS or self.task.arrival_ends,
             restart=_RESTARTS[mode],
+            guides=guides,
         )
         robots = self._world.robots
         self.poses = robots.poses
@@ -132,6 +135,8 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """(N,) how the attempt that ended in this step ended: 1 arrival, 2 collision, 3 time-out; 0 where none did."""
         self.final_observations = robots.final_observations
         """(N, numbers) last observation of the episodes that ended in this step; meaningless elsewhere."""
+        self.guidance = self._world.guidance
+        """What the robots would have to know of the shortest paths to their targets; None unless asked for."""
         self.reward_terms = robots.terms
         """(N, terms) of this step's reward, named by `reward_term_names`."""
         self.reward_term_names = term_names(self.task.reward)

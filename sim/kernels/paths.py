@@ -17,6 +17,9 @@ ZERO = np.float32(0.0)
 FAR_OFF = -1
 """In place of a corner: no path leads from here to the target."""
 
+UNDERFOOT = 0.15
+"""Metres within which a corner is as good as reached: it tells no direction any more."""
+
 
 @kernel()
 def _sees(free, row, column, to_row, to_column):
@@ -122,8 +125,8 @@ def grid_of(index, grids):
 
 
 @kernel(allocates=True)
-def path_length(x, y, target_x, target_y, index, slot, grids, fields, owners):
-    """How far it is from a point to a target of an arena, metres.
+def shortest_way(x, y, target_x, target_y, index, slot, grids, fields, owners):
+    """How far it is from a point to a target of an arena, and where to drive first.
 
     Args:
         x: of the point, metres, like the other three.
@@ -137,26 +140,30 @@ def path_length(x, y, target_x, target_y, index, slot, grids, fields, owners):
         owners: (S,) int64, of which arena's cell each is, counted through all arenas.
 
     Returns:
-        The length, below zero where the target's field is needed and is not in that row; and the target's cell.
+        The length, metres, below zero where the target's field is needed and is not in that row; x and y of the first corner
+        that is not underfoot, or of the target; and the target's cell.
     """
     free, nearest = grid_of(index, grids)
     columns = free.shape[1]
     cell, target = _cell_of(x, y, nearest), _cell_of(target_x, target_y, nearest)
     straight = math.hypot(target_x - x, target_y - y)
     if _sees(free, cell // columns, cell % columns, target // columns, target % columns):
-        return straight, target
+        return straight, target_x, target_y, target
     if slot < 0 or owners[slot] != grids.places[index, 0] + target:
-        return -1.0, target
+        return -1.0, target_x, target_y, target
     corners = fields[slot]
     length = 0.0
+    at_x, at_y, first_x, first_y, leads = x, y, target_x, target_y, False
     if corners[cell] != FAR_OFF:
         corner = np.int64(corners[cell])
         while corner != target:
             next_x, next_y = _middle(corner, free)
+            if not leads and math.hypot(next_x - at_x, next_y - at_y) > UNDERFOOT:
+                first_x, first_y, leads = next_x, next_y, True
             length += math.hypot(next_x - x, next_y - y)
             x, y = next_x, next_y
             corner = np.int64(corners[corner])
-    return max(straight, length + math.hypot(target_x - x, target_y - y)), target
+    return max(straight, length + math.hypot(target_x - x, target_y - y)), first_x, first_y, target
 
 
 @kernel(allocates=True)
@@ -167,7 +174,7 @@ def path_lengths(which, robots, slots, grids, fields, owners, lengths, missing):
         which: (N,) bool, the robots.
         robots: `sim.kernels.bundles.Robots`.
         slots: (N,) int32 rows of `fields` that may hold their targets'.
-        grids: see `path_length`, like `fields` and `owners`.
+        grids: see `shortest_way`, like `fields` and `owners`.
         fields: likewise.
         owners: likewise.
         lengths: (N,) float64, written but where a field is missing.
@@ -182,10 +189,51 @@ def path_lengths(which, robots, slots, grids, fields, owners, lengths, missing):
             continue
         x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
         target_x, target_y = np.float64(robots.targets[i, 0]), np.float64(robots.targets[i, 1])
-        length, _ = path_length(x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners)
+        length = shortest_way(x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners)[0]
         if length < 0.0:
             missing[count] = i
             count += 1
         else:
             lengths[i] = length
+    return count
+
+
+@kernel(allocates=True)
+def guide(which, robots, slots, grids, fields, owners, step_limit, numbers, missing):
+    """Write what the shortest paths tell of some robots, see `sim.engine.guidance`.
+
+    Args:
+        which: see `path_lengths`.
+        robots: likewise.
+        slots: likewise.
+        grids: likewise.
+        fields: likewise.
+        owners: likewise.
+        step_limit: steps of an attempt.
+        numbers: (N, 5) float32, written but where a field is missing.
+        missing: (N,) int32, written: the robots for which it is.
+
+    Returns:
+        How many these are.
+    """
+    count = 0
+    for i in range(which.shape[0]):
+        if not which[i]:
+            continue
+        x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
+        target_x, target_y = np.float64(robots.targets[i, 0]), np.float64(robots.targets[i, 1])
+        length, first_x, first_y, _ = shortest_way(
+            x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners
+        )
+        if length < 0.0:
+            missing[count] = i
+            count += 1
+            continue
+        bearing = math.atan2(first_y - y, first_x - x) - robots.poses[i, 2]
+        numbers[i, 0] = length / (length + 5.0)
+        numbers[i, 1] = length / 20.0
+        numbers[i, 2] = math.sin(bearing)
+        numbers[i, 3] = math.cos(bearing)
+        # Where an attempt ended, the next one has begun, whose steps are counted from the next step on.
+        numbers[i, 4] = 0.0 if robots.outcomes[i] else robots.records[i].steps / step_limit
     return count

@@ -35,6 +35,16 @@ def test_a_run_goes_on_with_what_was_kept_and_prints_what_all_of_it_says(
     assert json.loads(first.splitlines()[-1])["targets"] == {"clutter, best policy": 99.5}
 
 
+def test_what_is_measured_anew_takes_the_place_of_what_was_and_the_rest_stays() -> None:
+    old = field()
+    first, second, *_ = old.rows
+    again = first.model_copy(update={"episodes": 7, "arrivals": 7, "collisions": 0})
+    other_seed = second.model_copy(update={"seed": 99})
+    joined = old.model_copy(update={"date": "2030-01-01", "rows": (again, other_seed)}).in_place_of(old)
+    assert joined.rows == (*old.rows[1:], again, other_seed)
+    assert joined.date == "2030-01-01"
+
+
 def test_pieces_are_the_same_scenarios_whatever_the_size() -> None:
     assert [(each.first, each.count) for each in pieces("families", "maze", 250)] == [(0, 100), (100, 100), (200, 50)]
     assert sum(each.count for each in pieces("barn", FROZEN["barn"][0], 1000)) == 120

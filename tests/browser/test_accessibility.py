@@ -107,6 +107,7 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
         ("/arenas/draw", "text=All is well", "Start from…"),
         ("/alerts", "[data-testid=rule]", ""),
         ("/studies", "h1", ""),
+        ("/recordings", "h1", ""),
         ("/queue", "[data-testid=job]", ""),
         ("/evaluations", "[data-testid=evaluation]", ""),
         ("/leaderboards", "[data-testid=entry]", ""),

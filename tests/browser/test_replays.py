@@ -5,9 +5,11 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import av
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from PIL import Image
 from playwright.sync_api import BrowserContext, Page, expect
 
 pytestmark = pytest.mark.browser
@@ -116,11 +118,23 @@ def test_two_policies_drive_one_scenario_beside_their_charts_below_one_cursor(
     expect(page.frame_locator("[data-testid=replay-frame]").get_by_label("Seconds", exact=True)).not_to_have_value(
         f"{seconds:.1f}"
     )
-    with page.expect_download() as download:
-        dialog.get_by_role("link", name="MCAP").click()
-    file = tmp_path / "episode.mcap"
-    download.value.save_as(file)
-    with file.open("rb") as stream:
+
+    def taken_away(form: str) -> Path:
+        dialog.get_by_role("button", name="Download").click()
+        with page.expect_download(timeout=SOON) as download:
+            page.get_by_role("menuitem", name=form).click()
+        assert download.value.suggested_filename == f"mapless-complex-and-1-more-episode7.{form.lower()}"
+        file = tmp_path / f"episode.{form.lower()}"
+        download.value.save_as(file)
+        return file
+
+    with av.open(str(taken_away("MP4"))) as container:
+        pictures = sum(1 for _ in container.decode(video=0))
+    # Twenty a second, and a second and a half of the last one.
+    assert pictures == round(20 * max(each["seconds"] for each in ends)) + 1 + 30
+    with Image.open(taken_away("GIF")) as gif:
+        assert (gif.format, max(gif.size) >= 400) == ("GIF", True)
+    with taken_away("MCAP").open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         scans = Counter(channel.topic for _, channel, _, _ in reader.iter_decoded_messages())
     assert [scans["/policy1/scan"], scans["/policy2/scan"]] == [each["steps"] + 1 for each in ends]

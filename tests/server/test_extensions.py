@@ -112,7 +112,7 @@ def asked(jobs: JobService, spec: JobSpec, key: str) -> str:
 
 
 def next_job(client: TestClient, *extensions: dict[str, Any]) -> str | None:
-    kinds = ["view", "play", "replay", "export", "evaluate"]
+    kinds = ["view", "play", "replay", "film", "export", "evaluate"]
     body = {"worker": "w@host/jobs0", "claim_id": uuid.uuid4().hex, "kinds": kinds, "wait_seconds": 0.0}
     answer = client.post("/api/worker/jobs/claim", json=body | {"extensions": list(extensions)}, headers=WORKER)
     return None if answer.status_code == 204 else str(answer.json()["id"])

@@ -19,7 +19,7 @@ from tests.server.test_claims_at_once import Clock
 from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobKind, JobSpec, ReplayJob, ShippedPolicyName, ViewJob
 
 LEASE = 15.0
-ALL: tuple[JobKind, ...] = ("view", "play", "replay", "export", "evaluate")
+ALL: tuple[JobKind, ...] = ("view", "play", "replay", "film", "export", "evaluate")
 
 
 @pytest.fixture

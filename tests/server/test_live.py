@@ -28,17 +28,17 @@ from server.live.hub import LiveHub, TooManyViewsError
 from server.live.page import VISER_PROTOCOL, own_websocket
 from server.live.settings import LiveSettings
 from server.live.view import LiveView
-from server.scene.gate import KEY
-from server.scene.quiet import start_viser, stop_viser
-from server.scene.robots import RobotNodes
-from server.scene.scene import Scene
-from server.scene.themes import COLOURS, Theme
 from server.services import Services
 from sim.arenas import build_arena
 from sim.config import GeneratedArenaConfig, TaskConfig
 from workers.errors import FrameError
 from workers.frames import Frame
 from workers.reporting import WatchRequest
+from workers.scene.gate import KEY
+from workers.scene.quiet import start_viser, stop_viser
+from workers.scene.robots import RobotNodes
+from workers.scene.scene import Scene
+from workers.scene.themes import COLOURS, Theme
 
 ORIGIN = {"Origin": "http://127.0.0.1:8400"}
 SOCKETS = "ws://127.0.0.1:8400"

@@ -7,8 +7,8 @@ import pytest
 
 from server.live.playout import PlayoutBuffer
 from server.live.scoreboard import Scoreboard
-from server.scene.trails import Trails, trail_colours
 from workers.frames import Frame, ViewMode
+from workers.scene.trails import Trails, trail_colours
 
 
 def frame(number: int, robots: int = 1, mode: ViewMode = "policy") -> Frame:

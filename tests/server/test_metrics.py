@@ -465,6 +465,15 @@ def run_of(client: TestClient) -> str:
     return run_id
 
 
+def test_the_steps_of_buckets_are_read_without_the_rest() -> None:
+    buckets = Buckets.of(Points.of([2, 3, 5, 8, 13], [0] * 5, [1, 3, 5, math.nan, 2]))
+    encoded = buckets.encode()
+    for count in range(6):
+        assert Buckets.steps_in(encoded, count).tolist() == [2, 3, 5, 8, 13][:count]
+    with pytest.raises(ValueError, match="not the steps"):
+        Buckets.steps_in(encoded, 1_000)
+
+
 def test_a_runs_curves_over_http(client: TestClient, services: Services) -> None:
     run_id = run_of(client)
     with services.database.write() as session:

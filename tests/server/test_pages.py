@@ -120,3 +120,39 @@ def test_a_path_longer_than_any_file_is_the_page_too(dist: Path, client: TestCli
     assert client.get("/" + "x" * 5_000).status_code == 200
     assert client.get("/" + "x/" * 2_500).status_code == 200
     assert client.get("/assets/" + "x" * 5_000).status_code == 404
+
+
+def test_what_a_browser_has_already_is_not_sent_again(dist: Path, client: TestClient) -> None:
+    (dist / "index.html").write_text("<!doctype html><title>Mapless</title>" + "<p>One</p>" * 200)
+    for path in ("/", "/favicon.svg", "/assets/index-abc123.js"):
+        first = client.get(path)
+        again = client.get(path, headers={"If-None-Match": first.headers["etag"]})
+        assert (again.status_code, again.content) == (304, b"")
+        assert again.headers["cache-control"] == first.headers["cache-control"]
+    tag = client.get("/").headers["etag"]
+
+    (dist / "index.html").write_text("<!doctype html><title>Mapless</title>" + "<p>Other</p>" * 200)
+    anew = client.get("/", headers={"If-None-Match": tag})
+
+    assert anew.status_code == 200
+    assert "Other" in anew.text
+    assert anew.headers["etag"] != tag
+
+
+def test_a_part_of_an_asset(dist: Path, client: TestClient) -> None:
+    for _ in range(2):
+        part = client.get("/assets/index-abc123.js", headers={"Range": "bytes=0-5"})
+        assert (part.status_code, part.text) == (206, "export")
+        assert client.get("/assets/index-abc123.js").text == "export {}"
+
+
+def test_pages_and_assets_have_the_headers_that_hold_them_to_what_they_are(dist: Path, client: TestClient) -> None:
+    for path in ("/", "/assets/index-abc123.js"):
+        for _ in range(2):
+            response = client.get(path)
+            assert response.headers["x-content-type-options"] == "nosniff"
+            assert "default-src 'self'" in response.headers["content-security-policy"]
+            assert int(response.headers["content-length"]) == len(response.content)
+            assert client.head(path).headers["content-length"] == response.headers["content-length"]
+            assert client.head(path).content == b""
+            assert client.get(path, headers={"Host": "evil.example"}).status_code == 400

@@ -64,6 +64,7 @@ TABLE = {
         GET /api/arenas/imported/{sha256}
         GET /api/evaluations
         GET /api/uploads
+        GET /api/recordings
         GET /api/suites
         GET /api/field
         GET /api/leaderboards
@@ -86,6 +87,7 @@ TABLE = {
         POST /api/evaluations
         POST /api/playgrounds/{playground_id}/arena
         POST /api/uploads
+        POST /api/recordings
         POST /api/reproduction
         POST /api/studies
         POST /api/arenas/imported
@@ -126,6 +128,9 @@ TABLE = {
         GET /api/checkpoints/{checkpoint_id}/episodes
         GET /api/checkpoints/{checkpoint_id}/bundle
         GET /api/checkpoints/{checkpoint_id}/replays/{episode}
+        GET /api/recordings/{recording_id}
+        GET /api/recordings/{recording_id}/reading
+        GET /api/recordings/{recording_id}/beside
         GET /api/evaluations/{evaluation_id}
         GET /api/evaluations/{evaluation_id}/episodes
         GET /api/evaluations/{evaluation_id}/ways
@@ -135,6 +140,9 @@ TABLE = {
         GET /api/replays/{subjects}/{episode}
         GET /api/replays/{subjects}/{episode}/series
         GET /api/replays/{subjects}/{episode}/mcap
+        GET /api/replays/{subjects}/{episode}/mp4
+        GET /api/replays/{subjects}/{episode}/gif
+        GET /api/replays/{subjects}/{episode}/progress
         GET /replays/{subjects}/{episode}/{theme}/
         GET /api/runs/{run_id}/export
         GET /api/projects/{project_id}/export
@@ -171,6 +179,7 @@ TABLE = {
         POST /api/evaluations/{evaluation_id}/cancel
         DELETE /api/evaluations/{evaluation_id}
         DELETE /api/uploads/{upload_id}
+        DELETE /api/recordings/{recording_id}
         PUT /api/runs/{run_id}/place
         PUT /api/runs/{run_id}/priority
         POST /api/runs/{run_id}/front
@@ -240,6 +249,8 @@ TABLE = {
         SOCKET /api/worker/runs/{run_id}/link
         POST /api/worker/jobs/claim
         GET /api/worker/jobs/{job_id}/archive
+        GET /api/worker/jobs/{job_id}/recordings/{number}
+        GET /api/worker/jobs/{job_id}/bag
         POST /api/worker/jobs/{job_id}/report
         POST /api/worker/jobs/{job_id}/frames
         POST /api/worker/jobs/{job_id}/seen
@@ -405,6 +416,8 @@ def everybody(
             Reports(client, services).measured(evaluation)
             onnx = {"name": "Mine", "project_id": here, "content": "AAAA", "task": {}}
             upload = client.post("/api/uploads", json=onnx).json()
+            recorded = f"/api/recordings?name=drive.mcap&project_id={here}"
+            recording = client.post(recorded, content=b"not looked at").json()
             searched = {"kind": "range", "path": "algorithm.gamma", "low": 0.9, "high": 0.99}
             wanted = {"name": "Search", "project_id": here, "training": {}, "settings": [searched]}
             study = client.post("/api/studies", json=wanted).json()
@@ -435,6 +448,7 @@ def everybody(
                 "run_id": experiment["runs"][0]["id"],
                 "checkpoint_id": checkpoint,
                 "upload_id": upload["id"],
+                "recording_id": recording["id"],
                 "evaluation_id": evaluation["id"],
                 "study_id": study["id"],
                 "playground_id": ground["id"],

@@ -23,6 +23,8 @@ from mcap_ros2.decoder import DecoderFactory
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
 from server.jobs.results import ResultStore
+from server.policies.service import shipped_hash
+from server.replays.simulator import simulator
 from server.services import Services
 from server.settings import Settings
 from sim.scan import scan
@@ -52,16 +54,13 @@ def store_checkpoint(client: TestClient, services: Services, archive: bytes, rec
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where all of these tests keep their recordings, so that each is made once; with an old one to begin with."""
-    directory = tmp_path_factory.mktemp("replays")
-    (directory / "old.npz").write_bytes(b"x" * 1000)
-    os.utime(directory / "old.npz", (1.0, 1.0))
-    return directory
+    """Where all of these tests keep their recordings, so that each is made once."""
+    return tmp_path_factory.mktemp("replays")
 
 
 @pytest.fixture(autouse=True)
 def _keep(services: Services, kept: Path, job_worker: None) -> None:
-    services.results = ResultStore(kept, max_bytes=1)
+    services.results = ResultStore(kept, max_bytes=2**30)
 
 
 @pytest.fixture
@@ -146,7 +145,6 @@ SHIPPED = "policy:complex:complex-200"
 
 
 def test_two_policies_drive_one_scenario_side_by_side(client: TestClient, services: Services, kept: Path) -> None:
-    services.results = ResultStore(kept, max_bytes=2**30)
     other = store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
     both = f"{SHIPPED},checkpoint:{other}"
     replay = client.get(f"/api/replays/{both}/7").json()
@@ -301,9 +299,10 @@ def test_a_suite_that_has_changed_is_not_passed_off_as_the_old_one(
 ) -> None:
     # What driving it again would give is there already.
     assert client.get("/api/policies/complex/suites/complex-200/replays/0").status_code == 200
-    (made,) = (path for path in kept.iterdir() if RECORDED.suite_hash[:16] in path.name)
+    whose = f"{shipped_hash('complex')[:32]}-{RECORDED.suite_hash[:16]}-{simulator()}"
+    (made,) = (path for path in kept.iterdir() if path.name.startswith(whose))
     shutil.copy(made, tmp_path / made.name.replace(RECORDED.suite_hash[:16], "0" * 16))
-    services.results = ResultStore(tmp_path, max_bytes=1)
+    services.results = ResultStore(tmp_path, max_bytes=2**30)
     changed = RECORDED.model_copy(update={"suite_hash": "0" * 64})
     checkpoint = store_checkpoint(client, services, POLICY.archive.read_bytes(), changed)
     response = client.get(f"/api/checkpoints/{checkpoint}/replays/0")
@@ -322,7 +321,14 @@ def test_players_need_a_login(settings: Settings) -> None:
         assert redirected.headers["location"] == "/replays/policy:simple:simple-200/0/dark/"
 
 
-def test_recordings_that_nobody_looked_at_go_first(client: TestClient, checkpoint: str, kept: Path) -> None:
+def test_recordings_that_nobody_looked_at_go_first(
+    client: TestClient, services: Services, checkpoint: str, tmp_path: Path
+) -> None:
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    (kept / "old.npz").write_bytes(b"x" * 1000)
+    os.utime(kept / "old.npz", (1.0, 1.0))
+    services.results = ResultStore(kept, max_bytes=1)
     assert client.get(f"/api/checkpoints/{checkpoint}/replays/0").status_code == 200
     # The bound is a byte: only the newest stays, whatever its size.
     assert not (kept / "old.npz").exists()
@@ -332,7 +338,6 @@ def test_recordings_that_nobody_looked_at_go_first(client: TestClient, checkpoin
 def test_a_time_lapse_shows_the_same_scenarios_at_every_checkpoint(
     client: TestClient, services: Services, kept: Path
 ) -> None:
-    services.results = ResultStore(kept, max_bytes=2**30)
     first = store_checkpoint(client, services, POLICY.archive.read_bytes(), RECORDED)
     with services.database.write() as session:
         run_id = CheckpointRepository(session).get(first).run_id

@@ -150,7 +150,7 @@ def test_the_server_starts_without_what_only_workers_need() -> None:
     loaded = imported_by("import server.app, server.processes.serve")
 
     assert "fastapi" in loaded
-    assert loaded.isdisjoint({"torch", "pymunk", "numba", "scipy"})
+    assert loaded.isdisjoint({"torch", "pymunk", "numba", "scipy", "viser", "mcap", "mcap_ros2", "av"})
 
 
 def test_help_does_not_wait_for_the_server_nor_for_the_workers() -> None:

@@ -72,7 +72,7 @@ def test_ppos_written_out_gradients_equal_autograd(layout: ActionLayout) -> None
     with torch.no_grad():
         actions = ppo.actor(observations) + noise * torch.exp(ppo.actor.log_std)
     old = log_prob(noise, ppo.actor.log_std).detach() - 0.3 * torch.randn(200)
-    samples = Samples(observations, actions, old, torch.randn(200), torch.randn(200))
+    samples = Samples(observations, observations, actions, old, torch.randn(200), torch.randn(200))
     rows, flat = torch.randperm(200)[:150], ppo._optimizer
     reference = AutogradPpo(ppo.actor, ppo.critic, 0.2, 0.01)(samples, rows)
     expected = flat.gradients.clone()

@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from torch.nn import functional
 
-from sim.config import LidarConfig, ObservationConfig, TaskConfig
+from sim.arenas import build_arenas
+from sim.config import ArenaConfig, LidarConfig, ObservationConfig, TaskConfig
 from sim.drivers import Driver
+from sim.engine.guidance import GUIDANCE_SIZE, Guidance
+from sim.engine.paths import Paths
 from tests.workers.test_trainer import Recorder
 from workers.algorithms.ppo import build_ppo
 from workers.algorithms.recurrent_ppo import RecurrentPpo
+from workers.algorithms.storage.rollout import Samples
 from workers.checkpoints import read_checkpoint, read_policy
 from workers.config import (
     ConvNetwork,
@@ -164,15 +168,22 @@ def recurrent_ppo(**changes: object) -> RecurrentPpo:
     return ppo
 
 
-def test_learning_sees_what_acting_saw() -> None:
+@pytest.mark.parametrize("critic_sees", ["observation", "path"])
+def test_learning_sees_what_acting_saw(critic_sees: str) -> None:
     """Before the first step of an update every ratio is 1, over resets and over the seams of sequences and rollouts."""
-    ppo = recurrent_ppo()
+    ppo = recurrent_ppo(critic_sees=critic_sees)
+    if critic_sees == "path":
+        ppo.guidance = Guidance(TaskConfig(), Paths(build_arenas(ArenaConfig()), 0.2), ppo.robots)
+        ppo.guidance.now[:] = np.random.default_rng(5).random((ppo.robots, GUIDANCE_SIZE))
     drive(ppo, 8, 0)
     ppo.update(0.0)
     drive(ppo, 8, 1)
     storage = ppo.storage
     for rows in ppo.minibatches():
-        mean, values = ppo._gradients.predict(storage.observations[:-1].flatten(0, 1)[rows.flatten()], rows)  # type: ignore[attr-defined]
+        known = torch.zeros(ppo.robots * 8)
+        samples = storage.samples(known, known, known)
+        batch = Samples(*(column[rows.flatten()] for column in samples))
+        mean, values = ppo._gradients.predict(batch, rows)  # type: ignore[attr-defined]
         noise = storage.noise.flatten(0, 1)[rows.flatten()]
         acted = storage.actions.flatten(0, 1)[rows.flatten()]
         torch.testing.assert_close(mean + noise * ppo.actor.log_std.exp(), acted, rtol=0, atol=1e-6)

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from sim.actions import action_layout
-from sim.config import LidarConfig, ObservationConfig, TaskConfig
+from sim.config import ArenaConfig, LidarConfig, ObservationConfig, TaskConfig
 from tests.workers.test_trainer import Recorder
 from workers.algorithms import plain_ppo
 from workers.algorithms.ppo import Ppo, build_actor_critic
@@ -69,6 +69,15 @@ def test_two_robots_whose_episodes_end(task: TaskConfig, network: Network, tmp_p
     algorithm = PpoConfig(
         network=network, learning_rate_schedule="constant", scale_returns=False, **TWO_ROBOTS, **SMALL_STEPS
     )
+    distance, _ = apart(task, algorithm, 2, tmp_path)
+    assert distance < TOLERANCE
+
+
+@pytest.mark.parametrize("task", [TIMED_OUT, COLLIDING], ids=["timed out", "colliding"])
+def test_a_critic_that_is_told_the_way(task: TaskConfig, tmp_path: Path) -> None:
+    """Among obstacles, over time-outs, whose value is what the path was there, and collisions."""
+    task = task.model_copy(update={"arena": ArenaConfig(name="complex")})
+    algorithm = PpoConfig(critic_sees="path", learning_rate_schedule="constant", **TWO_ROBOTS, **SMALL_STEPS)
     distance, _ = apart(task, algorithm, 2, tmp_path)
     assert distance < TOLERANCE
 

@@ -8,6 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.engine.guidance import GUIDANCE_SIZE
 from tests.heads import head
 from workers.algorithms.gradients.ppo import AutogradPpo, WrittenPpo, entropy, log_prob
 from workers.algorithms.ppo import Ppo, build_ppo
@@ -112,7 +113,8 @@ def batch_with_ratio(actor: GaussianActor, ratios: list[float], advantages: list
     observations, actions = torch.rand(rows, 16), torch.rand(rows, 2)
     with torch.no_grad():
         now = log_prob((actions - actor(observations)) / actor.log_std.exp(), actor.log_std)
-    return Samples(observations, actions, now - torch.tensor(ratios).log(), torch.tensor(advantages), torch.randn(rows))
+    old, returns = now - torch.tensor(ratios).log(), torch.randn(rows)
+    return Samples(observations, observations, actions, old, torch.tensor(advantages), returns)
 
 
 def test_clipped_surrogate_by_hand() -> None:
@@ -132,16 +134,26 @@ def test_clipped_surrogate_by_hand() -> None:
     assert losses[2].item() == pytest.approx(kl, abs=1e-5)
 
 
+@pytest.mark.parametrize("critic_sees", ["observation", "path"])
 @pytest.mark.parametrize("network", [ResBlockNetwork(), MlpNetwork(), MlpNetwork(activation="tanh")], ids=repr)
-def test_written_out_gradients_equal_autograd(network: Network) -> None:
+def test_written_out_gradients_equal_autograd(network: Network, critic_sees: str) -> None:
     rows = 3 * ROWS_AT_ONCE
-    config = PpoConfig(network=network, robots=8, rollout_steps=rows // 8, minibatch_size=64, entropy_coefficient=0.01)
+    config = PpoConfig(
+        network=network,
+        robots=8,
+        rollout_steps=rows // 8,
+        minibatch_size=64,
+        critic_sees=critic_sees,
+    )
     ppo = build_ppo(config, 16, 0, CPU)
     with torch.no_grad():
         head(ppo.actor.network).weight.normal_(0.0, 0.3)
     generator = torch.Generator().manual_seed(1)
     ratios = (torch.rand(rows, generator=generator) + 0.5).tolist()
     samples = batch_with_ratio(ppo.actor, ratios, torch.randn(rows, generator=generator).tolist())
+    if critic_sees == "path":
+        told = torch.randn(rows, GUIDANCE_SIZE, generator=generator)
+        samples = samples._replace(critic_observations=torch.cat((samples.observations, told), dim=1))
     minibatch = torch.randperm(rows, generator=generator)[: 2 * ROWS_AT_ONCE + 50]
     flat = ppo._optimizer
 

@@ -15,6 +15,8 @@ export const ROUTES = {
   '/evaluations': 'EvaluationsPage',
   '/evaluations/:evaluationId': 'EvaluationPage',
   '/leaderboards/:suiteHash?': 'LeaderboardPage',
+  '/recordings': 'RecordingsPage',
+  '/recordings/:recordingId': 'RecordingPage',
   '/studies': 'StudiesPage',
   '/studies/:studyId': 'StudyPage',
   '/playground/:playgroundId?': 'PlaygroundPage',

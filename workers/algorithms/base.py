@@ -6,6 +6,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.engine.guidance import Guidance
+
 Arrays = Mapping[str, NDArray[np.generic]]
 
 
@@ -77,6 +79,19 @@ class Algorithm(Protocol):
 
     def load_state(self, state: Arrays) -> None:
         """Continues where `state` was taken."""
+
+
+@runtime_checkable
+class Guided(Protocol):
+    """An algorithm whose critic may be told what only a simulator knows of the way ahead.
+
+    Attributes:
+        is_guided: whether it is.
+        guidance: of its robots, as the environment keeps it: given before the first `act`.
+    """
+
+    is_guided: bool
+    guidance: Guidance | None
 
 
 @runtime_checkable

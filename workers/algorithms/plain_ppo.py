@@ -30,6 +30,7 @@ class Rollout(NamedTuple):
 
     Attributes:
         observations: (T, N, size).
+        critic_observations: (T, N, size), or (T, N, size + G) with what the critic alone is told.
         actions: (T, N, A) as sampled; the environment clips them to their range.
         log_probs: (T, N) of these actions under the policy that sampled them.
         rewards: (T, N) as the environment paid them.
@@ -40,6 +41,7 @@ class Rollout(NamedTuple):
     """
 
     observations: Tensor
+    critic_observations: Tensor
     actions: Tensor
     log_probs: Tensor
     rewards: Tensor
@@ -56,7 +58,7 @@ class Learner:
     Attributes:
         config: hyperparameters.
         actor: observations (n, size) to the mean (n, A) of a normal distribution, whose deviations are its own.
-        critic: observations (n, size) to values (n, 1), in scaled rewards.
+        critic: observations (n, size), and what it alone is told, to values (n, 1), in scaled rewards.
         env: all robots.
         observations: (N, size) that the next actions are for.
         generator: of exploration and of the order of minibatches.
@@ -79,7 +81,7 @@ def train(config: TrainingConfig, seed: int) -> Learner:
     ppo = config.algorithm
     assert isinstance(ppo, PpoConfig)
     actor, critic = build_actor_critic(ppo, inputs_of(config.task), seed, action_layout(config.task.robot))
-    env = NavigationVectorEnv(with_maps_of(config.task, seed), ppo.robots, seed=seed)
+    env = NavigationVectorEnv(with_maps_of(config.task, seed), ppo.robots, seed=seed, guides=ppo.critic_sees == "path")
     observations, _ = env.reset(seed=seed)
     generator = torch.Generator().manual_seed(stream_seed(seed, EXPLORATION))
     learner = Learner(ppo, actor, critic, env, observations, generator)
@@ -99,6 +101,7 @@ def collect(learner: Learner) -> Rollout:
     steps = []
     for _ in range(config.rollout_steps):
         observations = torch.from_numpy(learner.observations)
+        critic_observations = with_guidance(observations, env, final=False)
         policy = Normal(actor(observations), actor.log_std.exp())
         noise = torch.empty_like(policy.mean).normal_(generator=learner.generator)
         actions = policy.mean + policy.stddev * noise
@@ -109,10 +112,14 @@ def collect(learner: Learner) -> Rollout:
         followed = torch.where(
             dones[:, None], torch.from_numpy(env.final_observations), torch.from_numpy(learner.observations)
         )
-        values, next_values = learner.critic(observations)[:, 0], learner.critic(followed)[:, 0]
+        critic_followed = torch.where(
+            dones[:, None], with_guidance(followed, env, final=True), with_guidance(followed, env, final=False)
+        )
+        values, next_values = learner.critic(critic_observations)[:, 0], learner.critic(critic_followed)[:, 0]
         steps.append(
             Rollout(
                 observations=observations,
+                critic_observations=critic_observations,
                 actions=actions,
                 log_probs=policy.log_prob(actions).sum(dim=1),
                 rewards=torch.from_numpy(rewards),
@@ -123,6 +130,13 @@ def collect(learner: Learner) -> Rollout:
             )
         )
     return Rollout(*(torch.stack(column) for column in zip(*steps, strict=True)))
+
+
+def with_guidance(observations: Tensor, env: NavigationVectorEnv, *, final: bool) -> Tensor:
+    """What the critic sees (n, size): the same, or with the way to the target behind it, now or as an episode ended."""
+    if env.guidance is None:
+        return observations
+    return torch.cat((observations, torch.from_numpy(env.guidance.final if final else env.guidance.now)), dim=1)
 
 
 def estimate_advantages(config: PpoConfig, rewards: Tensor, rollout: Rollout) -> Tensor:
@@ -151,6 +165,7 @@ def learn(learner: Learner, rollout: Rollout) -> None:
     returns = (advantages + rollout.values).flatten()
     advantages = ((advantages - advantages.mean()) / (advantages.std() + 1e-8)).flatten()
     observations, actions = rollout.observations.flatten(0, 1), rollout.actions.flatten(0, 1)
+    critic_observations = rollout.critic_observations.flatten(0, 1)
     log_probs = rollout.log_probs.flatten()
 
     for _ in range(config.epochs):
@@ -161,7 +176,7 @@ def learn(learner: Learner, rollout: Rollout) -> None:
             # Nothing is gained by going further from the old policy than the clip, in the direction that seems to pay.
             surrogate = torch.minimum(ratio * advantages[rows], clipped * advantages[rows]).mean()
             entropy = policy.entropy()[0].sum()  # of one action: the deviations are the same everywhere
-            value_loss = (critic(observations[rows])[:, 0] - returns[rows]).square().mean()
+            value_loss = (critic(critic_observations[rows])[:, 0] - returns[rows]).square().mean()
 
             learner.optimizer.zero_grad()
             (value_loss - surrogate - config.entropy_coefficient * entropy).backward()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from sim.actions import DEFAULT_ACTIONS, ActionLayout
+from sim.engine.guidance import GUIDANCE_SIZE, Guidance
 from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
@@ -43,12 +44,14 @@ class Ppo:
     Args:
         config: hyperparameters.
         actor: the policy, on `storage.device`.
-        critic: observations (n, size) to values (n, 1), on the same device.
+        critic: observations (n, size), and what it alone is told, to values (n, 1), on the same device.
         storage: for one rollout of `config.rollout_steps` steps of `config.robots` robots.
         generator: of exploration and of the order of minibatches, on the same device.
         gradients: how a minibatch's gradients are computed; None is the fastest way that there is.
 
     Attributes:
+        is_guided: whether the critic is told the shortest paths.
+        guidance: which these are, where it is.
         threads: of an update; with 2 the actor learns beside the critic where compiled passes are known, bit for bit alike.
     """
 
@@ -70,12 +73,14 @@ class Ppo:
         self._logits, self._values = inference(actor.network, config.robots), inference(critic, config.robots)
         self._scaler = ReturnScaler(config.robots, config.gamma)
         self.threads = 1
+        self.is_guided = config.critic_sees == "path"
+        self.guidance: Guidance | None = None
 
     @torch.no_grad()
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Algorithm.act`."""
         storage, step = self.storage, self.storage.step
-        storage.observations[step] = torch.from_numpy(observations)
+        storage.see(step, observations, None if self.guidance is None else self.guidance.now)
         storage.noise[step].normal_(generator=self._generator)
         mean = bound_actions(self._logits(storage.observations[step]), self.actor.actions)
         torch.addcmul(mean, storage.noise[step], torch.exp(self.actor.log_std), out=storage.actions[step])
@@ -91,9 +96,10 @@ class Ppo:
         final_observations: NDArray[np.float32],
     ) -> None:
         """See `Algorithm.record`."""
-        self.storage.add_outcome(rewards, terminations, truncations, final_observations)
+        now, final = (None, None) if self.guidance is None else (self.guidance.now, self.guidance.final)
+        self.storage.add_outcome(rewards, terminations, truncations, final_observations, final)
         if self.storage.full:
-            self.storage.observations[-1] = torch.from_numpy(observations)
+            self.storage.see(-1, observations, now)
 
     @torch.no_grad()
     def update(self, progress: float) -> dict[str, float]:
@@ -155,12 +161,12 @@ class Ppo:
         yield from order.split(self.config.minibatch_size)
 
     def values(self) -> torch.Tensor:
-        """Values (steps + 1, robots) of the rollout's observations."""
+        """Values (steps + 1, robots) of what the critic saw in the rollout."""
         # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
-        return torch.stack([self._values(observations)[:, 0].clone() for observations in self.storage.observations])
+        return torch.stack([self._values(seen)[:, 0].clone() for seen in self.storage.critic_observations])
 
     def final_values(self, observations: torch.Tensor) -> torch.Tensor:
-        """Values (k,) of the observations (k, size) at which the step limit cut episodes."""
+        """Values (k,) of what the critic saw (k, size) where the step limit cut episodes."""
         values: torch.Tensor = self.critic(observations)[:, 0]
         return values
 
@@ -243,7 +249,12 @@ def build_actor_critic(
         torch.manual_seed(stream_seed(seed, WEIGHTS))
         network = build_network(config.network, inputs, actions.size)
         actor = GaussianActor(network, initial_deviations(config, actions), actions)
-        return actor, build_network(config.network, inputs, 1)
+        return actor, build_network(config.network, inputs.and_also(told(config)), 1)
+
+
+def told(config: PpoConfig) -> int:
+    """Numbers that the critic is told beyond what the robot sees."""
+    return GUIDANCE_SIZE if config.critic_sees == "path" else 0
 
 
 def build_ppo(
@@ -253,7 +264,7 @@ def build_ppo(
     inputs = as_inputs(inputs)
     actor, critic = build_actor_critic(config, inputs, seed, actions)
     actor, critic = actor.to(device), critic.to(device)
-    storage = RolloutStorage(config.rollout_steps, config.robots, inputs.size, actions.size, device)
+    storage = RolloutStorage(config.rollout_steps, config.robots, inputs.size, actions.size, device, told(config))
     generator = torch.Generator(device).manual_seed(stream_seed(seed, EXPLORATION))
     if isinstance(config.network, RecurrentNetworkConfig):
         # Only now: it is made of this.

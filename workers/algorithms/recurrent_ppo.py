@@ -15,7 +15,7 @@ from torch import Tensor
 from workers.algorithms.base import Arrays
 from workers.algorithms.gradients.ppo import AutogradPpo
 from workers.algorithms.ppo import Ppo
-from workers.algorithms.storage.rollout import RolloutStorage
+from workers.algorithms.storage.rollout import RolloutStorage, Samples
 from workers.config import PpoConfig, RecurrentNetworkConfig
 from workers.networks.modules import Described, GaussianActor
 from workers.networks.squashing import bound_actions
@@ -36,13 +36,14 @@ class RecurrentGradients(AutogradPpo):
         self.starts, self.keep = starts, keep
         self._networks = (actor.network, critic)
 
-    def predict(self, observations: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
+    def predict(self, batch: Samples, rows: Tensor) -> tuple[Tensor, Tensor]:
         """See `AutogradPpo.predict`."""
         keep = self.keep.flatten(0, 1)[rows]
-        sequences = observations.view(*rows.shape, -1)
+        seen = batch.observations, batch.critic_observations
         outputs = []
-        for network, starts in zip(self._networks, self.starts, strict=True):
+        for network, starts, observations in zip(self._networks, self.starts, seen, strict=True):
             assert isinstance(network, Described)
+            sequences = observations.view(*rows.shape, -1)
             outputs.append(network.unroll(sequences, starts.flatten(0, 1)[rows[0]], keep).flatten(0, 1))
         logits, values = outputs
         return bound_actions(logits, self._actor.actions), values[:, 0]
@@ -80,7 +81,7 @@ class RecurrentPpo(Ppo):
         for start, memory in zip(self._starts, self._memories, strict=True):
             start[step] = memory
         logits, self._memories[0] = self.actor.network(observations, self._memories[0])
-        self._seen[step] = self._next_values(observations)[:, 0]
+        self._seen[step] = self._next_values(self.storage.critic_observations[step])[:, 0]
         assert isinstance(logits, Tensor)
         return logits
 
@@ -101,8 +102,11 @@ class RecurrentPpo(Ppo):
         """See `Algorithm.record`."""
         cut = np.flatnonzero(truncations & ~terminations)
         if cut.size:
-            last = torch.from_numpy(final_observations[cut]).to(self.storage.device)
-            self._final_values.append(self.critic(last, self._memories[1][torch.from_numpy(cut)])[0][:, 0])
+            last = final_observations[cut]
+            if self.guidance is not None:
+                last = np.concatenate((last, self.guidance.final[cut]), axis=1)
+            seen = torch.from_numpy(last).to(self.storage.device)
+            self._final_values.append(self.critic(seen, self._memories[1][torch.from_numpy(cut)])[0][:, 0])
         keep = torch.from_numpy(~(terminations | truncations)).to(self.storage.device, torch.float32)[:, None]
         for memory in self._memories:
             memory.mul_(keep)
@@ -111,7 +115,7 @@ class RecurrentPpo(Ppo):
             self._keep[self.storage.step] = keep
             return
         # Looked at only: the next rollout begins with the same observation.
-        values, _ = self.critic(self.storage.observations[-1], self._memories[1])
+        values, _ = self.critic(self.storage.critic_observations[-1], self._memories[1])
         self._seen[-1] = values[:, 0]
 
     def update(self, progress: float) -> dict[str, float]:

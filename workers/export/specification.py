@@ -45,6 +45,18 @@ def specify(manifest: Manifest, description: Description | None, packed_weights:
             f"the observation {observation.name!r} version {observation.version} can't be made on a robot: "
             "export with the release that trained this policy"
         )
+    return specify_task(task, manifest.network.name, description, packed_weights)
+
+
+def specify_task(task: TaskConfig, network: str, description: Description | None, packed_weights: bytes) -> Specification:
+    """The specification of a policy that was made for a task.
+
+    Args:
+        task: robot, LiDAR, observation and limits.
+        network: its name.
+        description: of the network; None where only an ONNX file says what it computes.
+        packed_weights: see `pack_weights`.
+    """
     actions = action_layout(task.robot).size
     repeated, carried = earlier_places(task)
     arena = build_arena(task.arena, 0)
@@ -77,7 +89,7 @@ def specify(manifest: Manifest, description: Description | None, packed_weights:
         robot_radius=task.robot.inscribed_radius,
         robot_length=2.0 * half_length,
         robot_width=2.0 * half_width,
-        network=manifest.network.name,
+        network=network,
         formula=() if description is None else description.lines,
         memory=0 if description is None else description.memory,
         weights_sha256=hashlib.sha256(packed_weights).hexdigest(),

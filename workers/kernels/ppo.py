@@ -87,7 +87,8 @@ def differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lo
         grad_log_std: (A,) float64, added to: derivative of the loss by the log deviations.
         statistics: (4,) float64, added to: `STATISTICS`.
     """
-    all_observations, all_actions, all_log_probs, all_advantages, all_returns = samples
+    all_observations, all_critic_observations, all_actions, all_log_probs, all_advantages, all_returns = samples
+    critic_is_told = all_critic_observations.shape[1] > all_observations.shape[1]
     size = minibatch.shape[0]
     share = 1.0 / size
     grad_logits, grad_values = np.empty((at_once, lows.shape[0]), np.float32), np.empty((at_once, 1), np.float32)
@@ -103,6 +104,8 @@ def differentiate(actor, critic, whose, samples, minibatch, at_once, log_std, lo
             )  # fmt: skip
             backward(actor, observations, grad_logits[:rows], again)
         if whose & CRITIC:
+            if critic_is_told:
+                observations = all_critic_observations[some]
             values = forward(critic, observations, again)
             differentiate_value_loss(values, all_returns[some], share, grad_values, statistics)
             backward(critic, observations, grad_values[:rows], again)

@@ -66,6 +66,11 @@ class FieldRow(FieldKey):
     detour: float | None = None
 
     @property
+    def key(self) -> FieldKey:
+        """Who drove what."""
+        return FieldKey(**{name: getattr(self, name) for name in FieldKey.model_fields})
+
+    @property
     def success(self) -> float:
         """Share of the episodes that arrived."""
         return self.arrivals / self.episodes
@@ -83,6 +88,11 @@ class Field(Frozen):
     command: str
     date: str
     rows: tuple[FieldRow, ...]
+
+    def in_place_of(self, older: "Field") -> "Field":
+        """With the rows of an older measurement that this one does not measure anew."""
+        anew = {row.key for row in self.rows}
+        return self.model_copy(update={"rows": (*(row for row in older.rows if row.key not in anew), *self.rows)})
 
 
 @cache

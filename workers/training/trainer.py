@@ -19,7 +19,7 @@ from sim.envs.vector import NavigationVectorEnv
 from sim.observations import observation_layout
 from sim.suites import suite_for
 from workers.algorithms import build_algorithm
-from workers.algorithms.base import Threaded, with_prefix, without_prefix
+from workers.algorithms.base import Guided, Threaded, with_prefix, without_prefix
 from workers.archive_size import refuse_too_large
 from workers.checkpoints import (
     Checkpoint,
@@ -129,7 +129,10 @@ class Training:
         self.threaded = self.algorithm if isinstance(self.algorithm, Threaded) else None
         self.threads = ThreadCount(config.threads)
         self.task = with_maps_of(config.task, seed)
-        self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False)
+        guided = self.algorithm if isinstance(self.algorithm, Guided) and self.algorithm.is_guided else None
+        self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False, guides=guided is not None)
+        if guided is not None:
+            guided.guidance = self.env.guidance
         self.observations, _ = self.env.reset(seed=seed)
         self.metrics = TrainingMetrics(self.algorithm.robots, actions=self.actions)
         self.steps_per_update = self.algorithm.steps_per_update * self.algorithm.robots

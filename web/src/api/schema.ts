@@ -1806,6 +1806,94 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Recordings
+         * @description Some of the recordings, the newest first.
+         */
+        get: operations["list_recordings_api_recordings_get"];
+        put?: never;
+        /**
+         * Upload Recording
+         * @description Keep what a robot recorded: an `.mcap` or a `.db3` file, or the folder of a rosbag2 recording as `.zip` or `.tar`.
+         */
+        post: operations["upload_recording_api_recordings_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Recording
+         * @description One of the recordings.
+         */
+        get: operations["get_recording_api_recordings__recording_id__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Recording
+         * @description Forget one.
+         */
+        delete: operations["delete_recording_api_recordings__recording_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording_id}/beside": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Hold Beside
+         * @description What a policy would have commanded at every moment beside what the robot did, and where they part.
+         */
+        get: operations["hold_beside_api_recordings__recording_id__beside_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{recording_id}/reading": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Recording
+         * @description The scene, and noise, dropout, rate, delay and accelerations with their intervals: a second or two, then at once.
+         */
+        get: operations["read_recording_api_recordings__recording_id__reading_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/replays/{subjects}/{episode}": {
         parameters: {
             query?: never;
@@ -1826,6 +1914,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/replays/{subjects}/{episode}/gif": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Gif
+         * @description The episode from above as a GIF of half a minute at most, smaller than the MP4.
+         */
+        get: operations["replay_gif_api_replays__subjects___episode__gif_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/replays/{subjects}/{episode}/mcap": {
         parameters: {
             query?: never;
@@ -1838,6 +1946,46 @@ export interface paths {
          * @description The episode as an MCAP file of ROS 2 messages: scans, odometry, commands, the goal, and transforms.
          */
         get: operations["replay_messages_api_replays__subjects___episode__mcap_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/{episode}/mp4": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Video
+         * @description The episode from above as a film of a minute at most: MP4, H.264; of several policies the others are ghosts.
+         */
+        get: operations["replay_video_api_replays__subjects___episode__mp4_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replays/{subjects}/{episode}/progress": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Film Made
+         * @description How far a film of the episode is made, while the film itself is waited for.
+         */
+        get: operations["film_made_api_replays__subjects___episode__progress_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -3982,6 +4130,155 @@ export interface components {
              * @description Id of what it was done to.
              */
             target: string | null;
+        };
+        /**
+         * Bag
+         * @description A robot's recording that was uploaded.
+         */
+        Bag: {
+            /** Created At */
+            created_at: number;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /** Project Id */
+            project_id: string;
+            /** Sha256 */
+            sha256: string;
+            /**
+             * Size
+             * @description Bytes of its file.
+             */
+            size: number;
+        };
+        /**
+         * BagBeside
+         * @description What a policy would have commanded in a recording, moment by moment, beside what the robot did.
+         *
+         *     Attributes:
+         *         policy: its name.
+         *         period: seconds between its commands.
+         *         notes: what one should know, each a sentence.
+         *         times: of its commands (n).
+         *         forwards, turning: (n) what it would have commanded, m/s and rad/s.
+         *         did_forwards, did_turning: (n) what the robot did in the period that follows.
+         *         states: (n) index into `reasons`: why it would drive or stand.
+         *         reasons: for people.
+         *         driving: (n) whether the policy itself decides there.
+         *         partings: the largest first.
+         */
+        BagBeside: {
+            /** Did Forwards */
+            did_forwards: number[];
+            /** Did Turning */
+            did_turning: number[];
+            /** Driving */
+            driving: boolean[];
+            /** Forwards */
+            forwards: number[];
+            /** Notes */
+            notes: string[];
+            /** Partings */
+            partings: components["schemas"]["Parting"][];
+            /** Period */
+            period: number;
+            /** Policy */
+            policy: string;
+            /** Reasons */
+            reasons: string[];
+            /** States */
+            states: number[];
+            /** Times */
+            times: number[];
+            /** Turning */
+            turning: number[];
+        };
+        /**
+         * BagPage
+         * @description Some of the recordings, the newest first.
+         */
+        BagPage: {
+            /** Items */
+            items: components["schemas"]["Bag"][];
+            /**
+             * Total
+             * @description How many there are on all pages.
+             */
+            total: number;
+        };
+        /**
+         * BagReading
+         * @description A recording: what is in it, the way that was driven, what was fitted. Times are seconds since its begin.
+         *
+         *     Attributes:
+         *         seconds: that it lasts.
+         *         topics: that could be read, and those that are.
+         *         notes: what one should know of it, each a sentence.
+         *         times: of the moments (n) below.
+         *         path: (n) x, y and heading of the robot, in the frame of its odometry.
+         *         forwards, turning: (n) measured, m/s and rad/s.
+         *         asked_forwards, asked_turning: (n) commanded, likewise; None where nothing was yet.
+         *         points: x and y of what the LiDAR met, metres.
+         *         scan_times: of the scans that are kept to be drawn.
+         *         scan_bearings: of their rays against the heading, radians.
+         *         scans: ranges along these, metres; None where nothing was met.
+         *         lidar_at: x and y of the LiDAR on the robot, metres.
+         *         goals: time, x, y of each goal.
+         *         lidar: what the scans say.
+         *         fitted: quantities with their intervals.
+         *         settings: what a training with these would begin with.
+         */
+        BagReading: {
+            /** Asked Forwards */
+            asked_forwards: (number | null)[];
+            /** Asked Turning */
+            asked_turning: (number | null)[];
+            /** Fitted */
+            fitted: components["schemas"]["Fitted"][];
+            /** Forwards */
+            forwards: number[];
+            /** Goals */
+            goals: [
+                number,
+                number,
+                number
+            ][];
+            lidar: components["schemas"]["LidarFacts"];
+            /** Lidar At */
+            lidar_at: [
+                number,
+                number
+            ];
+            /** Notes */
+            notes: string[];
+            /** Path */
+            path: [
+                number,
+                number,
+                number
+            ][];
+            /** Points */
+            points: [
+                number,
+                number
+            ][];
+            /** Scan Bearings */
+            scan_bearings: number[];
+            /** Scan Times */
+            scan_times: number[];
+            /** Scans */
+            scans: (number | null)[][];
+            /** Seconds */
+            seconds: number;
+            /** Settings */
+            settings: components["schemas"]["Setting"][];
+            /** Times */
+            times: number[];
+            /** Topics */
+            topics: components["schemas"]["Topic"][];
+            /** Turning */
+            turning: number[];
         };
         /**
          * BaselineName
@@ -6198,6 +6495,50 @@ export interface components {
             rays: number;
         };
         /**
+         * FilmProgress
+         * @description How far a film is made.
+         */
+        FilmProgress: {
+            /**
+             * Ready
+             * @description It is there.
+             */
+            ready: boolean;
+            /**
+             * Share
+             * @description Of the work, 0 to 1; 0 while it waits for its turn, or for the episodes to be driven.
+             */
+            share: number;
+        };
+        /**
+         * Fitted
+         * @description A quantity of the robot or its sensors, fitted from a recording.
+         *
+         *     Attributes:
+         *         key: of the quantity; that of a setting of a task where there is one, such as `lidar.noise`.
+         *         title: for people.
+         *         unit: of the numbers.
+         *         value: the estimate; None where it can't be told.
+         *         low, high: its interval of 95 %; None where the recording sets no bound on that side.
+         *         note: how it was found, or why it can't be told and what would help.
+         */
+        Fitted: {
+            /** High */
+            high: number | null;
+            /** Key */
+            key: string;
+            /** Low */
+            low: number | null;
+            /** Note */
+            note: string;
+            /** Title */
+            title: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number | null;
+        };
+        /**
          * FormulaTerm
          * @description A formula of one's own, paid in every step; see docs/rewards.md for what it may read.
          */
@@ -6852,7 +7193,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "view" | "play" | "replay" | "export" | "evaluate";
+            kind: "view" | "play" | "replay" | "film" | "bag" | "export" | "evaluate";
             /**
              * Progress
              * @description Share of the work that is done, 0 to 1.
@@ -7205,6 +7546,26 @@ export interface components {
              * @default 30
              */
             rays: number;
+        };
+        /**
+         * LidarFacts
+         * @description What the scans say of the LiDAR; angles in degrees, lengths in metres.
+         *
+         *     Attributes:
+         *         beams: of a scan.
+         *         field_of_view: from the first beam to the last.
+         *         looks: where the middle of that is, against the heading, left positive.
+         *         range: the longest that it measures.
+         */
+        LidarFacts: {
+            /** Beams */
+            beams: number;
+            /** Field Of View */
+            field_of_view: number;
+            /** Looks */
+            looks: number;
+            /** Range */
+            range: number;
         };
         /**
          * Lineage
@@ -8238,6 +8599,25 @@ export interface components {
             step: number | null;
         };
         /**
+         * Parting
+         * @description A while in which policy and robot did most unlike things.
+         *
+         *     Attributes:
+         *         at: when they were furthest apart.
+         *         start, end: of the while about it.
+         *         share: how far, as a share of the larger span of the policy's limits; 1 is as far as it goes.
+         */
+        Parting: {
+            /** At */
+            at: number;
+            /** End */
+            end: number;
+            /** Share */
+            share: number;
+            /** Start */
+            start: number;
+        };
+        /**
          * PasswordChange
          * @description A new password. The other browsers that were signed in are signed out.
          */
@@ -8812,6 +9192,13 @@ export interface components {
              */
             clip_range: number;
             /**
+             * Critic sees
+             * @description With the path it is told the shortest path's length and direction besides what the robot sees, and judges better where targets are out of sight. The policy is told nothing.
+             * @default observation
+             * @enum {string}
+             */
+            critic_sees: "observation" | "path";
+            /**
              * Entropy coefficient
              * @default 0.003
              */
@@ -8902,6 +9289,13 @@ export interface components {
              * @default 0.2
              */
             clip_range: number;
+            /**
+             * Critic sees
+             * @description With the path it is told the shortest path's length and direction besides what the robot sees, and judges better where targets are out of sight. The policy is told nothing.
+             * @default observation
+             * @enum {string}
+             */
+            critic_sees: "observation" | "path";
             /**
              * Entropy coefficient
              * @default 0.003
@@ -9367,7 +9761,7 @@ export interface components {
             items: components["schemas"]["WaitingRun"][];
             /**
              * Jobs
-             * @description Views, replays, exports and evaluations that wait for a worker of jobs.
+             * @description Views, replays, films, exports and evaluations that wait for a worker of jobs.
              */
             jobs: number;
             /**
@@ -10919,6 +11313,23 @@ export interface components {
             seen_at: number;
         };
         /**
+         * Setting
+         * @description A setting of a task, as the recording has it.
+         *
+         *     Attributes:
+         *         path: of the setting within a task.
+         *         title: for people.
+         *         value: of the setting.
+         */
+        Setting: {
+            /** Path */
+            path: string[];
+            /** Title */
+            title: string;
+            /** Value */
+            value: number | number[];
+        };
+        /**
          * ShippedPolicy
          * @description A trained policy that ships with the project.
          */
@@ -12279,6 +12690,32 @@ export interface components {
              * @default -1
              */
             weight: number;
+        };
+        /**
+         * Topic
+         * @description A topic of a recording that could be read as `role`.
+         *
+         *     Attributes:
+         *         role: what it would be read as.
+         *         name: of the topic.
+         *         type: of its messages.
+         *         messages: how many there are.
+         *         chosen: whether it is the one that is read.
+         */
+        Topic: {
+            /** Chosen */
+            chosen: boolean;
+            /** Messages */
+            messages: number;
+            /** Name */
+            name: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "scan" | "odometry" | "commands" | "goal";
+            /** Type */
+            type: string;
         };
         /**
          * TrailPart
@@ -18988,6 +19425,358 @@ export interface operations {
             };
         };
     };
+    list_recordings_api_recordings_get: {
+        parameters: {
+            query?: {
+                /** @description Items at most. */
+                limit?: number;
+                /** @description Items to leave out before them. */
+                offset?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BagPage"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    upload_recording_api_recordings_post: {
+        parameters: {
+            query: {
+                /** @description Of the recording, for people. */
+                name: string;
+                project_id?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Bag"];
+                };
+            };
+            /** @description Makes no sense as a whole */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    get_recording_api_recordings__recording_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                recording_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Bag"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    delete_recording_api_recordings__recording_id__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                recording_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    hold_beside_api_recordings__recording_id__beside_get: {
+        parameters: {
+            query?: {
+                /** @description Id of a checkpoint. */
+                checkpoint?: string | null;
+                /** @description Where several fit: the one that is read. */
+                commands?: string | null;
+                /** @description Where several fit: the one that is read. */
+                goal?: string | null;
+                /** @description Where several fit: the one that is read. */
+                odometry?: string | null;
+                /** @description Where several fit: the one that is read. */
+                scan?: string | null;
+                /** @description Name of a shipped policy. */
+                shipped?: string | null;
+                /** @description Id of an uploaded policy. */
+                uploaded?: string | null;
+            };
+            header?: never;
+            path: {
+                recording_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BagBeside"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Can't be read, or lacks what is asked of it: the reason is in the detail */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    read_recording_api_recordings__recording_id__reading_get: {
+        parameters: {
+            query?: {
+                /** @description Where several fit: the one that is read. */
+                commands?: string | null;
+                /** @description Where several fit: the one that is read. */
+                goal?: string | null;
+                /** @description Where several fit: the one that is read. */
+                odometry?: string | null;
+                /** @description Where several fit: the one that is read. */
+                scan?: string | null;
+            };
+            header?: never;
+            path: {
+                recording_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BagReading"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Can't be read, or lacks what is asked of it: the reason is in the detail */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
     replay_api_replays__subjects___episode__get: {
         parameters: {
             query?: never;
@@ -19007,6 +19796,85 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["EpisodeReplay"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    replay_gif_api_replays__subjects___episode__gif_get: {
+        parameters: {
+            query?: {
+                theme?: "light" | "dark";
+            };
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/gif": unknown;
                 };
             };
             /** @description No valid login */
@@ -19138,6 +20006,147 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    replay_video_api_replays__subjects___episode__mp4_get: {
+        parameters: {
+            query?: {
+                theme?: "light" | "dark";
+            };
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "video/mp4": unknown;
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+            /** @description Not driven again: the reason is in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Took too long, or too many wait already: Retry-After says when to come again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    film_made_api_replays__subjects___episode__progress_get: {
+        parameters: {
+            query?: {
+                form?: "scene" | "mcap" | "mp4" | "gif";
+                theme?: "light" | "dark";
+            };
+            header?: never;
+            path: {
+                episode: number;
+                subjects: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FilmProgress"];
+                };
+            };
+            /** @description No valid login */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Not in this state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

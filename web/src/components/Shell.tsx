@@ -82,6 +82,7 @@ export function Shell() {
           {!locked && (
             <>
               <Link to="/projects">Projects</Link>
+              <Link to="/recordings">Recordings</Link>
               <Link to="/storage">Storage</Link>
             </>
           )}

@@ -158,6 +158,7 @@ const WAYS_ON: Record<string, readonly (readonly [to: string, label: string])[]>
   leaderboard: [['/leaderboards', 'All leaderboards']],
   study: [['/studies', 'All studies']],
   project: [['/projects', 'All projects']],
+  recording: [['/recordings', 'All recordings']],
   playground: [['/playground', 'Open another']],
 }
 

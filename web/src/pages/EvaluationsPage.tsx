@@ -33,6 +33,9 @@ export function EvaluationsPage() {
           <Button component={Link} to="/leaderboards" variant="default">
             Leaderboards
           </Button>
+          <Button component={Link} to="/recordings" variant="default">
+            From a robot
+          </Button>
           <PolicyUpload />
         </Group>
       }

@@ -12,6 +12,7 @@ import { ArenaFields, isOfArena } from '../components/launch/ArenaFields'
 import { TimeEstimate } from '../components/launch/TimeEstimate'
 import { ParallelRunsInput } from '../components/ParallelRuns'
 import { useLaunchProject } from '../components/people/useLaunchProject'
+import { withSettings } from '../components/recordings/reading'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
 import { faultsOf } from '../form/faults'
@@ -67,15 +68,16 @@ export function NewTrainingPage() {
   )
   const copied = useCopy(original.data, start.data)
   const chosen = search.get('arena')
+  const told = search.get('settings')
   const initial =
     from !== null || checkpoint !== null
       ? copied
       : like !== null
         ? likePolicy(policy.data, shipped !== null)
-        : withArena(form.data?.defaults, chosen)
+        : withArena(form.data?.defaults, chosen, told)
   const source = from !== null ? original : checkpoint !== null ? start : like !== null ? policy : null
   const error = form.isError ? form.error : (source?.error ?? null)
-  const key = checkpoint ?? from ?? (shipped ? `from ${shipped}` : like) ?? chosen ?? ''
+  const key = checkpoint ?? from ?? (shipped ? `from ${shipped}` : like) ?? chosen ?? told ?? ''
 
   return (
     <Page title="New training">
@@ -112,10 +114,10 @@ export function NewTrainingPage() {
   )
 }
 
-/** The defaults, on the arena that was chosen in the gallery. */
-function withArena(defaults: unknown, chosen: string | null): Json | undefined {
+/** The defaults, on the arena that was chosen in the gallery, with what was fitted from a robot's recording. */
+function withArena(defaults: unknown, chosen: string | null, told: string | null): Json | undefined {
   if (defaults === undefined) return undefined
-  const values = defaults as Json
+  const values = withSettings(defaults as Json, told)
   const arena = arenaFromSearch(chosen)
   const there = arena ? withValue(values, ['training', 'task', 'arena'], arena) : values
   return withValue(there, NAME, suggestedName(valueAt(there, ['training']) ?? null))

@@ -297,10 +297,7 @@ test('an episode is replayed; its address can be passed on', async () => {
   const dialog = screen.getByRole('dialog', { name: 'Episode 2' })
   expect(dialog).toHaveTextContent('Collision at 2.4 s12 steps, on simple-200')
   expect(within(dialog).queryByRole('alert')).not.toBeInTheDocument()
-  expect(within(dialog).getByRole('link', { name: 'Download' })).toHaveAttribute(
-    'href',
-    '/replays/checkpoint:cp2/1/light/?download',
-  )
+  expect(within(dialog).getByRole('button', { name: 'Download' })).toBeEnabled()
   // Two pictures at once would share one machine.
   expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
   await user.keyboard('{Escape}')
@@ -348,16 +345,48 @@ test('two policies are shown in one place, by a link that shows them again', asy
   expect(screen.getByTestId('replay-ends')).toHaveTextContent(
     /A.*Collision at 2.4 s.*BA simple arenaArrival at 4.8 s/,
   )
-  expect(screen.getByRole('link', { name: 'MCAP' })).toHaveAttribute(
-    'href',
-    '/api/replays/checkpoint:cp2,policy:simple:simple-200/1/mcap',
-  )
   // Of several, the reward is one line each: the sum, or the term that one chooses.
   expect(await screen.findByRole('combobox', { name: 'Term of the reward' })).toBeInTheDocument()
   expect(server.asked.filter((path) => path.endsWith('/progress')).length).toBeLessThan(5)
   await user.keyboard('{Escape}{Escape}')
   await waitFor(() => expect(screen.queryByRole('dialog')).not.toBeInTheDocument())
   expect(router.state.location.search).toBe('')
+})
+
+test('an episode is taken away in the form that one chooses; a refusal is said', async () => {
+  let finish = () => {}
+  const made = new Promise<void>((done) => {
+    finish = done
+  })
+  const server = startServer({
+    ...routes,
+    'GET /api/replays/checkpoint%3Acp2/1': replay,
+    'GET /api/replays/checkpoint%3Acp2/1/series': episodeSeries,
+    'GET /api/replays/checkpoint%3Acp2/1/progress': { ready: false, share: 0.4 },
+    'GET /api/replays/checkpoint:cp2/1/mp4': refusal(503, '200 jobs wait for a worker already.'),
+    'GET /api/replays/checkpoint:cp2/1/gif': async () => {
+      await made
+      return new Response('GIF89a')
+    },
+  })
+  const taken: string[] = []
+  vi.spyOn(HTMLAnchorElement.prototype, 'click').mockImplementation(function (this: HTMLAnchorElement) {
+    taken.push(`${this.getAttribute('href')} ${this.download === ''}`)
+  })
+  const { user } = open('/runs/run1?replay=2')
+  const choose = async (form: string) => {
+    await user.click(await screen.findByRole('button', { name: 'Download' }))
+    await user.click(await screen.findByRole('menuitem', { name: new RegExp(`^${form}`) }))
+  }
+  await choose('GIF')
+  expect(await screen.findByRole('button', { name: /^GIF: 40/ })).toBeDisabled()
+  finish()
+  await screen.findByRole('button', { name: 'Download' })
+  expect(taken).toEqual(['/api/replays/checkpoint:cp2/1/gif?theme=light true'])
+  expect(server.asked).toContain('/api/replays/checkpoint%3Acp2/1/progress?form=gif&theme=light')
+  await choose('MP4')
+  expect(await screen.findByText('200 jobs wait for a worker already.')).toBeInTheDocument()
+  expect(taken).toHaveLength(1)
 })
 
 test('Back closes a replay that was opened here, and leaves the page where it is', async () => {

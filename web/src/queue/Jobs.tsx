@@ -22,7 +22,7 @@ export function Jobs() {
   )
   const cancel = $api.useMutation('post', '/api/jobs/{job_id}/cancel', change('take it back'))
   return (
-    <Panel title="Views, replays, exports, evaluations" flush data-testid="jobs">
+    <Panel title="Views, replays, films, exports, evaluations" flush data-testid="jobs">
       <Rows
         what="Jobs"
         head={['What', 'Of', 'State', 'By', 'Asked for', '']}

@@ -63,7 +63,7 @@ class AutogradPpo:
             if parameter.grad is not None:
                 parameter.grad.zero_()
         log_std = self._actor.log_std
-        mean, values = self.predict(batch.observations, rows)
+        mean, values = self.predict(batch, rows)
         noise = (batch.actions - mean) / torch.exp(log_std)
         log_ratio = log_prob(noise, log_std) - batch.log_probs
         ratio = torch.exp(log_ratio)
@@ -76,9 +76,9 @@ class AutogradPpo:
             clip_fraction = (ratio != clipped).float().mean()
             return torch.stack((policy_loss, value_loss, kl, clip_fraction))
 
-    def predict(self, observations: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean actions (n, A) and values (n,) of observations (n, size), which are these rows of the rollout."""
-        return self._actor(observations), self._critic(observations)[:, 0]
+    def predict(self, batch: Samples, rows: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean actions (n, A) and values (n,) of samples, which are these rows of the rollout."""
+        return self._actor(batch.observations), self._critic(batch.critic_observations)[:, 0]
 
 
 class WrittenPpo:

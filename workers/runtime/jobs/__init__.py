@@ -1,1 +1,1 @@
-"""What a worker does beside trainings: views, replays, exports and evaluations, each in a process that is warm already."""
+"""What a worker does beside trainings: views, replays, films, recordings, exports, evaluations, each in a warm process."""

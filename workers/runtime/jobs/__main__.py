@@ -24,7 +24,7 @@ from workers.runtime.sight import ServerSight
 from workers.runtime.supervised import end_with_supervisor
 
 _VIEWS: tuple[JobKind, ...] = ("view", "play")
-_WAITED_FOR: tuple[JobKind, ...] = ("replay", "export")
+_WAITED_FOR: tuple[JobKind, ...] = ("replay", "film", "bag", "export")
 _ALL_BUT_VIEWS: tuple[JobKind, ...] = tuple(kind for kind in KINDS if kind not in _VIEWS)
 # Of finished policies that are watched or played with at a time; each takes a few per cent of a core.
 VIEW_PLACES = 4

@@ -46,9 +46,27 @@ class JobClient(ServerClient):
         Raises:
             ArchiveIntegrityError: what came is not what was stored.
         """
+        if self._fetch_file(job_id, "archive", attempt, path) != sha256:
+            raise ArchiveIntegrityError("the policy's archive is not what was stored there")
+
+    def fetch_recording(self, job_id: str, attempt: int, number: int, path: Path) -> None:
+        """What a film's policy of that number did."""
+        self._fetch_file(job_id, f"recordings/{number}", attempt, path)
+
+    def fetch_bag(self, job_id: str, attempt: int, sha256: str, path: Path) -> None:
+        """The robot's recording that the job reads.
+
+        Raises:
+            ArchiveIntegrityError: what came is not what was stored.
+        """
+        if self._fetch_file(job_id, "bag", attempt, path) != sha256:
+            raise ArchiveIntegrityError("the recording is not what was stored there")
+
+    def _fetch_file(self, job_id: str, what: str, attempt: int, path: Path) -> str:
+        """A file; its SHA-256."""
         digest = hashlib.sha256()
         try:
-            with self._http.stream("GET", f"/api/worker/jobs/{job_id}/archive", params={"attempt": attempt}) as response:
+            with self._http.stream("GET", f"/api/worker/jobs/{job_id}/{what}", params={"attempt": attempt}) as response:
                 if response.is_error:
                     response.read()
                 check(response)
@@ -58,8 +76,7 @@ class JobClient(ServerClient):
                         file.write(block)
         except httpx.TransportError as error:
             raise unavailable(error) from error
-        if digest.hexdigest() != sha256:
-            raise ArchiveIntegrityError("the policy's archive is not what was stored there")
+        return digest.hexdigest()
 
     def bring_result(self, job_id: str, attempt: int, path: Path) -> None:
         """What came out of the job."""

@@ -7,7 +7,8 @@ import shutil
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
@@ -17,6 +18,8 @@ from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefuse
 from workers.job_protocol import (
     FRAME_LENGTH_BYTES,
     MAX_FRAMES_BYTES,
+    BagJob,
+    FilmJob,
     JobClaim,
     JobEnd,
     JobKind,
@@ -27,7 +30,18 @@ from workers.play_protocol import PlaySeen
 from workers.processes import how_it_ended
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.jobs.client import JobClient
-from workers.runtime.jobs.process import ARCHIVE, RECORDING, RESULT, Done, Failed, Progressed, Said, main
+from workers.runtime.jobs.process import (
+    ARCHIVE,
+    BAG,
+    RECORDING,
+    RESULT,
+    Done,
+    Failed,
+    Progressed,
+    Said,
+    main,
+    recording_name,
+)
 from workers.runtime.jobs.pulse import REPORT_SECONDS, pulse
 from workers.runtime.sight import ServerSight
 
@@ -128,16 +142,12 @@ class Place:
 
     def _do(self, claim: JobClaim, directory: Path) -> JobEnd | None:
         """How the job ended; None where the server knows better."""
-        if claim.sha256 is not None:
-            sha256 = claim.sha256
-            try:
-                with pulse(self._client, claim, 0.0):
-                    self._patiently(
-                        lambda: self._client.fetch_archive(claim.id, claim.attempt, sha256, directory / ARCHIVE),
-                        claim.lease_seconds,
-                    )
-            except (ArchiveIntegrityError, RequestRefusedError) as error:
-                return JobEnd(outcome="failed", error=str(error))
+        try:
+            with pulse(self._client, claim, 0.0):
+                for fetch in self._needed(claim, directory):
+                    self._patiently(fetch, claim.lease_seconds)
+        except (ArchiveIntegrityError, RequestRefusedError) as error:
+            return JobEnd(outcome="failed", error=str(error))
         ours, theirs = self._context.Pipe()
         process = self._context.Process(
             target=main, args=(claim.spec.model_dump_json(), str(directory), theirs), daemon=True
@@ -164,6 +174,17 @@ class Place:
                     lambda: self._client.bring_recording(claim.id, claim.attempt, recording), claim.lease_seconds
                 )
         return end
+
+    def _needed(self, claim: JobClaim, directory: Path) -> Iterator[Callable[[], None]]:
+        """Fetches what the job can't begin without, one file after another."""
+        if claim.sha256 is not None:
+            yield partial(self._client.fetch_archive, claim.id, claim.attempt, claim.sha256, directory / ARCHIVE)
+        if isinstance(claim.spec, FilmJob):
+            for number in range(len(claim.spec.film.policies)):
+                path = directory / recording_name(number)
+                yield partial(self._client.fetch_recording, claim.id, claim.attempt, number, path)
+        if isinstance(claim.spec, BagJob):
+            yield partial(self._client.fetch_bag, claim.id, claim.attempt, claim.spec.bag_sha256, directory / BAG)
 
     def _patiently(self, request: Callable[[], None], seconds: float) -> None:
         """Ask again while the server does not answer, for as long as it may keep the job for us."""

@@ -19,9 +19,11 @@ from workers.errors import WorkerError
 from workers.frames import Frame
 from workers.job_protocol import (
     JOB_SPEC,
+    BagJob,
     BaselineName,
     EvaluateJob,
     ExportJob,
+    FilmJob,
     JobOrders,
     PlayJob,
     ReplayJob,
@@ -39,7 +41,15 @@ RESULT = "result"
 RECORDING = "recording"
 """Of an evaluation: what its robots did, where that is not too much."""
 
+BAG = "bag"
+"""In the job's folder: the robot's recording that it reads."""
+
 _PROGRESS_SECONDS = 0.5
+
+
+def recording_name(number: int) -> str:
+    """In the folder of a film's job: what its policy of that number did."""
+    return f"{RECORDING}{number}"
 
 
 @dataclass(frozen=True)
@@ -99,6 +109,16 @@ def _do(text: str, directory: Path, connection: "Connection[Said, JobOrders]") -
             from workers.replays.record import record
 
             record(_archive_of(spec, archive), spec.policy, spec.suite, _teller(connection)).save(result)
+        case FilmJob():
+            from workers.replays.films import make_film
+
+            recordings = [directory / recording_name(number) for number in range(len(spec.film.policies))]
+            make_film(spec.film, recordings, result, _teller(connection))
+        case BagJob():
+            from workers.bags.job import read_recording
+
+            told = read_recording(spec, directory / BAG, archive, directory, _teller(connection))
+            result.write_text(told.model_dump_json(), encoding="utf-8")
         case ExportJob():
             from workers.export.bundle import bundle, export_checkpoint
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+import workers.bags.job
 import workers.export.bundle
 import workers.live.playing
 import workers.live.viewer
+import workers.replays.film
 import workers.replays.record
 import workers.training.evaluation  # noqa: F401 - each is needed by a job
 from sim.config import TaskConfig

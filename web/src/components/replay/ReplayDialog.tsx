@@ -1,15 +1,16 @@
 /** An episode over the page: in 3D, beside its charts and beside what others did in the same place; to seek, to take away. */
 import { Button, Group, Modal, MultiSelect, Text, useComputedColorScheme } from '@mantine/core'
-import { useRef } from 'react'
+import { useRef, useState } from 'react'
 import { $now } from '../../api/client'
 import type { EpisodeReplay } from '../../api/types'
 import { OUTCOMES } from '../../lib/episodes'
 import { count, percent } from '../../lib/format'
 import { useTogetherInAddress } from '../../lib/hooks'
 import { IconMaximize } from '../icons'
+import { Downloads } from './Downloads'
 import classes from './Replay.module.css'
 import { ReplayCharts } from './ReplayCharts'
-import { Download, DownloadPage, Stage } from './Stage'
+import { Stage } from './Stage'
 import { letter } from './strips'
 import { usePlayer } from './usePlayer'
 
@@ -51,6 +52,13 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
   )
   const page = replay.data && `${replay.data.page}${dark ? 'dark' : 'light'}/`
   const { time, seek } = usePlayer(frame, page)
+  const [loaded, setLoaded] = useState<string>()
+  const film = $now.useQuery(
+    'get',
+    '/api/replays/{subjects}/{episode}/progress',
+    { params: { path, query: { form: 'scene', theme: dark ? 'dark' : 'light' } } },
+    { enabled: page !== undefined && loaded !== page, refetchInterval: ASK_MS, retry: false },
+  )
   const place = order.indexOf(episode)
   return (
     <Modal opened onClose={onClose} size={1440} title={`Episode ${count(episode + 1)}`}>
@@ -65,6 +73,8 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
           time={time}
           query={replay}
           progress={progress.data}
+          drawn={film.data?.share}
+          onLoad={() => setLoaded(page)}
         />
         <section className={classes.charts} aria-label="Charts of the episode">
           {replay.data && <ReplayCharts query={series} time={time} onSeek={seek} />}
@@ -86,13 +96,7 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
               >
                 Full screen
               </Button>
-              <DownloadPage page={page} />
-              <Download
-                path={`/api/replays/${subjects}/${episode}/mcap`}
-                title="Scans, odometry, commands and transforms as ROS 2 messages, for Foxglove and ROS"
-              >
-                MCAP
-              </Download>
+              <Downloads subjects={subjects} episode={episode} page={page} theme={dark ? 'dark' : 'light'} />
             </>
           )}
         </Group>

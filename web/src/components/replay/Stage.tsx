@@ -1,11 +1,11 @@
 /** Where a recording plays in 3D, once it is there; and the way to take it along. */
 import { Button } from '@mantine/core'
-import type { ComponentProps, RefObject } from 'react'
+import { type ComponentProps, type RefObject, useState } from 'react'
 import { at } from '../../lib/base'
 import { IconDownload } from '../icons'
 import { QueryError } from '../ui'
 import classes from './Replay.module.css'
-import { Waiting } from './Waiting'
+import { Drawing, Waiting } from './Waiting'
 
 interface StageProps {
   ref?: RefObject<HTMLDivElement | null>
@@ -20,21 +20,44 @@ interface StageProps {
   time: number | null
   query: { error: ComponentProps<typeof QueryError>['error'] | null; refetch: () => unknown }
   progress: ComponentProps<typeof Waiting>['progress']
+  /** Share of the picture that is drawn, where that is known. */
+  drawn?: number | undefined
+  onLoad?: () => void
 }
 
-export function Stage({ ref, frame, testId, title, what, page, time, query, progress }: StageProps) {
+export function Stage({
+  ref,
+  frame,
+  testId,
+  title,
+  what,
+  page,
+  time,
+  query,
+  progress,
+  drawn,
+  onLoad,
+}: StageProps) {
+  const [loaded, setLoaded] = useState<string>()
   return (
     <div ref={ref} className={classes.stage} data-testid={testId}>
       {page ? (
-        <iframe
-          key={page}
-          ref={frame}
-          title={title}
-          src={at(page)}
-          allow="fullscreen"
-          data-testid={`${testId}-frame`}
-          data-seconds={time ?? undefined}
-        />
+        <>
+          <iframe
+            key={page}
+            ref={frame}
+            title={title}
+            src={at(page)}
+            allow="fullscreen"
+            onLoad={() => {
+              setLoaded(page)
+              onLoad?.()
+            }}
+            data-testid={`${testId}-frame`}
+            data-seconds={time ?? undefined}
+          />
+          {loaded !== page && time === null && <Drawing share={drawn} />}
+        </>
       ) : query.error ? (
         <QueryError error={query.error} what={what} retry={() => void query.refetch()} />
       ) : (
@@ -44,33 +67,19 @@ export function Stage({ ref, frame, testId, title, what, page, time, query, prog
   )
 }
 
-interface DownloadProps {
-  path: string
-  title: string
-  children: string
-}
-
-export function Download({ path, title, children }: DownloadProps) {
+/** The recording itself. */
+export function DownloadPage({ page }: { page: string }) {
   return (
     <Button
       component="a"
-      href={at(path)}
+      href={at(`${page}?download`)}
       download
       variant="default"
       size="xs"
       leftSection={<IconDownload size={14} />}
-      title={title}
+      title="One file that plays in any browser, without Mapless"
     >
-      {children}
-    </Button>
-  )
-}
-
-/** The recording itself. */
-export function DownloadPage({ page }: { page: string }) {
-  return (
-    <Download path={`${page}?download`} title="One file that plays in any browser, without Mapless">
       Download
-    </Download>
+    </Button>
   )
 }

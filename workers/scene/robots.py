@@ -4,13 +4,13 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from server.scene import meshes
-from server.scene.continuity import continues, ended
-from server.scene.themes import OUTCOMES, Colours, linear, robot_colours
-from server.scene.trails import Trails, trail_colours
 from sim.config import TaskConfig
 from sim.lidar import drawn_ray_angles, ray_origins
 from workers.frames import Frame
+from workers.scene import meshes
+from workers.scene.continuity import continues, ended
+from workers.scene.themes import OUTCOMES, Colours, linear, robot_colours
+from workers.scene.trails import Trails, trail_colours
 
 _FLOOR_HEIGHT = 0.02
 _HIT_HEIGHT = 0.05

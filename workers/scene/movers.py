@@ -3,9 +3,9 @@
 import numpy as np
 import viser
 
-from server.scene import meshes
-from server.scene.themes import Colours, linear
 from workers.frames import Frame
+from workers.scene import meshes
+from workers.scene.themes import Colours, linear
 
 
 class MoverNodes:

@@ -10,10 +10,10 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from server.scene.stage import Stage, StagePicture
-from server.scene.themes import OUTCOMES, Colours, linear
 from sim.config import TaskConfig
 from workers.frames import Frame
+from workers.scene.stage import Stage, StagePicture
+from workers.scene.themes import OUTCOMES, Colours, linear
 
 HANDLE = "/world/handle"
 """The node with the handles."""

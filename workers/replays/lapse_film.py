@@ -1,18 +1,19 @@
 """A run's learning as one recording: the same scenarios, driven by one checkpoint after another."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import viser
 
-from server.replays.film import FRAMES_PER_SECOND, LAST_PICTURE_SECONDS, Filmed, frames_at, mark_end, movers_at
-from server.scene.camera import CameraRig
-from server.scene.quiet import start_viser, stop_viser
-from server.scene.scene import Scene
-from server.scene.themes import Theme
 from sim.config import ImportedArenaConfig
 from workers.frames import Frame
+from workers.replays.film import FRAMES_PER_SECOND, mark_end
+from workers.replays.moments import LAST_PICTURE_SECONDS, Filmed, frames_at, movers_at
+from workers.scene.camera import CameraRig
+from workers.scene.quiet import start_viser, stop_viser
+from workers.scene.scene import Scene
+from workers.scene.themes import Theme
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +31,13 @@ class Chapter:
     lasts: float
 
 
-def film_lapse(chapters: Sequence[Chapter], theme: Theme) -> bytes:
+def film_lapse(chapters: Sequence[Chapter], theme: Theme, progress: Callable[[float], None]) -> bytes:
     """A `.viser` file; takes about half a second for each chapter.
 
     Args:
         chapters: in their order, each with the same arena, robot and LiDAR.
         theme: light or dark.
+        progress: told the share of the work that is done, 0 to 1.
     """
     first = chapters[0].robots[0]
     place = first.task.model_copy(update={"arena": ImportedArenaConfig.of(first.track.arena)})
@@ -60,6 +62,7 @@ def film_lapse(chapters: Sequence[Chapter], theme: Theme) -> bytes:
                         ended.add(robot)
                         marks.append(mark_end(server.scene, filmed, f"{number}-{robot}"))
                 serializer.insert_sleep(chapter.lasts / len(reel))
+            progress((number + 1) / len(chapters))
             serializer.insert_sleep(LAST_PICTURE_SECONDS)
         return serializer.serialize()
     finally:

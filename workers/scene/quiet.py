@@ -12,7 +12,7 @@ import websockets.exceptions
 from viser import _messages
 from viser.infra import _infra
 
-from server.scene.gate import GatedServe
+from workers.scene.gate import GatedServe
 
 # viser lets nobody decide who may connect; what its module knows as `websockets` does it instead.
 _infra.websockets = SimpleNamespace(  # type: ignore[assignment, attr-defined]

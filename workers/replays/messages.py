@@ -13,14 +13,14 @@ Of several policies each has its own, below `/policy1`, `/policy2`, and so on, i
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from mcap_ros2.writer import Writer
 from numpy.typing import NDArray
 
-from server.replays.subject import Subject
 from sim.actions import action_layout
 from sim.config import AckermannDrive, LidarConfig, TaskConfig
 from sim.lidar import ray_angles
@@ -116,22 +116,35 @@ geometry_msgs/Quaternion rotation
 }
 
 
-def as_mcap(parts: Sequence[tuple[Subject, Track]], episode: int) -> bytes:
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """Who drove, with which robot and LiDAR, and what it did."""
+
+    title: str
+    task: TaskConfig
+    track: Track
+
+
+def as_mcap(driven: Sequence[Driven], suite: str, episode: int, progress: Callable[[float], None]) -> bytes:
     """The file; takes about a millisecond for each moment.
 
     Args:
-        parts: who drove, and what they did.
+        driven: all who drove.
+        suite: its name.
         episode: its place in the suite, from 0.
+        progress: told the share of the work that is done, 0 to 1.
     """
     file = io.BytesIO()
     with Writer(file) as writer:
         schemas = {name: writer.register_msgdef(name, text) for name, text in _DEFINITIONS.items()}
-        for number, (subject, track) in enumerate(parts, 1):
-            _Robot(writer, schemas, subject.task, f"policy{number}" if len(parts) > 1 else "").write(track)
+        for number, each in enumerate(driven, 1):
+            robot = _Robot(writer, schemas, each.task, f"policy{number}" if len(driven) > 1 else "")
+            for share in robot.write(each.track):
+                progress((number - 1 + share) / len(driven))
         writer.add_metadata(
             "mapless",
-            {"suite": parts[0][0].recorded.suite, "episode": str(episode + 1)}
-            | {f"policy{number}": subject.title for number, (subject, _) in enumerate(parts, 1)},
+            {"suite": suite, "episode": str(episode + 1)}
+            | {f"policy{number}": each.title for number, each in enumerate(driven, 1)},
         )
     return file.getvalue()
 
@@ -153,8 +166,8 @@ class _Robot:
         self._below = f"/{name}" if name else ""
         self._prefix = f"{name}/" if name else ""
 
-    def write(self, track: Track) -> None:
-        """All of it, moment by moment."""
+    def write(self, track: Track) -> Iterator[float]:
+        """All of it, moment by moment; gives the share that is written."""
         period, last = self._task.control_period, len(track.poses) - 1
         self._send(
             "goal_pose",
@@ -177,6 +190,7 @@ class _Robot:
                 pose={"pose": _pose(x, y, heading), "covariance": [0.0] * 36},
                 twist={"twist": _twist(*track.twists[moment].tolist()), "covariance": [0.0] * 36},
             )
+            yield moment / (last + 1)
             if moment < last:
                 # A moment's command is the one of the step that led there: it was given at the moment before.
                 command = _twist(*self._commanded(track.commands[moment + 1]))

@@ -3,14 +3,14 @@
 import numpy as np
 import viser
 
-from server.scene.movers import MoverNodes
-from server.scene.robots import RobotNodes
-from server.scene.stage import Stage
-from server.scene.stage_nodes import OBSTACLE_HEIGHT, StageNodes
-from server.scene.themes import COLOURS, Colours, Theme
 from sim.arenas import Arena, arena_clearance, build_arena
 from sim.config import TaskConfig
 from workers.frames import Frame
+from workers.scene.movers import MoverNodes
+from workers.scene.robots import RobotNodes
+from workers.scene.stage import Stage
+from workers.scene.stage_nodes import OBSTACLE_HEIGHT, StageNodes
+from workers.scene.themes import COLOURS, Colours, Theme
 
 # Everything hangs below this node, so that one message moves the world under the camera when it follows a robot.
 _WORLD = "/world"

@@ -1,0 +1,1 @@
+"""Recordings of robots (bags) that people upload: kept, read by a worker, held beside a policy."""

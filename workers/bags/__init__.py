@@ -1,0 +1,1 @@
+"""Recordings of robots (bags): read, their sensors and motion fitted, a policy held beside what the robot did."""
