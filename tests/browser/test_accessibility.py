@@ -195,3 +195,17 @@ def test_the_menu_of_a_policy_gives_the_focus_back(lab: tuple[Lab, BrowserContex
         page.get_by_role("menuitem", name="Checkpoint").click()
     expect(button).to_be_focused()
     page.close()
+
+
+@pytest.mark.timeout(300)
+def test_axe_finds_nothing_in_an_alert_that_comes_over_a_page(lab: tuple[Lab, BrowserContext]) -> None:
+    _, context = lab
+    page = context.new_page()
+    page.goto("/alerts")
+    expect(page.get_by_test_id("rule").first).to_be_visible()
+    training = {"steps": 2_000, "evaluation": {"every_steps": 2_000}}
+    created(context.request, "/api/experiments", {"name": "Soon over", "training": training, "seeds": [0]})
+    expect(page.get_by_role("alert").first).to_be_visible(timeout=120_000)
+    found = list(faults(page))
+    page.close()
+    assert not found, "\n".join(found)

@@ -70,6 +70,11 @@ export const theme = createTheme({
     Button: { defaultProps: { size: 'sm' } },
     Tooltip: { defaultProps: { openDelay: 300, withArrow: true } },
     Modal: { defaultProps: { centered: true, closeButtonProps: { 'aria-label': 'Close' } } },
+    Notification: {
+      defaultProps: { closeButtonProps: { 'aria-label': 'Close' } },
+      // The library's grey below a title has 3.3 to 1 on white.
+      styles: { description: { color: 'var(--mapless-text-quiet)' } },
+    },
     // Its focus is on its first item, and on nothing that is no item.
     Menu: {
       defaultProps: {

@@ -71,7 +71,7 @@ export function SaidTable() {
 function Title({ alert: { title, run_id, experiment_id } }: { alert: Alert }) {
   const path = run_id ? `/runs/${run_id}` : experiment_id ? `/experiments/${experiment_id}` : undefined
   return path ? (
-    <Anchor component={Link} to={path} size="sm">
+    <Anchor component={Link} to={path} size="sm" display="block">
       {title}
     </Anchor>
   ) : (
