@@ -68,7 +68,7 @@ def suite(robot: JackalConfig, arrival: float) -> Suite:
     published = load_suite("barn-20")
     names = [f"world_{world}" for world in LOG]
     which = [index for index, arena in enumerate(published.arenas) if arena.name in names]
-    rules = load_suite("barn-jackal-120").rules
+    rules = load_suite("barn-jackal-300").rules
     return dataclasses.replace(
         published,
         arena_indices=published.arena_indices[which],
@@ -96,7 +96,7 @@ def main() -> None:
     seconds = sum(world.arrivals * world.seconds for world in log) / arrivals
     hit, published = sum(world.collisions for world in log), float(np.mean([world.score for world in log]))
     print(f"| the challenge's example, its log | 0.5 | {arrivals:.0f} | {hit:.0f} | {seconds:.1f} | {published:.3f} |")
-    full = load_suite("barn-jackal-120").rules
+    full = load_suite("barn-jackal-300").rules
     assert isinstance(full.robot, JackalConfig)
     assert full.arrival_distance is not None
     for robot, arrival in ((EXAMPLE, EXAMPLE_ARRIVAL), (full.robot, full.arrival_distance)):

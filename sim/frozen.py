@@ -6,7 +6,7 @@ _FOLDER = resources.files("sim") / "suites" / "data"
 
 MEANINGS = {
     "barn-20": "20 worlds of the BARN benchmark, for any robot: 10 m straight on through a field of thin pillars.",
-    "barn-jackal-120": "120 worlds drawn as BARN's are, by its challenge's rules: a Jackal, 2 m/s, against the clock.",
+    "barn-jackal-300": "300 worlds drawn as BARN's are, by its challenge's rules: a Jackal, 2 m/s, against the clock.",
     "clutter-500": "50 maps of clutter, difficulty 0.5.",
     "complex-200": "The paper's complex arena.",
     "crowd-200": "A slow robot's luck: pedestrians four times as fast do not see it, so one that stands is hit too.",

@@ -8,12 +8,15 @@ from typing import get_args
 
 import numpy as np
 
+from sim.arenas.families import BENCHMARKS
 from sim.config import FamilyName
 from sim.suites import Suite, SuiteRules, load_suite, suite_in, suite_places
 from workers.shipped.field import Part
 
-FAMILIES: tuple[FamilyName, ...] = tuple(name for name in get_args(FamilyName) if name not in ("mixed", "varied"))
-FROZEN: dict[Part, tuple[str, ...]] = {"barn": ("barn-jackal-120",), "people": ("people-500", "heedless-500")}
+FAMILIES: tuple[FamilyName, ...] = tuple(
+    name for name in get_args(FamilyName) if name not in ("mixed", "varied", *BENCHMARKS)
+)
+FROZEN: dict[Part, tuple[str, ...]] = {"barn": ("barn-jackal-300",), "people": ("people-500", "heedless-500")}
 
 PIECE = 100
 """Scenarios of a piece, at most."""

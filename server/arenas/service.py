@@ -37,6 +37,8 @@ _FAMILIES: tuple[tuple[str, FamilyName], ...] = (
     ("Thicket of pillars", "thicket"),
     ("Clutter and thickets", "mixed"),
     ("Another family on every map", "varied"),
+    ("Fields as BARN's", "barn"),
+    ("Scenes among people", "people"),
 )
 _POOLS: tuple[tuple[str, GeneratedArenaConfig | AddedArenaPool], ...] = (
     *((title, GeneratedArenaConfig(name=name)) for title, name in _FAMILIES),

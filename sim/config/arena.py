@@ -12,7 +12,9 @@ from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ArenaFamily
 
 ArenaName = Literal["simple", "complex"]
-FamilyName = Literal["clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed", "varied"]
+FamilyName = Literal[
+    "clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed", "varied", "barn", "people"
+]
 
 
 class ArenaConfig(Frozen):
@@ -81,7 +83,8 @@ class GeneratedArenaConfig(ArenaPool):
         "clutter",
         title="Arena",
         description="Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, "
-        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them.",
+        "warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. "
+        "Or as in a benchmark, whatever the robot's size: fields of pillars as BARN's, scenes among people.",
     )
 
 

@@ -51,6 +51,15 @@ class TaskConfig(Frozen):
         description="Metres from the body's middle within which what a ray meets is a collision; touching it always is.",
         json_schema_extra=ADVANCED,
     )
+    way_clearance: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        title="Clearance of ways",
+        description="Metres that shortest paths and generated passages keep from obstacles; as a rule what the body needs "
+        "to turn anywhere. Less for a long body that is to learn gaps which it fits through lengthwise.",
+        json_schema_extra=ADVANCED,
+    )
     step_limit: int = Field(
         500,
         ge=10,
@@ -115,4 +124,6 @@ class TaskConfig(Frozen):
     @property
     def passable_clearance(self) -> float:
         """Distance from obstacles that the robot's centre needs on its way, metres."""
+        if self.way_clearance is not None:
+            return self.way_clearance
         return max(self.robot.circumscribed_radius, self.collision_distance)

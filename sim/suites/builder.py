@@ -11,6 +11,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from sim.arenas.barn import barn_world
 from sim.arenas.families import SUITE_SEEDS
 from sim.arenas.files import load_arena
 from sim.arenas.scenes import SCENES
@@ -77,7 +78,7 @@ def build_suite(name: str) -> str:
         return _ruled_text(name, scenes, scene_scenarios(scenes, _PEOPLE_RULES.task()), _PEOPLE_RULES)
     if name in _BARN:
         count, seed = _BARN[name]
-        worlds = [BarnPlace(world=world, barn_seed=seed) for world in range(count)]
+        worlds = [BarnPlace(world=world, barn_seed=seed, attempt=barn_world(world, seed).attempt) for world in range(count)]
         return _ruled_text(name, worlds, barn_scenarios(worlds), _BARN_RULES)
     if name not in _SUITES:
         raise SuiteError(f"there is no suite {name!r}; there are {', '.join(_NAMES)}")

@@ -42,14 +42,15 @@ class ScenePlace(Frozen):
 
 
 class BarnPlace(Frozen):
-    """One world of the BARN benchmark's kind."""
+    """One world of the BARN benchmark's kind, and the random draw that it was found at."""
 
     world: int
     barn_seed: int
+    attempt: int
 
     def build(self) -> BarnWorld:
         """The world with its start and goal."""
-        return barn_world(self.world, self.barn_seed)
+        return barn_world(self.world, self.barn_seed, self.attempt)
 
 
 Place = ArenaConfig | GeneratedPlace | ScenePlace | BarnPlace | ArenaFile

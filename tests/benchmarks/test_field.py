@@ -64,7 +64,7 @@ def test_who_drives_where() -> None:
 
 
 def test_the_planner_with_the_map_scores_in_barn_and_what_was_kept_is_read_back(tmp_path: Path) -> None:
-    (piece,) = pieces("barn", "barn-jackal-120", 1)
+    (piece,) = pieces("barn", "barn-jackal-300", 1)
     kept = Kept(tmp_path / "field.jsonl")
     kept.add(drive(knows_the_map(), piece))
     (row,) = rows(iter(Kept(tmp_path / "field.jsonl")))
@@ -73,7 +73,7 @@ def test_the_planner_with_the_map_scores_in_barn_and_what_was_kept_is_read_back(
     assert 0.0 <= row.score <= 0.5
     again = Kept(tmp_path / "field.jsonl")
     assert again.get(key_of(knows_the_map(), piece), piece) is not None
-    assert again.get(key_of(knows_the_map(), piece), Piece("barn", "barn-jackal-120", 0, 100)) is None
+    assert again.get(key_of(knows_the_map(), piece), Piece("barn", "barn-jackal-300", 0, 100)) is None
 
 
 def test_the_docs_are_its_output() -> None:

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sim.arenas import Arena, build_arenas, free_distance, with_maps_of
+from sim.arenas import Arena, build_arenas, build_task_arenas, free_distance, with_maps_of
 from sim.arenas.cells import Grid, components, free_mask
 from sim.arenas.families import CLEARANCE, FAMILIES, SUITE_SEEDS, generate_arena, pool_seeds
 from sim.arenas.planner import Planner
-from sim.config import MAX_MAPS, FamilyName, GeneratedArenaConfig, TaskConfig
+from sim.arenas.scenes import SCENES, generate_scene
+from sim.config import MAX_MAPS, FamilyName, GeneratedArenaConfig, JackalConfig, TaskConfig
 from sim.errors import ArenaError
 from sim.suites import suite_for
 
@@ -163,3 +164,27 @@ def test_a_configuration_of_before_seeds_had_maps_of_their_own_means_one_pool() 
     assert GeneratedArenaConfig.model_validate({"name": "clutter"}).own_maps
     again = GeneratedArenaConfig(own_maps=True, seed=7)
     assert GeneratedArenaConfig.model_validate_json(again.model_dump_json()) == again
+
+
+def test_scenes_to_train_in_are_all_ten_and_their_people_see_nobody() -> None:
+    pool = build_arenas(GeneratedArenaConfig(name="people", difficulty=1.0, maps=20))
+    assert [arena.name.rsplit("-", 1)[0] for arena in pool] == [*SCENES, *SCENES]
+    assert not any(mover.sees_robots for arena in pool for mover in arena.movers)
+    assert not same(pool[0], pool[10])
+    whole = generate_scene("queue", 7, sees=False).arena
+    assert generate_arena("people", 1.0, 7).movers == whole.movers
+    assert generate_arena("people", 0.5, 7).movers == whole.movers[: round(0.5 * len(whole.movers))]
+    assert len(generate_arena("people", 0.0, 7).movers) == 1
+
+
+def test_fields_to_train_in_have_the_benchmarks_size_whatever_the_robot() -> None:
+    wide = TaskConfig(arena=GeneratedArenaConfig(name="barn", maps=2), robot=JackalConfig())
+    for arena, usual in zip(build_task_arenas(wide), build_arenas(wide.arena), strict=True):
+        assert (arena.half_width, arena.half_height) == (2.25, 7.0)
+        assert same(arena, usual)
+
+
+def test_a_long_body_may_be_asked_to_take_gaps_that_it_cannot_turn_in() -> None:
+    jackal = TaskConfig(robot=JackalConfig())
+    assert jackal.passable_clearance == pytest.approx(0.333, abs=1e-3)
+    assert jackal.model_copy(update={"way_clearance": 0.25}).passable_clearance == 0.25

@@ -7,12 +7,15 @@ from sim.config import (
     DistancePart,
     Frozen,
     GeneratedArenaConfig,
+    JackalConfig,
     LidarConfig,
     MoversConfig,
     ObservationConfig,
     PathProgressTerm,
     RangesPart,
     RewardConfig,
+    RoundConfig,
+    SingleMount,
     SpeedsPart,
     TaskConfig,
     TimeoutTerm,
@@ -40,6 +43,19 @@ class Recipe(Frozen):
     training: TrainingConfig
     seed: int
     suites: tuple[str, ...]
+
+
+def _with_trail(batches: int) -> ObservationConfig:
+    """What a policy sees that is to know where it has been."""
+    return ObservationConfig(
+        parts=(
+            RangesPart(batches=batches, inverse=True),
+            SpeedsPart(),
+            DistancePart(scaling="saturating"),
+            BearingPart(encoding="sine_cosine"),
+            TrailPart(sectors=30),
+        )
+    )
 
 
 RECIPES: tuple[Recipe, ...] = (
@@ -105,15 +121,7 @@ RECIPES: tuple[Recipe, ...] = (
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="varied", difficulty=1.0, maps=1024, seed=0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0),
-                observation=ObservationConfig(
-                    parts=(
-                        RangesPart(batches=60, inverse=True),
-                        SpeedsPart(),
-                        DistancePart(scaling="saturating"),
-                        BearingPart(encoding="sine_cosine"),
-                        TrailPart(sectors=30),
-                    )
-                ),
+                observation=_with_trail(batches=60),
                 reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-1000.0), TimeoutTerm(), PathProgressTerm())),
                 step_limit=1000,
                 arrival_ends=True,
@@ -134,6 +142,76 @@ RECIPES: tuple[Recipe, ...] = (
         ),
         seed=0,
         suites=("varied-1-200", "clutter-500", "barn-20", "crowd-200", "complex-200"),
+    ),
+    Recipe(
+        name="jackal",
+        title="Through BARN's fields",
+        description="A Jackal at up to 2 m/s, trained on 512 fields of pillars drawn as the BARN benchmark's are: it sees "
+        "its trail, and learns gaps that it fits through lengthwise; six minutes on one core.",
+        training=TrainingConfig(
+            task=TaskConfig(
+                arena=GeneratedArenaConfig(name="barn", difficulty=1.0, maps=512, seed=0),
+                robot=JackalConfig(max_linear_acceleration=20.0, max_angular_acceleration=25.0),
+                lidar=LidarConfig(rays=135, field_of_view=270.0, range=10.0, mount=SingleMount(x=0.055)),
+                observation=_with_trail(batches=45),
+                reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-2000.0), TimeoutTerm(), PathProgressTerm())),
+                control_period=0.1,
+                arrival_distance=1.0,
+                collision_distance=0.0,
+                way_clearance=0.25,
+                step_limit=500,
+                arrival_ends=True,
+            ),
+            algorithm=PpoConfig(
+                network=MlpNetwork(hidden_sizes=(128, 128)),
+                robots=512,
+                rollout_steps=64,
+                minibatch_size=4096,
+                epochs=4,
+                learning_rate=4e-4,
+                entropy_coefficient=0.005,
+                gamma=0.99,
+                critic_sees="path",
+            ),
+            steps=8_000_000,
+            evaluation=EvaluationConfig(every_steps=8_000_000),
+        ),
+        seed=0,
+        suites=("barn-jackal-300",),
+    ),
+    Recipe(
+        name="people",
+        title="Among people",
+        description="A robot as fast as the people around it, trained on 512 scenes whose people do not see it: corridors, "
+        "doors, crossings, queues and groups. It sees its last three scans; five minutes on one core.",
+        training=TrainingConfig(
+            task=TaskConfig(
+                arena=GeneratedArenaConfig(name="people", difficulty=1.0, maps=512, seed=0),
+                robot=RoundConfig(radius=0.25, max_linear_speed=1.0, max_angular_speed=2.0),
+                lidar=LidarConfig(rays=120, field_of_view=360.0, range=6.0),
+                observation=ObservationConfig.preset("improved", batches=60, frames=3),
+                reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-2000.0), TimeoutTerm(), PathProgressTerm())),
+                arrival_distance=0.3,
+                collision_distance=0.0,
+                step_limit=300,
+                arrival_ends=True,
+            ),
+            algorithm=PpoConfig(
+                network=MlpNetwork(hidden_sizes=(128, 128)),
+                robots=512,
+                rollout_steps=64,
+                minibatch_size=4096,
+                epochs=4,
+                learning_rate=4e-4,
+                entropy_coefficient=0.003,
+                gamma=0.99,
+                critic_sees="path",
+            ),
+            steps=8_000_000,
+            evaluation=EvaluationConfig(every_steps=8_000_000),
+        ),
+        seed=0,
+        suites=("people-500", "heedless-500"),
     ),
     Recipe(
         name="crowd",

@@ -1,4 +1,7 @@
-"""From (family, difficulty, seed) to an arena in which a robot gets everywhere; the same three give the same arena."""
+"""From (family, difficulty, seed) to an arena; the same three give the same arena.
+
+In those of `FAMILIES` a robot gets everywhere; those of `BENCHMARKS` have the shape of a benchmark's worlds.
+"""
 
 import hashlib
 from collections.abc import Callable
@@ -7,6 +10,7 @@ from typing import Final, get_args
 
 import numpy as np
 
+from sim.arenas.barn import training_world
 from sim.arenas.cells import CELL, components, free_mask
 from sim.arenas.families.clutter import clutter
 from sim.arenas.families.layout import Plan
@@ -18,6 +22,7 @@ from sim.arenas.families.thicket import thicket
 from sim.arenas.families.varied import varied
 from sim.arenas.families.warehouse import warehouse
 from sim.arenas.geometry import Arena
+from sim.arenas.scenes import training_scene
 from sim.config import MAX_MAPS, FamilyName
 from sim.errors import ArenaError
 from sim.extending.discovery import implementation
@@ -34,6 +39,9 @@ FAMILIES: Final[dict[FamilyName, Callable[[Plan], None]]] = {
     "mixed": mixed,
     "varied": varied,
 }
+
+BENCHMARKS: Final[dict[FamilyName, Callable[[float, int], Arena]]] = {"barn": training_world, "people": training_scene}
+"""Arenas of the kind and the size that a benchmark has, whatever the robot: by difficulty and seed."""
 
 SIZE = 10.0
 """Edge of a generated arena, metres."""
@@ -61,20 +69,21 @@ def pool_seeds(seed: int, maps: int) -> range:
 def generate_arena(
     family: FamilyName | ArenaFamily, difficulty: float, seed: int, *, size: float = SIZE, clearance: float = CLEARANCE
 ) -> Arena:
-    """A square arena of a family.
+    """A square arena of a family, or one of a benchmark's kind.
 
     Args:
-        family: one of `FAMILIES`, or the configuration of one that an extension has added.
+        family: one of `FAMILIES` or `BENCHMARKS`, or the configuration of one that an extension has added.
         difficulty: 0 (few obstacles, wide passages) to 1 (many, and passages 0.4 m wider than the robot's own space).
         seed: 0 to 2^63 - 1; the difficulty does not change the random numbers, so one seed is one layout, easy or hard.
-        size: edge, 5 to 40 m.
+        size: edge, 5 to 40 m; one of a benchmark's kind has its own.
         clearance: what the robot needs around its centre, 0.05 to 0.6 m. The free space at this clearance hangs
-            together but for crumbs of 2 %: there is a path between any two points of its largest part.
+            together but for crumbs of 2 %: there is a path between any two points of its largest part. One of a
+            benchmark's kind takes no notice of it.
 
     Raises:
         ArenaError: an argument is out of its range, or what an extension draws is in two parts time and again.
     """
-    if not isinstance(family, ArenaFamily) and family not in FAMILIES:
+    if not isinstance(family, ArenaFamily) and family not in FAMILIES and family not in BENCHMARKS:
         raise ArenaError(f"there is no family of arenas {family!r}: choose one of {', '.join(get_args(FamilyName))}")
     if not 0.0 <= difficulty <= 1.0:
         raise ArenaError(f"a difficulty lies between 0 and 1, and {difficulty} does not")
@@ -84,6 +93,8 @@ def generate_arena(
         raise ArenaError(f"arenas are generated for clearances of {_CLEARANCES[0]} to {_CLEARANCES[1]} m, not {clearance} m")
     if not 0 <= seed < 2**63:
         raise ArenaError(f"a seed lies between 0 and 2^63 - 1, and {seed} does not")
+    if not isinstance(family, ArenaFamily) and family in BENCHMARKS:
+        return BENCHMARKS[family](difficulty, seed)
     label, number, fill = _family(family)
     name = f"{label}-{difficulty:g}-{seed}"
     for attempt in range(_ATTEMPTS):

@@ -8,10 +8,12 @@ Times and places are drawn so that people and robot, equally fast, meet about ha
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final, Literal, get_args
 
 import numpy as np
 
+from sim.arenas.geometry import Arena
 from sim.arenas.scenes.draft import HALF, PERSON, Draft, Scene
 from sim.errors import ArenaError
 
@@ -178,3 +180,17 @@ def generate_scene(name: SceneName, seed: int, *, sees: bool) -> Scene:
     draft = Draft(np.random.default_rng([list(SCENES).index(name), seed]), sees)
     SCENES[name](draft)
     return draft.scene(f"{name}-{seed}")
+
+
+def training_scene(difficulty: float, seed: int) -> Arena:
+    """A scene to train in, whose people don't see the robot.
+
+    Args:
+        difficulty: the share of the scene's people who are there; one is, at least.
+        seed: at least 0; of ten that follow one another each has another scene.
+
+    Raises:
+        ArenaError: as `generate_scene`.
+    """
+    arena = generate_scene(list(SCENES)[seed % len(SCENES)], seed, sees=False).arena
+    return replace(arena, movers=arena.movers[: max(1, round(difficulty * len(arena.movers)))])

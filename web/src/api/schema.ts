@@ -6616,10 +6616,10 @@ export interface components {
             /** Movers */
             movers?: components["schemas"]["MoversConfig-Input"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. Or as in a benchmark, whatever the robot's size: fields of pillars as BARN's, scenes among people. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "varied" | "warehouse";
+            name: "barn" | "clutter" | "corridors" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -6653,10 +6653,10 @@ export interface components {
             /** Movers */
             movers: components["schemas"]["MoversConfig-Output"];
             /**
-             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. (enum property replaced by openapi-typescript)
+             * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. Or as in a benchmark, whatever the robot's size: fields of pillars as BARN's, scenes among people. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "clutter" | "corridors" | "maze" | "mixed" | "passages" | "rooms" | "thicket" | "varied" | "warehouse";
+            name: "barn" | "clutter" | "corridors" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -12234,6 +12234,11 @@ export interface components {
              * @default 500
              */
             step_limit: number;
+            /**
+             * Clearance of ways
+             * @description Metres that shortest paths and generated passages keep from obstacles; as a rule what the body needs to turn anywhere. Less for a long body that is to learn gaps which it fits through lengthwise.
+             */
+            way_clearance?: number | null;
         };
         /**
          * TaskConfig
@@ -12293,6 +12298,11 @@ export interface components {
              * @default 500
              */
             step_limit: number;
+            /**
+             * Clearance of ways
+             * @description Metres that shortest paths and generated passages keep from obstacles; as a rule what the body needs to turn anywhere. Less for a long body that is to learn gaps which it fits through lengthwise.
+             */
+            way_clearance: number | null;
         };
         /**
          * Td3Config
