@@ -139,7 +139,7 @@ def suite_for(task: TaskConfig) -> Suite:
     fits = task.passable_clearance <= usual.passable_clearance
     if fits and isinstance(task.arena, ArenaConfig) and not task.arena.movers.count:
         return load_suite(f"{task.arena.name}-{_DRAWN_SCENARIOS}")
-    large = TaskConfig(robot=task.robot, collision_distance=task.collision_distance)
+    large = TaskConfig(robot=task.robot, collision_distance=task.collision_distance, way_clearance=task.way_clearance)
     return _draw_suite(task.arena, usual if fits else large)
 
 

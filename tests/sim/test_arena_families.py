@@ -187,4 +187,6 @@ def test_fields_to_train_in_have_the_benchmarks_size_whatever_the_robot() -> Non
 def test_a_long_body_may_be_asked_to_take_gaps_that_it_cannot_turn_in() -> None:
     jackal = TaskConfig(robot=JackalConfig())
     assert jackal.passable_clearance == pytest.approx(0.333, abs=1e-3)
-    assert jackal.model_copy(update={"way_clearance": 0.25}).passable_clearance == 0.25
+    lengthwise = TaskConfig(arena=GeneratedArenaConfig(name="barn"), robot=JackalConfig(), way_clearance=0.25)
+    assert lengthwise.passable_clearance == 0.25
+    assert suite_for(lengthwise).name == "barn-0.5-0.25m-200"
