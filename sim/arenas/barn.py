@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from sim.arenas.cells import components
 from sim.arenas.geometry import Arena
@@ -95,8 +95,10 @@ def barn_world(number: int, seed: int, attempt: int = 0) -> BarnWorld:
         random = np.random.default_rng([seed, number, draw])
         filled = _automaton(random, fill, rounds)
         free = _free(filled)
+        if not free.any(axis=0).all():  # which is seen sooner than that two regions are two
+            continue
         near, far = _largest_at_the_edges(free)
-        if not near.any() or (near != far).any():
+        if (near != far).any():
             continue
         rows = (int(random.choice(np.flatnonzero(near[:, column]))) for column in (0, SIDE - 1))
         first, last = zip(rows, (0, SIDE - 1), strict=True)
@@ -124,20 +126,19 @@ def _automaton(random: np.random.Generator, fill: float, rounds: int) -> Cells:
     """The pillars: the first and last row are the sides, beyond which all counts as filled."""
     filled = random.random((SIDE, SIDE)) < fill
     filled[[0, -1]] = True
+    around = np.zeros((SIDE + 2, SIDE + 2), dtype=np.int8)
+    around[[0, -1], 1:-1] = 1
     for _ in range(rounds):
-        around = np.pad(np.pad(filled, ((1, 1), (0, 0)), constant_values=True), ((0, 0), (1, 1))).astype(np.int8)
-        neighbours = sum(around[i : i + SIDE, j : j + SIDE] for i in range(3) for j in range(3)) - filled
+        around[1:-1, 1:-1] = filled
+        across = around[:-2] + around[1:-1] + around[2:]
+        neighbours = across[:, :-2] + across[:, 1:-1] + across[:, 2:] - filled
         filled = (filled | (neighbours > _CROWDED)) & (neighbours >= _LONELY)
-    return np.asarray(filled)
+    return filled
 
 
 def _free(filled: Cells) -> Cells:
     """Where the middle of a robot has room: nothing is filled in the square around it."""
-    padded = np.pad(filled, _REACH)
-    taken = np.zeros_like(filled)
-    for i, j in itertools.product(range(2 * _REACH + 1), repeat=2):
-        taken |= padded[i : i + SIDE, j : j + SIDE]
-    return ~taken
+    return np.asarray(~maximum_filter(filled, 2 * _REACH + 1, mode="constant"))
 
 
 def _largest_at_the_edges(free: Cells) -> tuple[Cells, Cells]:

@@ -55,7 +55,7 @@ HASHES = {
 
 
 RULED = {
-    "barn-jackal-300": "82decfa8dbbf649417cdac723d6e6cce595e53b08c4615400dcae3c92b92aa5e",
+    "barn-jackal-300": "e25f1bc8b59f93eb9dd30e6d6e89284acd2f6c3aa0fe660bf6a881f85784f175",
     "heedless-500": "d967f1e4c8ce5263a46f4bb172ae8d6ddcbf858973962eebe80ed784356ff1ab",
     "people-500": "bac9cb7e17cb703061f5804d7d853198cab0d1b97f0289925a868626a5a72529",
 }
