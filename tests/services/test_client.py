@@ -18,6 +18,7 @@ import pytest
 import mapless_client
 from mapless_client import models
 from tests.services.stack import ROLLOUT, ROOT, TOKEN, Service
+from tests.workers.robot_bags import as_mcap, messages, simulated
 
 SCHEMAS = json.loads((ROOT / "web" / "openapi.json").read_text("utf-8"))["components"]["schemas"]
 
@@ -174,6 +175,24 @@ def test_settings_are_searched(client: mapless_client.Client, environment: dict[
     assert all(set(trial.values) == {"algorithm.learning_rate", "algorithm.epochs"} for trial in found.results)
     with pytest.raises(mapless_client.InvalidRequestError, match="no such setting"):
         client.search("Wrong", [{"kind": "range", "path": "algorithm.speed", "low": 0.0, "high": 1.0}])
+
+
+def test_a_robots_recording_becomes_the_task_of_a_training(client: mapless_client.Client, tmp_path: Path) -> None:
+    file = tmp_path / "corridor.mcap"
+    file.write_bytes(as_mcap(messages(simulated(seconds=45.0, lidar={"noise": 0.01}))))
+    sent = client.upload_recording(file)
+    assert (sent.name, sent.size) == ("corridor.mcap", file.stat().st_size)
+    assert [recording.id for recording in client.recordings()] == [sent.id]
+    reading = client.recording_reading(sent.id)
+    (noise,) = (fitted for fitted in reading.fitted if fitted.key == "lidar.noise")
+    assert noise.value == pytest.approx(0.01, rel=0.3)
+    task = reading.task()
+    assert task["lidar"]["noise"] == pytest.approx(noise.value, abs=1e-3)
+    launched = client.launch("As it drives", {"steps": 2 * ROLLOUT, "task": task})
+    client.stop(launched.id)
+    file.write_bytes(b"")
+    with pytest.raises(mapless_client.RefusedError, match="file is empty"):
+        client.upload_recording(file)
 
 
 def test_the_models_say_what_the_api_says() -> None:

@@ -11,6 +11,7 @@ import argparse
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,7 +20,8 @@ from pydantic import BaseModel
 from sim.arrays import Floats
 from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
-from sim.suites import EpisodeTable, Situation, Suite, load_suite, run_controller, suite_named, suite_names
+from sim.suites import EpisodeTable, Situation, Suite, SuiteRules, load_suite, run_controller, suite_named, suite_names
+from sim.suites.rules import SuiteLidar
 from workers.checkpoints import copy_policy, read_policy
 from workers.frames import Frame
 from workers.policy import torch_policy
@@ -142,7 +144,11 @@ def measure_baselines(path: Path = BASELINES, *, again: bool = False) -> Baselin
     """
     old = Baselines.model_validate_json(path.read_bytes()).baselines if path.exists() and not again else ()
     kept = {(each.name, result.suite_hash): result for each in old for result in each.results}
-    drawn = {name: suite_named(name, each.training.task) for each in RECIPES for name in each.suites}
+    drawn = {
+        name: _on_equal_terms(suite_named(name, each.training.task), each.training.task)
+        for each in RECIPES
+        for name in each.suites
+    }
     suites = [*map(load_suite, suite_names()), *(suite for name, suite in drawn.items() if name not in suite_names())]
     measured = Baselines(
         command=f"{_COMMAND} --baselines",
@@ -159,6 +165,20 @@ def measure_baselines(path: Path = BASELINES, *, again: bool = False) -> Baselin
     )
     _write(path, measured, indent=2)
     return measured
+
+
+def _on_equal_terms(suite: Suite, task: TaskConfig) -> Suite:
+    """The suite, a drawn one of another robot than the default one asking for that robot, its LiDAR and its pace."""
+    if suite.rules != SuiteRules() or task.robot == TaskConfig().robot:
+        return suite
+    rules = SuiteRules(
+        robot=task.robot,
+        lidar=SuiteLidar(**task.lidar.model_dump(), batches=task.observation.batches),
+        arrival_distance=task.arrival_distance,
+        collision_distance=task.collision_distance,
+        control_period=task.control_period,
+    )
+    return replace(suite, rules=rules)
 
 
 def _suite_figures(result: EvaluationResult, task: TaskConfig) -> SuiteFigures:

@@ -24,6 +24,8 @@ from mapless_client.errors import (
     UnreachableError,
 )
 from mapless_client.models import (
+    Bag,
+    BagReading,
     Checkpoint,
     ComparedExperiment,
     Comparison,
@@ -35,6 +37,7 @@ from mapless_client.models import (
     Evaluation,
     Evidence,
     Experiment,
+    Fitted,
     ImportedRun,
     ImportedThing,
     Improvement,
@@ -47,12 +50,15 @@ from mapless_client.models import (
     RunEvent,
     RunState,
     SeedMean,
+    Setting,
     Study,
     Thinned,
     Trial,
 )
 
 __all__ = [
+    "Bag",
+    "BagReading",
     "Checkpoint",
     "Client",
     "ClientError",
@@ -69,6 +75,7 @@ __all__ = [
     "Evaluation",
     "Evidence",
     "Experiment",
+    "Fitted",
     "ForbiddenError",
     "Form",
     "ImportedRun",
@@ -87,6 +94,7 @@ __all__ = [
     "RunEvent",
     "RunState",
     "SeedMean",
+    "Setting",
     "Study",
     "Thinned",
     "Trial",

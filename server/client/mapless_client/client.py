@@ -12,6 +12,8 @@ from mapless_client.curves import Curve, curve
 from mapless_client.downloads import Form, Pulled, keep, pull
 from mapless_client.errors import ClientError
 from mapless_client.models import (
+    Bag,
+    BagReading,
     Checkpoint,
     Comparison,
     Diagnoses,
@@ -323,6 +325,36 @@ class Client:
         """
         answer = self._transport.upload(f"/api/projects/{project_id}/import", Path(archive), "application/x-tar")
         return ProjectImport.model_validate(answer)
+
+    def recordings(self) -> Iterator[Bag]:
+        """Robots' recordings, the newest first, fetched as they are asked for."""
+        offset = 0
+        while items := self._transport.get("/api/recordings", {"limit": _PAGE, "offset": offset})["items"]:
+            yield from map(Bag.model_validate, items)
+            offset += len(items)
+
+    def upload_recording(self, file: str | Path, name: str | None = None, *, project: str | None = None) -> Bag:
+        """Send what a robot recorded: an `.mcap` or a `.db3` file, or the folder of a rosbag2 recording as `.zip` or `.tar`.
+
+        Args:
+            file: of the recording.
+            name: for people; that of the file without it.
+            project: id of the project; the first one without it.
+
+        Raises:
+            RefusedError: it is empty or too large, or there are too many.
+        """
+        file = Path(file)
+        query = {"name": name or file.name, "project_id": project}
+        return Bag.model_validate(self._transport.upload("/api/recordings", file, "application/octet-stream", query))
+
+    def recording_reading(self, recording_id: str) -> BagReading:
+        """What a recording tells of its robot: quantities with intervals, and settings for a training.
+
+        Raises:
+            RefusedError: it is no recording of ROS 2, or lacks a scan or odometry.
+        """
+        return BagReading.model_validate(self._transport.get(f"/api/recordings/{recording_id}/reading"))
 
     def _checkpoint_page(self, run_id: str, *, limit: int, offset: int) -> Json:
         page: Json = self._transport.get(f"/api/runs/{run_id}/checkpoints", {"limit": limit, "offset": offset})

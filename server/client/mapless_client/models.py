@@ -333,3 +333,53 @@ class Comparison(Model):
     improvements: list[Improvement]
     differences: list[Difference]
     warnings: list[str]
+
+
+class Bag(Model):
+    """A robot's recording that was uploaded; `size` in bytes."""
+
+    id: str
+    project_id: str
+    name: str
+    sha256: str
+    size: int
+    created_at: float
+
+
+class Fitted(Model):
+    """A quantity that a recording tells; None is what it can't tell, or a side without a bound."""
+
+    key: str
+    title: str
+    unit: str
+    value: float | None
+    low: float | None
+    high: float | None
+    note: str
+
+
+class Setting(Model):
+    """A setting of a task, as a recording has it; `path` leads to it within the task."""
+
+    path: list[str]
+    title: str
+    value: float | list[int]
+
+
+class BagReading(Model):
+    """What a recording tells of its robot; `seconds` is how long it lasts, `notes` what one should know of it."""
+
+    seconds: float
+    notes: list[str]
+    fitted: list[Fitted]
+    settings: list[Setting]
+
+    def task(self) -> Json:
+        """The settings as a launch takes them: `launch(name, {"task": reading.task()})`."""
+        task: Json = {}
+        for setting in self.settings:
+            part = task
+            for key in setting.path[:-1]:
+                part = part.setdefault(key, {})
+            part[setting.path[-1]] = setting.value
+        return task

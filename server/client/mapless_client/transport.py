@@ -86,7 +86,7 @@ class Transport:
         _check(response)
         return response.json() if response.content else None
 
-    def upload(self, path: str, file: Path, content_type: str) -> Any:
+    def upload(self, path: str, file: Path, content_type: str, query: Query | None = None) -> Any:
         """Send a file, read bit by bit; the answer's JSON.
 
         Raises:
@@ -97,7 +97,7 @@ class Transport:
         try:
             with file.open("rb") as content:
                 blocks = iter(lambda: content.read(_BLOCK), b"")
-                response = self._http.post(path, content=blocks, headers=headers, timeout=_UPLOAD)
+                response = self._http.post(path, params=_params(query), content=blocks, headers=headers, timeout=_UPLOAD)
         except httpx.TransportError as error:
             raise UnreachableError(f"{self._url} does not answer: {error}") from error
         _check(response)
