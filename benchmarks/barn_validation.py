@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 
 from benchmarks.report import finish, parser
 from sim.baselines.named import TABLED, controller_of
-from sim.config import JackalConfig
-from sim.suites import EpisodeTable, Suite, SuiteRules, load_suite, run_controller
+from sim.config import JackalConfig, TaskConfig
+from sim.suites import EpisodeTable, Suite, SuiteRules, load_suite, run_controller, run_suite
+from workers.checkpoints import read_policy
+from workers.policy import torch_policy
+from workers.shipped.library import shipped_policy
 
 
 class Published(NamedTuple):
@@ -59,6 +62,9 @@ MOVE_BASE = "mapping, A* and dynamic window"
 
 PLANNERS = ("dynamic window", MOVE_BASE, "MPPI", "VFH+")
 
+POLICY = "jackal"
+"""The shipped policy that drives beside them, where the limits are those that it was trained for."""
+
 # Validated would be a simulator in which the same kind of planner scores about as much as in the log.
 AT_MOST = {f"{MOVE_BASE} at 0.5 m/s, times the log's score": 1.2}
 
@@ -85,6 +91,13 @@ def scores(table: EpisodeTable, period: float) -> NDArray[np.float64]:
     return np.asarray((table.outcomes == 1) * optimal / np.clip(table.steps * period, 2.0 * optimal, 8.0 * optimal))
 
 
+def _driven(name: str, task: TaskConfig, worlds: Suite) -> EpisodeTable:
+    if name != POLICY:
+        return run_controller(controller_of(TABLED[name], task), task, worlds)
+    manifest, policy = read_policy(shipped_policy(name).archive)
+    return run_suite(torch_policy(policy), manifest.training.task, worlds)
+
+
 def main() -> None:
     """Print the table in Markdown."""
     options = parser(__doc__).parse_args()
@@ -102,8 +115,8 @@ def main() -> None:
     for robot, arrival in ((EXAMPLE, EXAMPLE_ARRIVAL), (full.robot, full.arrival_distance)):
         worlds = suite(robot, arrival)
         task = worlds.rules.task()
-        for name in PLANNERS:
-            table = run_controller(controller_of(TABLED[name], task), task, worlds)
+        for name in PLANNERS if robot is EXAMPLE else (*PLANNERS, POLICY):
+            table = _driven(name, task, worlds)
             arrived = table.outcomes == 1
             score = float(scores(table, task.control_period).mean())
             figures[f"{name} at {robot.max_linear_speed:g} m/s, score"] = round(score, 4)

@@ -27,14 +27,19 @@ def type_places(page: Page, **places: float) -> None:
     page.wait_for_timeout(500)
 
 
-def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) -> None:
-    page = context.new_page()
+def open_simple(page: Page) -> None:
+    """A playground of a shipped policy in the simple arena, once it drives."""
     page.goto("/policies/complex")
     page.get_by_role("link", name=re.compile("^Play with")).click()
     page.get_by_role("combobox", name="Arena").click()
     page.get_by_role("option", name="Simple").click()
     page.get_by_role("button", name="Let it drive").click()
     expect(page.get_by_test_id("outcome")).to_contain_text("It", timeout=SOON)
+
+
+def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) -> None:
+    page = context.new_page()
+    open_simple(page)
     address = f"/api/playgrounds/{page.url.rsplit('/', 1)[1]}"
 
     page.get_by_role("button", name="Pause").click()
@@ -61,3 +66,27 @@ def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) ->
     expect(page.get_by_test_id("tally")).to_contain_text("0 collided")
     # The disc's edge is 0.35 m from the straight line on one side, 0.45 m on the other; the robot is 0.1 m wide.
     assert max(abs(y) for x, y in ways if abs(x + 0.3) < 0.4) > 0.4
+
+
+def test_a_moment_that_is_kept_is_a_scenario_to_measure_others_on(context: BrowserContext) -> None:
+    page = context.new_page()
+    open_simple(page)
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Add a disc").press("Enter")
+    expect(page.get_by_role("combobox", name="Handles on")).to_have_value("Disc 1")
+    type_places(page, x=-0.3, y=0.05, Radius=0.4)
+
+    page.get_by_role("textbox", name="Name").fill("A disc in the way")
+    page.get_by_role("combobox", name="Suite of your own").fill("Hard corners")
+    page.get_by_role("button", name="Keep", exact=True).click()
+    expect(page.get_by_text("Hard corners has 1 scenario now.")).to_be_visible(timeout=SOON)
+    page.get_by_role("link", name="Evaluate on the suite").click()
+    policies = page.get_by_role("combobox", name="Policies")
+    policies.fill("go-to")
+    page.get_by_role("option", name="Go-to-goal", exact=True).click()
+    policies.press("Escape")
+    page.get_by_role("button", name="Evaluate, 1 time").click()
+    row = page.get_by_test_id("evaluation").filter(has_text="Hard corners")
+    expect(row).to_have_attribute("data-state", "done", timeout=SOON)
+    page.get_by_role("link", name="Go-to-goal").click()
+    expect(page.get_by_test_id("episode")).to_have_count(1)
