@@ -7,144 +7,26 @@ synthetic, their link to the server is the real one. A page is all its requests 
     python -m benchmarks.load --database postgresql --check
 """
 
-import os
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, TypeVar
 
-import httpx
 import numpy as np
 import psutil
-from pydantic import BaseModel
 
-from benchmarks.backing import Postgres
 from benchmarks.load.meter import Meter
 from benchmarks.load.plan import PagesTold, Plan, StreamsTold, ViewsTold, WorkersTold
-from benchmarks.processes import free_port, kill, tree
+from benchmarks.load.served import TOKEN, WORKER_TOKEN, Database, Part, cores, launch, server_on_a_core
 from benchmarks.report import finish, parser
-from benchmarks.service import wait_for
 
-ROOT = Path(__file__).resolve().parents[2]
-Database = Literal["sqlite", "postgresql"]
 MAX_PAGE_MILLISECONDS = 300.0
 # Flat: over the second half the memory grows by no more than this part of itself.
 MAX_GROWTH_PERCENT = 3.0
 # Of the 30 frames a second that a view aims at.
 MIN_VIEW_FRAMES = 27.0
-_SEEDS_PER_EXPERIMENT = 50
-_TOKEN = "a-login-token-of-the-benchmark"
-_WORKER_TOKEN = "a-worker-token-of-the-benchmark"
-
-M = TypeVar("M", bound=BaseModel)
-
-
-@contextmanager
-def _server(directory: Path, database: Database, cores: tuple[int, list[int]]) -> Iterator[tuple[str, int]]:
-    """A server on a core of its own; its URL and process id."""
-    port, (own, others) = free_port(), cores
-    environment = {
-        **{name: value for name, value in os.environ.items() if not name.startswith("MAPLESS_")},
-        "MAPLESS_DATA_DIR": str(directory / "data"),
-        "MAPLESS_PORT": str(port),
-        "MAPLESS_TOKEN": _TOKEN,
-        "MAPLESS_WORKER_TOKEN": _WORKER_TOKEN,
-    }
-    # What has been started is ended, however far the rest has come.
-    with ExitStack() as started:
-        if database == "postgresql":
-            postgres = Postgres(directory)
-            started.callback(postgres.close)
-            postgres.start()
-            for process in postgres.members():
-                # Some end as soon as the database is up.
-                with suppress(psutil.NoSuchProcess):
-                    process.cpu_affinity(others)
-            environment["MAPLESS_DATABASE_URL"] = postgres.url
-        log = started.enter_context((directory / "server.log").open("ab"))
-        server = subprocess.Popen(
-            ["taskset", "-c", str(own), sys.executable, "-m", "server", "serve"],
-            cwd=ROOT,
-            env=environment,
-            stdout=log,
-            stderr=log,
-            start_new_session=True,
-        )
-        started.callback(_end, server)
-        url = f"http://127.0.0.1:{port}"
-        wait_for(lambda: _answers(url), seconds=60.0)
-        yield url, server.pid
-
-
-def _end(process: "subprocess.Popen[Any]") -> None:
-    """End it, if it has not ended, with all that it has started."""
-    kill(tree(process.pid))
-    process.wait()
-
-
-def _answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/healthz").status_code == 200
-    except httpx.TransportError:
-        return False
-
-
-def _launch(url: str, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """So many runs, and their experiments."""
-    run_ids: list[str] = []
-    experiment_ids: list[str] = []
-    with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {_TOKEN}"}, timeout=60.0) as api:
-        while len(run_ids) < runs:
-            seeds = list(range(min(_SEEDS_PER_EXPERIMENT, runs - len(run_ids))))
-            answer = api.post("/api/experiments", json={"name": "load", "seeds": seeds, "training": {}}).raise_for_status()
-            experiment_ids.append(answer.json()["id"])
-            run_ids.extend(run["id"] for run in answer.json()["runs"])
-    return tuple(run_ids), tuple(experiment_ids)
-
-
-class _Part:
-    """A process that makes a part of the load, on the cores that are not the server's."""
-
-    def __init__(self, plan: Plan, cores: list[int], niceness: int, *command: str) -> None:
-        where = ("taskset", "-c", ",".join(map(str, cores)), "nice", "-n", str(niceness))
-        self._process = subprocess.Popen(
-            [*where, sys.executable, "-m", *command], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        self._say(plan.model_dump_json())
-
-    def await_readiness(self) -> None:
-        """Until it has imported what it needs.
-
-        Raises:
-            RuntimeError: it ended instead.
-        """
-        assert self._process.stdout is not None
-        if not self._process.stdout.readline():
-            raise RuntimeError("a part of the load did not start; its own output says why")
-
-    def begin(self, end: float) -> None:
-        """Make the load until then, on the machine's clock."""
-        self._say(f"{end}")
-
-    def told(self, model: type[M], seconds: float) -> M:
-        """What it tells when it is over, which must be so within `seconds`."""
-        # Read while it writes: what many pages took does not fit into a pipe.
-        told, _ = self._process.communicate(timeout=seconds)
-        return model.model_validate_json(told)
-
-    def _say(self, line: str) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{line}\n")
-        self._process.stdin.flush()
-
-    def kill(self) -> None:
-        """End it, if it has not ended."""
-        _end(self._process)
 
 
 def load(
@@ -159,19 +41,18 @@ def load(
     page_seconds: float = 10.0,
 ) -> dict[str, object]:
     """Make the load for a while; the figures."""
-    usable = sorted(os.sched_getaffinity(0))
-    own, others = usable[0], usable[1:] or usable[:1]
+    own, others = cores()
     with (
         TemporaryDirectory(prefix="mapless-load-") as directory,
-        _server(Path(directory), database, (own, others)) as server,
+        server_on_a_core(Path(directory), database, (own, others)) as server,
         ExitStack() as started,
     ):
         url, pid = server
-        run_ids, experiment_ids = _launch(url, runs)
+        run_ids, experiment_ids = launch(url, runs)
         plan = Plan(
             server_url=url,
-            token=_TOKEN,
-            worker_token=_WORKER_TOKEN,
+            token=TOKEN,
+            worker_token=WORKER_TOKEN,
             run_ids=run_ids,
             experiment_ids=experiment_ids,
             series=series,
@@ -189,7 +70,7 @@ def load(
             (5, ("benchmarks.load.views",)),
             (0, ("benchmarks.load.browsers", "pages")),
         ):
-            parts.append(_Part(plan, others, niceness, *command))
+            parts.append(Part(plan, others, niceness, *command))
             started.callback(parts[-1].kill)
         patience = seconds + 120.0
         for part in parts:

@@ -20,6 +20,7 @@ class Plan(BaseModel):
         page_seconds: between two pages that a browser opens.
         views: watched runs.
         seconds: how long it lasts.
+        settling_seconds: at its beginning, of which views tell nothing.
         end: when it is over, on the machine's clock; known when everybody is ready.
     """
 
@@ -36,12 +37,18 @@ class Plan(BaseModel):
     page_seconds: float
     views: int
     seconds: float
+    settling_seconds: float = 0.0
     end: float = 0.0
 
     @property
     def over(self) -> bool:
         """Whether the time has come."""
         return time.time() >= self.end
+
+    @property
+    def settled(self) -> bool:
+        """Whether what is measured counts."""
+        return time.time() >= self.end - self.seconds + self.settling_seconds
 
 
 class WorkersTold(BaseModel):

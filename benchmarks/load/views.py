@@ -28,14 +28,15 @@ async def _watch(plan: Plan, run_id: str, told: ViewsTold) -> None:
                 ) as socket,
             ):
                 async for message in socket:
-                    told.messages += 1
-                    told.bytes += len(message)
+                    if plan.settled:
+                        told.messages += 1
+                        told.bytes += len(message)
         except TimeoutError:
             return
         except (OSError, WebSocketException):
             await asyncio.sleep(1.0)
         finally:
-            told.seconds += time.time() - opened
+            told.seconds += time.time() - max(opened, plan.end - plan.seconds + plan.settling_seconds)
         told.ended += 1
 
 

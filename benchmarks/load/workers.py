@@ -32,6 +32,24 @@ _FRAMES_PER_SECOND = 30.0
 _STEPS_PER_ITEM = 8_192
 
 
+def made_up_frame(watch: WatchRequest, step: int, moment: float) -> Frame:
+    """Robots that go round in circles; `moment` in seconds."""
+    robots, rays = watch.robots, LidarConfig().rays
+    angles = moment + np.arange(robots, dtype=np.float32)
+    return Frame(
+        mode=watch.mode,
+        step=step,
+        sim_time=moment,
+        speed=1.0,
+        poses=np.stack((np.cos(angles), np.sin(angles), angles), axis=1).astype(np.float32),
+        targets=np.zeros((robots, 2), np.float32),
+        ranges=np.full((robots, rays), 1.0 + 0.5 * np.sin(moment), np.float32),
+        fields_of_view=np.full(robots, 180.0, np.float32),
+        rewards=np.zeros(robots, np.float32),
+        outcomes=np.zeros(robots, np.uint8),
+    )
+
+
 class SyntheticRun:
     """A claimed run: its spool, its link and what it makes up."""
 
@@ -84,26 +102,11 @@ class SyntheticRun:
         self._link.notify()
 
     def show(self, moment: float) -> None:
-        """One frame, while somebody watches: robots that go round in circles."""
+        """One frame, while somebody watches."""
         watch = self._watch  # orders change it meanwhile
         if watch is None or self._link is None:
             return
-        robots, rays = watch.robots, LidarConfig().rays
-        angles = moment + np.arange(robots, dtype=np.float32)
-        self._link.frame(
-            Frame(
-                mode=watch.mode,
-                step=self._step,
-                sim_time=moment,
-                speed=1.0,
-                poses=np.stack((np.cos(angles), np.sin(angles), angles), axis=1).astype(np.float32),
-                targets=np.zeros((robots, 2), np.float32),
-                ranges=np.full((robots, rays), 1.0 + 0.5 * np.sin(moment), np.float32),
-                fields_of_view=np.full(robots, 180.0, np.float32),
-                rewards=np.zeros(robots, np.float32),
-                outcomes=np.zeros(robots, np.uint8),
-            ).encode()
-        )
+        self._link.frame(made_up_frame(watch, self._step, moment).encode())
         self.frames += 1
 
     def close(self) -> None:

@@ -1,5 +1,7 @@
 """Carries viser's WebSocket between a browser and the scene's own port: everything down, little up.
 
+What moves does not come through that port, but from the view itself, in viser's words.
+
 Up goes the camera, and of a playground what its owner clicks and drags.
 
 viser believes every message of a client: some write attributes of its controls unchecked, one opens a public tunnel. So
@@ -9,7 +11,7 @@ what comes from browsers is let through by name.
 import contextlib
 from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import anyio
 import msgspec
@@ -20,6 +22,10 @@ from websockets.exceptions import ConnectionClosed
 
 from server.live.page import VISER_PROTOCOL
 from workers.scene.gate import KEY
+
+if TYPE_CHECKING:
+    from server.live.hub import View
+    from server.live.picture import Sight
 
 # A camera's pose takes about 300 bytes.
 _MAX_MESSAGE = 4096
@@ -75,21 +81,24 @@ WATCH: Allowed = msgspec.msgpack.Decoder(_Camera)
 PLAY: Allowed = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _DragStart | _DragEnd)
 
 
-async def bridge(browser: WebSocket, port: int, allowed: Allowed = WATCH) -> None:
-    """Connects an unaccepted WebSocket of a browser with the scene on a port of 127.0.0.1, until one of them leaves."""
+async def bridge(browser: WebSocket, view: "View", allowed: Allowed = WATCH) -> None:
+    """Connects an unaccepted WebSocket of a browser with a scene, until one of them leaves."""
     async with connect(
-        f"ws://127.0.0.1:{port}",
+        f"ws://127.0.0.1:{view.port}",
         subprotocols=[VISER_PROTOCOL],  # type: ignore[list-item]
         additional_headers=KEY,
         compression=None,
         max_size=None,
-        # Frames pile up in the scene, which merges them, and not here.
+        # What changes piles up in the scene, which merges it, and not here.
         max_queue=4,
         proxy=None,
         ping_interval=None,
     ) as scene:
         await browser.accept(subprotocol=VISER_PROTOCOL)
-        await until_one_ends(partial(_down, scene, browser), partial(_up, browser, scene, allowed))
+        with contextlib.closing(view.look()) as sight:
+            await until_one_ends(
+                partial(_down, scene, browser, sight), partial(_move, sight, browser), partial(_up, browser, scene, allowed)
+            )
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):
         await browser.close()
 
@@ -118,9 +127,17 @@ def may_pass(message: bytes, allowed: Allowed = WATCH) -> bool:
     return True
 
 
-async def _down(scene: ClientConnection, browser: WebSocket) -> None:
+async def _down(scene: ClientConnection, browser: WebSocket, sight: "Sight") -> None:
     async for message in scene:
-        await browser.send_bytes(message if isinstance(message, bytes) else message.encode())
+        window = message if isinstance(message, bytes) else message.encode()
+        await browser.send_bytes(window)
+        sight.saw(window)
+
+
+async def _move(sight: "Sight", browser: WebSocket) -> None:
+    while True:
+        # Waits while the browser is behind, and then skips what it has missed.
+        await browser.send_bytes(await sight.next())
 
 
 async def _up(browser: WebSocket, scene: ClientConnection, allowed: Allowed) -> None:

@@ -125,7 +125,7 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
                 await stack.enter_async_context(services.drivers.driving(JobService(services), run_id, subject.driven))
             view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme, subject.stage))
             await until_one_ends(
-                partial(bridge, websocket, view.port, PLAY if subject.stage is not None else WATCH),
+                partial(bridge, websocket, view, PLAY if subject.stage is not None else WATCH),
                 partial(services.gate.until_changed, principal_of(websocket)),
             )
     except (TooManyViewsError, ArenaError) as error:

@@ -28,6 +28,7 @@ from workers.reporting import WatchRequest
 from workers.scene.themes import Theme
 
 if TYPE_CHECKING:
+    from server.live.picture import Sight
     from workers.scene.stage import Stage
 
 _T = TypeVar("_T")
@@ -44,11 +45,14 @@ class TooManyViewsError(LiveError):
 
 
 class View(Protocol):
-    """The scene of one run in one theme, in a thread and on a port of its own."""
+    """The scene of one run in one theme, on a port of its own."""
 
     @property
     def port(self) -> int:
         """Port of the scene's WebSocket on 127.0.0.1."""
+
+    def look(self) -> "Sight":
+        """For a browser that watches: what moves in the scene, as it changes."""
 
     def show(self, frame: Frame) -> None:
         """Queues a frame; returns at once, and drops what cannot be shown in time.
@@ -116,7 +120,7 @@ class LiveHub:
     Args:
         view_factory: builds the scene of a run; called in a thread, at the first watcher.
         linger: seconds that a scene outlives its last watcher, so that a reload finds it again.
-        capacity: scenes at the same time; each is a thread and about a megabyte.
+        capacity: scenes at the same time; each is a thread of viser's and about a megabyte.
     """
 
     def __init__(self, view_factory: ViewFactory, *, linger: float = 10.0, capacity: int = 32) -> None:

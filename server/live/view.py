@@ -1,10 +1,12 @@
-"""The scene of one watched run on a viser server of its own, drawn by one thread thirty times a second."""
+"""The scene of one watched run on a viser server of its own."""
 
 import logging
 import threading
 import time
 
-from server.live.playout import FRAMES_PER_SECOND, PlayoutBuffer
+from server.live.artist import ARTIST
+from server.live.picture import Picture, Sight
+from server.live.playout import PlayoutBuffer
 from server.live.scoreboard import Score, Scoreboard, ViewState
 from server.live.settings import MAX_ROBOTS, RECEIVING_SECONDS, LiveSettings
 from sim.config import MAX_MOVERS, ArenaPool, TaskConfig
@@ -23,9 +25,9 @@ COMPLAIN_SECONDS = 10.0
 
 
 class LiveView:
-    """One run in one theme: a viser server on a free port of 127.0.0.1 and the thread that draws.
+    """One run in one theme: a viser server on a free port of 127.0.0.1, and what moves in its scene.
 
-    Calls come from any thread and return at once; only the thread of the view touches the scene.
+    Calls come from any thread and return at once; only the artist's thread touches the scene.
 
     Args:
         task: arena, robot and LiDAR to draw.
@@ -38,7 +40,8 @@ class LiveView:
         self._server = start_viser()
         self._rays = task.lidar.scan_size
         self._arenas = task.arena.maps if isinstance(task.arena, ArenaPool) else 1
-        self._scene = Scene(self._server, task, theme)
+        self._picture = Picture(self._server)
+        self._scene = Scene(self._server, task, theme, self._picture)
         self._stage = None if stage is None else self._scene.add_stage(stage)
         self._camera = CameraRig(self._server, self._scene.half_size)
         self._scoreboard = Scoreboard()
@@ -47,15 +50,20 @@ class LiveView:
         self._settings = settings
         self._connected = False
         self._arrived = float("-inf")
-        self._positions: list[tuple[float, float]] = []
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._draw, name="live-view", daemon=True)
-        self._thread.start()
+        self._positions: list[list[float]] = []
+        self._complained = float("-inf")
+        self._drawing = threading.Lock()
+        self._closed = False
+        ARTIST.add(self)
 
     @property
     def port(self) -> int:
         """Port of the scene's WebSocket on 127.0.0.1."""
         return self._server.get_port()
+
+    def look(self) -> Sight:
+        """For a browser that watches, on the event loop that it is served by."""
+        return self._picture.look()
 
     def show(self, frame: Frame) -> None:
         """Queues a frame; returns at once, and drops what cannot be shown in time.
@@ -88,38 +96,45 @@ class LiveView:
             return self._scoreboard.score("live" if live else silent, self._settings.follow)
 
     def close(self) -> None:
-        """Stops the thread and the port; blocks until both are gone."""
-        self._stopping.set()
-        self._thread.join()
+        """Closes the port; blocks until it is gone and nothing is drawn any more."""
+        ARTIST.remove(self)
+        with self._drawing:
+            self._closed = True
         stop_viser(self._server)
 
-    def _draw(self) -> None:
-        tick = time.monotonic()
-        complained = float("-inf")
-        while not self._stopping.wait(max(0.0, tick - time.monotonic())):
-            now = time.monotonic()
-            tick = max(tick + 1.0 / FRAMES_PER_SECOND, now)
+    def draw(self, now: float) -> tuple[Sight, ...]:
+        """Draws what is due; called by the artist.
+
+        Args:
+            now: seconds of a steady clock.
+
+        Returns:
+            Who has something new to see.
+        """
+        with self._drawing:
+            if self._closed:
+                return ()
             try:
                 self._tick(now)
             except Exception:
                 # The next frame may be drawn: a view that stood still for ever would look as if the robots did.
-                if now - complained > COMPLAIN_SECONDS:
+                if now - self._complained > COMPLAIN_SECONDS:
                     logger.exception("a frame could not be drawn")
-                    complained = now
+                    self._complained = now
+            return self._picture.sights if self._picture.publish() else ()
 
     def _tick(self, now: float) -> None:
-        """Draws what is due."""
         with self._lock:
             frame = self._buffer.take()
             settings = self._settings
             if frame is not None:
                 self._scoreboard.update(frame)
-        with self._server.atomic():
-            self._scene.show_rays(settings.rays, None if settings.ray_robots == "all" else settings.follow or 0)
-            self._camera.follow(settings.follow, now)
-            if frame is not None:
-                self._positions = [(float(x), float(y)) for x, y, _ in frame.poses]
-                self._scene.update(frame, now)
-            if self._stage is not None:
+        self._scene.show_rays(settings.rays, None if settings.ray_robots == "all" else settings.follow or 0)
+        self._camera.follow(settings.follow, now)
+        if frame is not None:
+            self._positions = frame.poses[:, :2].tolist()
+            self._scene.update(frame, now)
+        if self._stage is not None:
+            with self._server.atomic():
                 self._stage.update(frame)
-            self._scene.centre_on(*self._camera.centre(self._positions, now))
+        self._scene.centre_on(*self._camera.centre(self._positions, now))

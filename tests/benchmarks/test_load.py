@@ -10,7 +10,8 @@ import sys
 import psutil
 import pytest
 
-from benchmarks.load.__main__ import Database, load
+from benchmarks.load.__main__ import load
+from benchmarks.load.served import Database
 from benchmarks.processes import kill, tree
 from benchmarks.service import wait_for
 from tests.conftest import POSTGRES, require_service

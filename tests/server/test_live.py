@@ -35,6 +35,7 @@ from workers.errors import FrameError
 from workers.frames import Frame
 from workers.reporting import WatchRequest
 from workers.scene.gate import KEY
+from workers.scene.moving import ByViser
 from workers.scene.quiet import start_viser, stop_viser
 from workers.scene.robots import RobotNodes
 from workers.scene.scene import Scene
@@ -286,19 +287,20 @@ async def _play(view: LiveView) -> bool:
     return False
 
 
-def test_the_rays_of_one_robot_leave_those_of_the_others_without_length() -> None:
-    frame = make_frame(robots=3)
+def test_rays_are_drawn_of_the_robot_that_is_asked_for_or_of_all() -> None:
+    frame = dataclasses.replace(make_frame(robots=3), poses=np.array([[0, 0, 0], [1, 2, 0], [3, 4, 0]], np.float32))
     server = start_viser()
     try:
-        nodes = RobotNodes(server, "/robots", TaskConfig(), COLOURS["light"], frame)
-        nodes.show_rays(True, 1)
-        nodes.update(frame, 0.0)
-        rays = nodes._ray_lines.points.reshape(3, 30, 2, 3)
+        nodes = RobotNodes(server, ByViser(), "/robots", TaskConfig(), COLOURS["light"], frame)
+        for asked, drawn in ((1, [1]), (None, [0, 1, 2]), (7, [2])):
+            nodes.show_rays(True, asked)
+            nodes.update(frame, 0.0)
+            assert nodes._rays is not None
+            rays = nodes._rays.lines.points.reshape(-1, 30, 2, 3)
+            np.testing.assert_allclose(rays[:, 0, 0, :2], frame.poses[drawn, :2])
+            np.testing.assert_allclose(np.linalg.norm(rays[:, :, 1] - rays[:, :, 0], axis=-1), 2.0, rtol=1e-5)
     finally:
         stop_viser(server)
-    lengths = np.linalg.norm(rays[:, :, 1] - rays[:, :, 0], axis=-1)
-    assert lengths[[0, 2]].max() == 0.0
-    assert lengths[1] == pytest.approx(np.full(30, 2.0), abs=1e-5)
 
 
 def test_rays_are_drawn_where_each_robots_own_scanner_has_them() -> None:
@@ -309,9 +311,10 @@ def test_rays_are_drawn_where_each_robots_own_scanner_has_them() -> None:
     )
     server = start_viser()
     try:
-        nodes = RobotNodes(server, "/robots", TaskConfig(), COLOURS["light"], frame)
+        nodes = RobotNodes(server, ByViser(), "/robots", TaskConfig(), COLOURS["light"], frame)
         nodes.update(frame, 0.0)
-        ends = nodes._ray_lines.points.reshape(2, 30, 2, 3)[:, [0, -1], 1, :2]
+        assert nodes._rays is not None
+        ends = nodes._rays.lines.points.reshape(2, 30, 2, 3)[:, [0, -1], 1, :2]
     finally:
         stop_viser(server)
     # All 2 m long: 45 degrees to either side of one robot, and a right angle to either side of the other.
@@ -339,19 +342,20 @@ def test_a_scene_follows_the_training_into_another_arena() -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_scene_shows_movers_where_they_are_as_wide_as_they_are(theme: Theme) -> None:
-    view = LiveView(TaskConfig(), theme, LiveSettings())
-    nodes = view._server.scene._handle_from_node_name
+    server = start_viser()
+    nodes = server.scene._handle_from_node_name
     try:
+        scene = Scene(server, TaskConfig(), theme)
         for number, movers in enumerate(([], [[1.0, 2.0, 0.25], [-3.0, 0.5, 0.4]], [[0.0, -1.0, 0.5]], [])):
             frame = dataclasses.replace(make_frame(number), movers=np.array(movers, np.float32).reshape(-1, 3))
-            view._scene.update(frame, float(number))
+            scene.update(frame, float(number))
             assert ("/world/movers" in nodes) == bool(movers)
             if movers:
                 drawn: Any = nodes["/world/movers"]
                 np.testing.assert_allclose(drawn.batched_positions[:, :2], frame.movers[:, :2])
                 np.testing.assert_allclose(drawn.batched_scales[:, :2], frame.movers[:, 2:].repeat(2, axis=1))
     finally:
-        view.close()
+        stop_viser(server)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from server.live.playout import PlayoutBuffer
 from server.live.scoreboard import Scoreboard
@@ -125,11 +126,23 @@ def test_a_crowd_is_not_listed_one_by_one() -> None:
     assert board.score("live", 40).robots == []
 
 
+def all_segments(trails: Trails) -> NDArray[np.float32]:
+    """Of a single robot, the newest first."""
+    return np.concatenate([trails.newest(), trails.older()])
+
+
+def test_a_trail_grows_at_its_robots_end_until_a_point_is_kept() -> None:
+    trails = Trails(np.zeros((1, 3), np.float32), points=4, max_speed=0.25)
+    # A point is kept four times in a simulated second.
+    changes = [trails.update(np.array([[0.01 * tick, 0.0, 0.0]], np.float32), 0.1 * tick) for tick in range(7)]
+    assert changes == [True, False, False, True, False, False, True]
+
+
 def test_a_trail_follows_its_robot_and_ends_where_it_is_put_elsewhere() -> None:
     trails = Trails(np.zeros((1, 3), np.float32), points=4, max_speed=0.25)
     for tick in range(10):
         trails.update(np.array([[0.05 * tick, 0.0, 0.0]], np.float32), tick * 0.2)
-    segments = trails.segments()
+    segments = all_segments(trails)
     assert segments.shape == (4, 2, 3)
     # The newest end is the robot, and each segment goes on where the one before ended.
     assert segments[0, 0, 0] == pytest.approx(0.45)
@@ -137,7 +150,7 @@ def test_a_trail_follows_its_robot_and_ends_where_it_is_put_elsewhere() -> None:
     assert (np.diff(segments[:, 0, 0]) < 0).all()
 
     trails.update(np.array([[3.0, 3.0, 0.0]], np.float32), 2.0)
-    np.testing.assert_allclose(trails.segments()[..., :2], 3.0)
+    np.testing.assert_allclose(all_segments(trails)[..., :2], 3.0)
 
 
 def test_a_trail_starts_anew_with_another_clip() -> None:
@@ -145,7 +158,7 @@ def test_a_trail_starts_anew_with_another_clip() -> None:
     for tick in range(5):
         trails.update(np.array([[0.05 * tick, 0.0, 0.0]], np.float32), tick * 0.2)
     trails.update(np.array([[0.3, 0.0, 0.0]], np.float32), 60.0, anew=True)
-    np.testing.assert_allclose(trails.segments()[..., 0], 0.3, rtol=1e-6)
+    np.testing.assert_allclose(all_segments(trails)[..., 0], 0.3, rtol=1e-6)
 
 
 def test_trails_fade_into_the_floor() -> None:

@@ -4,6 +4,8 @@ To follow a robot, the world moves under the camera instead of the camera throug
 browsers, and everyone may still turn and zoom freely. Only the change of what is followed moves cameras, once.
 """
 
+from collections.abc import Sequence
+
 import viser
 
 Point = tuple[float, float, float]
@@ -46,7 +48,7 @@ class CameraRig:
                 client.camera.position = position
                 client.camera.look_at = target
 
-    def centre(self, robots: list[tuple[float, float]], now: float) -> tuple[float, float]:
+    def centre(self, robots: Sequence[Sequence[float]], now: float) -> tuple[float, float]:
         """The point of the arena that lies under the camera.
 
         Args:

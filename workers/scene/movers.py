@@ -5,6 +5,7 @@ import viser
 
 from workers.frames import Frame
 from workers.scene import meshes
+from workers.scene.moving import Moving
 from workers.scene.themes import Colours, linear
 
 
@@ -13,14 +14,16 @@ class MoverNodes:
 
     Args:
         server: where the nodes live.
+        moving: where they are set.
         parent: path of the node to hang them under.
         colours: of the theme.
         movers: how many.
     """
 
-    def __init__(self, server: viser.ViserServer, parent: str, colours: Colours, movers: int) -> None:
+    def __init__(self, server: viser.ViserServer, moving: Moving, parent: str, colours: Colours, movers: int) -> None:
         mesh = meshes.mover()
         self._movers = movers
+        self._moving = moving
         self._bodies = server.scene.add_batched_meshes_simple(
             f"{parent}/movers",
             mesh.vertices,
@@ -39,10 +42,12 @@ class MoverNodes:
     def update(self, frame: Frame) -> None:
         """Draws the movers of a frame that has as many."""
         height = np.zeros(self._movers, np.float32)
-        self._bodies.batched_positions = np.column_stack([frame.movers[:, :2], height])
+        self._moving.put(self._bodies, "batched_positions", np.column_stack([frame.movers[:, :2], height]))
         # As wide as each is, all equally tall.
-        self._bodies.batched_scales = np.column_stack([frame.movers[:, 2], frame.movers[:, 2], height + np.float32(1.0)])
+        scales = np.column_stack([frame.movers[:, 2], frame.movers[:, 2], height + np.float32(1.0)])
+        self._moving.put(self._bodies, "batched_scales", scales)
 
     def remove(self) -> None:
         """Takes the nodes away."""
+        self._moving.forget(self._bodies)
         self._bodies.remove()

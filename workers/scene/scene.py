@@ -7,6 +7,7 @@ from sim.arenas import Arena, arena_clearance, build_arena
 from sim.config import TaskConfig
 from workers.frames import Frame
 from workers.scene.movers import MoverNodes
+from workers.scene.moving import ByViser, Moving
 from workers.scene.robots import RobotNodes
 from workers.scene.stage import Stage
 from workers.scene.stage_nodes import OBSTACLE_HEIGHT, StageNodes
@@ -26,23 +27,26 @@ class Scene:
         server: where the nodes live.
         task: the place, and the geometry of robot and LiDAR.
         theme: light or dark.
+        moving: where the nodes that move are set.
     """
 
-    def __init__(self, server: viser.ViserServer, task: TaskConfig, theme: Theme) -> None:
+    def __init__(self, server: viser.ViserServer, task: TaskConfig, theme: Theme, moving: Moving | None = None) -> None:
         self._server = server
+        self._moving = moving or ByViser()
         self._task = task
         self._colours = COLOURS[theme]
         self._rays: tuple[bool, int | None] = (True, None)
         self._robots: RobotNodes | None = None
         self._movers: MoverNodes | None = None
         self._shape: tuple[int, ...] = ()
+        self._centre = np.zeros(3)
         self._world = server.scene.add_frame(_WORLD, show_axes=False)
         _light(server, theme, self._colours)
         self._enter(0)
 
     def add_stage(self, stage: Stage) -> StageNodes:
         """Nodes for what a playground draws, below the world that moves under the camera."""
-        return StageNodes(self._server, self._world, stage, self._task, self._colours)
+        return StageNodes(self._server, self._centre, stage, self._task, self._colours)
 
     def add_robots(self, task: TaskConfig, frame: Frame, number: int) -> RobotNodes:
         """Robots of another task in the same place, without rays; whoever adds them updates them.
@@ -53,7 +57,7 @@ class Scene:
             number: of the first of them, for its colour.
         """
         parent = f"{_WORLD}/beside{number}"
-        robots = RobotNodes(self._server, parent, task, self._colours, frame, first=number)
+        robots = RobotNodes(self._server, self._moving, parent, task, self._colours, frame, first=number)
         robots.show_rays(visible=False, robot=None)
         return robots
 
@@ -64,7 +68,8 @@ class Scene:
 
     def centre_on(self, x: float, y: float) -> None:
         """Moves the world so that the point (x, y) of the arena lies where the camera looks."""
-        self._world.position = (-x, -y, 0.0)
+        self._centre[:2] = x, y
+        self._moving.put(self._world, "position", -self._centre)
 
     def show_rays(self, visible: bool, robot: int | None) -> None:
         """Shows or hides rays, hits and scanned area; those of one robot, or of all where it is None."""
@@ -88,13 +93,15 @@ class Scene:
             if self._robots is not None:
                 self._robots.remove()
             self._shape = frame.ranges.shape
-            self._robots = RobotNodes(self._server, _WORLD, self._task, self._colours, frame)
+            self._robots = RobotNodes(self._server, self._moving, _WORLD, self._task, self._colours, frame)
             self._robots.show_rays(*self._rays)
         self._robots.update(frame, now)
         if len(frame.movers) != (0 if self._movers is None else len(self._movers)):
             if self._movers is not None:
                 self._movers.remove()
-            self._movers = MoverNodes(self._server, _WORLD, self._colours, len(frame.movers)) if len(frame.movers) else None
+            self._movers = None
+            if len(frame.movers):
+                self._movers = MoverNodes(self._server, self._moving, _WORLD, self._colours, len(frame.movers))
         if self._movers is not None:
             self._movers.update(frame)
 

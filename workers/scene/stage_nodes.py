@@ -36,16 +36,16 @@ class StageNodes:
 
     Args:
         server: where they live.
-        world: the node below which everything hangs.
+        centre: (3,) the point of the arena under the camera, as it changes.
         stage: whose.
         task: for the robot's size.
         colours: of the theme.
     """
 
     def __init__(
-        self, server: viser.ViserServer, world: viser.FrameHandle, stage: Stage, task: TaskConfig, colours: Colours
+        self, server: viser.ViserServer, centre: NDArray[np.float64], stage: Stage, task: TaskConfig, colours: Colours
     ) -> None:
-        self._server, self._world, self._stage, self._colours = server, world, stage, colours
+        self._server, self._centre, self._stage, self._colours = server, centre, stage, colours
         self._robot_radius = task.robot.circumscribed_radius
         self._obstacles: dict[tuple[str, int], tuple[tuple[float, ...], viser.SceneNodeHandle]] = {}
         self._way: viser.LineSegmentsHandle | None = None
@@ -180,7 +180,7 @@ class StageNodes:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
         if not (np.isfinite(origin).all() and np.isfinite(direction).all()) or abs(direction[2]) < 1e-6:
             return
-        points = origin + ((_HEIGHTS - origin[2]) / direction[2])[:, None] * direction - np.array(self._world.position)
+        points = origin + ((_HEIGHTS - origin[2]) / direction[2])[:, None] * direction + self._centre
         found = self._met(points)
         if found is not None:
             self._stage.choose(*found)

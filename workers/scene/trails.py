@@ -27,31 +27,42 @@ class Trails:
         self._points = np.full((len(poses), points + 1, 3), _HEIGHT, np.float32)
         self._points[:, :, :2] = poses[:, None, :2]
 
-    def update(self, poses: NDArray[np.float32], sim_time: float, *, anew: bool = False) -> None:
+    def update(self, poses: NDArray[np.float32], sim_time: float, *, anew: bool = False) -> bool:
         """The robots have moved on; where one has been put somewhere else, its trail starts there.
 
         Args:
             poses: (robots, 3) where they are.
             sim_time: simulated seconds.
             anew: start all trails here.
+
+        Returns:
+            Whether more than the newest segments has changed.
         """
         elapsed = sim_time - self._sim_time
         self._sim_time = sim_time
         moved = np.hypot(*(poses[:, :2] - self._points[:, 0, :2]).T)
         jumped = (moved > 0.05 + _TELEPORT * self._max_speed * elapsed) | anew
-        if not 0.0 <= sim_time - self._kept_at < _SPACING:
+        kept = not 0.0 <= sim_time - self._kept_at < _SPACING
+        if kept:
             self._kept_at = sim_time
             self._points[:, 1:] = self._points[:, :-1]
         self._points[:, 0, :2] = poses[:, :2]
-        self._points[jumped] = self._points[jumped, :1]
+        again = bool(jumped.any())
+        if again:
+            self._points[jumped] = self._points[jumped, :1]
+        return kept or again
 
-    def segments(self) -> NDArray[np.float32]:
-        """(robots x points, 2, 3) line segments, each robot's newest first."""
-        return np.stack([self._points[:, :-1], self._points[:, 1:]], axis=2).reshape(-1, 2, 3)
+    def newest(self) -> NDArray[np.float32]:
+        """(robots, 2, 3) the line segment that ends at each robot."""
+        return self._points[:, :2]
+
+    def older(self) -> NDArray[np.float32]:
+        """(robots x (points - 1), 2, 3) the other line segments, each robot's newest first."""
+        return np.stack([self._points[:, 1:-1], self._points[:, 2:]], axis=2).reshape(-1, 2, 3)
 
 
 def trail_colours(colours: NDArray[np.float64], floor: NDArray[np.float64], points: int) -> NDArray[np.float64]:
-    """(robots x points, 2, 3) colours of `Trails.segments`: the robot's own, turning into the floor's with age."""
+    """(robots x points, 2, 3) colours of each robot's segments, newest first: its own, turning into the floor's with age."""
     strength = np.linspace(0.85, 0.0, points + 1)[None, :, None]
     shades = colours[:, None, :] * strength + floor * (1.0 - strength)
     return np.stack([shades[:, :-1], shades[:, 1:]], axis=2).reshape(-1, 2, 3)
