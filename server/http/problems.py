@@ -1,15 +1,19 @@
 """How the service's errors are described in OpenAPI and answered over HTTP."""
 
+import logging
 import math
 from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
+from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketState
 
 from server.errors import ErrorBody, RefusedFieldError, ServiceError
+
+logger = logging.getLogger(__name__)
 
 Responses = dict[int | str, dict[str, Any]]
 
@@ -44,10 +48,15 @@ PROVIDER_FAILED: Responses = {503: {"model": ErrorBody, "description": "The prov
 TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 
+def retry_after(error: ServiceError) -> dict[str, str]:
+    """The header that says when to come again, where that is known."""
+    return {} if error.retry_after is None else {"Retry-After": str(max(1, math.ceil(error.retry_after)))}
+
+
 def error_response(error: ServiceError) -> JSONResponse:
     """The error as its HTTP response."""
-    headers = {} if error.retry_after is None else {"Retry-After": str(max(1, math.ceil(error.retry_after)))}
-    return JSONResponse(ErrorBody(detail=error.message).model_dump(), status_code=error.status, headers=headers)
+    body = ErrorBody(detail=error.message).model_dump()
+    return JSONResponse(body, status_code=error.status, headers=retry_after(error))
 
 
 async def close_for_now(websocket: WebSocket, error: ServiceError) -> None:
@@ -67,6 +76,12 @@ def install_error_handlers(app: FastAPI) -> None:
             await close_for_now(connection, error)
             return None
         return error_response(error)
+
+    @app.exception_handler(ClientDisconnect)
+    async def _let_go(request: Request, _error: ClientDisconnect) -> Response:
+        # A worker that is lost in the middle of an upload is an everyday matter. Nobody reads this answer.
+        logger.info("%s %s: whoever sent it left before it was complete", request.method, request.url.path)
+        return Response(status_code=HTTPStatus.BAD_REQUEST)
 
     @app.exception_handler(RefusedFieldError)
     async def _refuse_field(_request: Request, error: RefusedFieldError) -> JSONResponse:

@@ -7,12 +7,13 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
+from server.errors import ServiceError
 from server.http.paging import PartDep
-from server.http.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED
+from server.http.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED, retry_after
 from server.live.page import HEADERS
 from server.replays import lapse, repository, service
 from server.replays.films import episode_film, film_of, film_progress
-from server.replays.page import replay_page
+from server.replays.page import failed_page, replay_page
 from server.replays.recordings import progress_of, recordings_of
 from server.replays.references import Reference, references
 from server.replays.schemas import BesideList, EpisodeReplay, EpisodeSeries, FilmProgress, Lapse, Replay, ReplayProgress
@@ -213,6 +214,13 @@ async def play_time_lapse(
     """The player of a run's time lapse; see `play`."""
     if request.query_params.keys() - {_DOWNLOAD}:
         return RedirectResponse(request.url.path)
+    try:
+        return await _time_lapse_player(replayed, request, theme, services)
+    except ServiceError as error:
+        return _failed(theme, error)
+
+
+async def _time_lapse_player(replayed: Replayed, request: Request, theme: Theme, services: Services) -> Response:
     subjects = await replayed.subjects()
     # What was read of the recordings is let go while the film is made.
     film, caption = lapse.filmed(subjects, await recordings_of(services, subjects), theme)
@@ -229,11 +237,23 @@ async def play(replayed: ReplayedDep, request: Request, episode: int, theme: The
     """The player, with the scenario inside. What viser's client would do besides is cut off."""
     if request.query_params.keys() - {_DOWNLOAD}:
         return RedirectResponse(request.url.path)
+    try:
+        return await _player(replayed, request, episode, theme, services)
+    except ServiceError as error:
+        return _failed(theme, error)
+
+
+async def _player(replayed: Replayed, request: Request, episode: int, theme: Theme, services: Services) -> Response:
     caption = service.captioned(await replayed.parts(episode), episode)
     subjects = await replayed.subjects()
     path = await film_of(services, episode_film(subjects, episode, "scene", theme), subjects)
     headers = HEADERS | (_attached(subjects, episode, "html") if _DOWNLOAD in request.query_params else {})
     return HTMLResponse(await services.lanes.replays.run(replay_page, theme, path, caption), headers=headers)
+
+
+def _failed(theme: Theme, error: ServiceError) -> Response:
+    """The same status as elsewhere, for whoever looks into the frame."""
+    return HTMLResponse(failed_page(theme, error.message), status_code=error.status, headers=HEADERS | retry_after(error))
 
 
 def _attached(subjects: Sequence[Subject], episode: int, suffix: str) -> dict[str, str]:

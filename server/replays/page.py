@@ -34,6 +34,20 @@ def replay_page(theme: Theme, recording: Path, caption: "Caption | LapseCaption"
     return viser_page(theme, head, caption.html())
 
 
+def failed_page(theme: Theme, message: str) -> str:
+    """In the place of a replay that can't be shown: why, and a way to ask for it once more.
+
+    Args:
+        theme: light or dark.
+        message: what has happened, and what to do about it.
+    """
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>No replay</title>'
+        f'<style>{_asset("failed.css")}</style></head><body data-theme="{theme}"><main><h1>This can\'t be shown now</h1>'
+        f'<p>{html.escape(message)}</p><p><a href="">Try again</a></p></main></body></html>'
+    )
+
+
 @dataclass(frozen=True)
 class Driver:
     """Who drove.

@@ -232,3 +232,18 @@ def test_a_worker_gets_the_recordings_of_its_film_and_no_others(
     refused = asker.answer()
     assert refused.status_code == 500
     assert refused.json()["detail"] == "The film could not be made: out of ink"
+
+
+def test_where_no_film_can_be_made_its_frame_says_why_and_what_to_do(
+    client: TestClient, by_hand: DirectClient, kept: Path
+) -> None:
+    asker = Asking(client, f"/replays/{SUBJECT}/7/dark/")
+    for _ in range(2):
+        claim = claimed(by_hand)
+        by_hand.end_job(claim.id, claim.attempt, JobEnd(outcome="failed", error="no <ink> left"))
+    shown = asker.answer()
+    assert (shown.status_code, shown.headers["content-type"]) == (500, "text/html; charset=utf-8")
+    assert "The film could not be made: no &lt;ink&gt; left" in shown.text
+    assert 'data-theme="dark"' in shown.text
+    assert '<a href="">Try again</a>' in shown.text
+    assert "default-src 'none'" in shown.headers["Content-Security-Policy"]

@@ -2,10 +2,13 @@
 
 import logging
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
+from celery.worker.consumer import Consumer
 from fastapi.testclient import TestClient
 from sqlalchemy import make_url, text
 from starlette.websockets import WebSocketDisconnect
@@ -178,3 +181,13 @@ def test_one_asks_at_a_time_and_less_often_the_longer_it_lasts() -> None:
 
 def test_a_worker_reconnects_to_the_broker_for_as_long_as_it_takes() -> None:
     assert create_app("memory://").conf.broker_connection_max_retries is None
+
+
+def test_a_worker_that_loses_its_broker_prints_no_warning_of_what_celery_will_change() -> None:
+    app = create_app("memory://")
+    # All that Celery looks at when a connection is lost.
+    consumer = SimpleNamespace(app=app, connection=app.connection_for_read())
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        Consumer.on_connection_error_after_connected(consumer, ConnectionResetError("gone"))
+    assert not [warning for warning in said if issubclass(warning.category, PendingDeprecationWarning)]

@@ -5,10 +5,13 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import httpx
 import pytest
 
+from benchmarks.service import wait_for
+from tests.server.harness import WORKER_TOKEN
 from tests.server.test_serving import serving
 
 SECONDS = 1.0
@@ -139,3 +142,20 @@ def test_a_stream_stays_open(url: str) -> None:
         time.sleep(4 * SECONDS)
         httpx.post(f"{base}/api/experiments", json={}, headers={"Authorization": f"Bearer {token}"}).raise_for_status()
         assert any(line == "event: changes" for line in lines)
+
+
+def test_a_worker_that_goes_away_in_the_middle_of_an_upload_is_one_line_of_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with log.open("wb") as stderr, serving(tmp_path / "data", stderr=stderr, MAPLESS_WORKER_TOKEN=WORKER_TOKEN) as (_, url):
+        with connected(url) as connection:
+            head = (
+                "PUT /api/worker/runs/lost/checkpoints/1?attempt=1 HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+                f"Authorization: Bearer {WORKER_TOKEN}\r\nContent-Length: 1000000\r\n\r\n"
+            )
+            connection.sendall(head.encode() + b'{"after_seq":')
+            time.sleep(0.2)
+        wait_for(lambda: b"left before it was complete" in log.read_bytes(), seconds=PATIENCE)
+        assert httpx.get(httpx.URL(url).copy_with(path="/healthz", query=None)).status_code == 200
+    said = log.read_text()
+    assert "Traceback" not in said
+    assert len(said.splitlines()) == 1, said

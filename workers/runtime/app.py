@@ -32,6 +32,9 @@ def create_app(broker_url: str) -> Celery:
         broker_connection_retry_on_startup=True,
         # As long as it takes: Celery's own hundred tries are over after less than an hour.
         broker_connection_max_retries=None,
+        # What Celery will do by itself one day, and warns of where nobody has said so. Of ours it cancels nothing: no task
+        # of this application is acknowledged late.
+        worker_cancel_long_running_tasks_on_connection_loss=True,
         broker_transport_options=_transport_options(broker_url),
         worker_hijack_root_logger=True,
         worker_send_task_events=False,
