@@ -186,7 +186,7 @@ def test_a_worker_reconnects_to_the_broker_for_as_long_as_it_takes() -> None:
 def test_a_worker_that_loses_its_broker_prints_no_warning_of_what_celery_will_change() -> None:
     app = create_app("memory://")
     # All that Celery looks at when a connection is lost.
-    consumer = SimpleNamespace(app=app, connection=app.connection_for_read())
+    consumer = SimpleNamespace(app=app, connection=app.connection_for_read(), qos_global=False, max_prefetch_count=1)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         Consumer.on_connection_error_after_connected(consumer, ConnectionResetError("gone"))
