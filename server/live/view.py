@@ -116,12 +116,13 @@ class LiveView:
                 return ()
             try:
                 self._tick(now)
+                return self._picture.sights if self._picture.publish() else ()
             except Exception:
                 # The next frame may be drawn: a view that stood still for ever would look as if the robots did.
                 if now - self._complained > COMPLAIN_SECONDS:
                     logger.exception("a frame could not be drawn")
                     self._complained = now
-            return self._picture.sights if self._picture.publish() else ()
+                return ()
 
     def _tick(self, now: float) -> None:
         with self._lock:
