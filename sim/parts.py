@@ -28,6 +28,7 @@ _MODULES: dict[str, Part] = {
     "uvicorn": "server",
     "viser": "server",
     "websockets": "server",
+    "zstandard": "server",
     "av": "worker",
     "mcap": "worker",
     "mcap_ros2": "worker",
