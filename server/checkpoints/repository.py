@@ -82,13 +82,12 @@ class CheckpointRepository:
     def at_step(self, run_id: str, step: int) -> tables.Checkpoint | None:
         """The run's whole checkpoint of exactly this step, if there is one."""
         query = _whole(run_id).where(tables.Checkpoint.step == step)
-        return self._session.scalars(query.order_by(tables.Checkpoint.created_at.desc())).first()
+        return self._session.scalars(query.order_by(tables.Checkpoint.created_at.desc()).limit(1)).first()
 
     def last(self, run_id: str) -> tables.Checkpoint | None:
         """The run's whole checkpoint of the highest step, from which it is resumed."""
-        return self._session.scalars(
-            _whole(run_id).order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
-        ).first()
+        query = _whole(run_id).order_by(tables.Checkpoint.step.desc(), tables.Checkpoint.created_at.desc())
+        return self._session.scalars(query.limit(1)).first()
 
     def page(
         self, run_id: str, window: Window, step: int | None = None

@@ -2,12 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, status
+from fastapi import APIRouter, Depends, Query, Response, status
 
-from server.experiments.form import form_schema
+from server.experiments.form import training_form
 from server.experiments.schemas import (
     Experiment,
-    ExperimentCreate,
     ExperimentLaunch,
     ExperimentPatch,
     TrainingForm,
@@ -19,7 +18,6 @@ from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
-from workers.presets import PRESETS
 
 router = APIRouter(tags=["experiments"])
 
@@ -31,11 +29,11 @@ async def _service(services: ServicesDep) -> ExperimentService:
 ExperimentServiceDep = Annotated[ExperimentService, Depends(_service)]
 
 
-@router.get("/api/training/form", responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
-def get_training_form(kept: KeptDep) -> TrainingForm:
+@router.get("/api/training/form", response_model=TrainingForm, responses=NOT_MODIFIED, dependencies=[SIGNED_IN])
+def get_training_form(kept: KeptDep) -> Response:
     """What the launch form is made of: schema, defaults and presets."""
-    kept.unless()
-    return TrainingForm(schema=form_schema(), defaults=ExperimentCreate(), presets=list(PRESETS))
+    headers = kept.unless()
+    return Response(training_form(), media_type="application/json", headers=headers)
 
 
 @router.get("/api/training/pace", dependencies=[SIGNED_IN])

@@ -45,6 +45,13 @@ class StoredTraining:
 
 def read_training(document: Mapping[str, Any]) -> StoredTraining:
     """What a stored document says."""
+    try:
+        return StoredTraining(TrainingConfig.model_validate(document), ())
+    except ValidationError:
+        return _read_in_part(document)
+
+
+def _read_in_part(document: Mapping[str, Any]) -> StoredTraining:
     rest: dict[str, Any] = deepcopy(dict(document))
     unreadable: set[str] = set()
     while True:

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable, Iterator
 from hashlib import blake2b
+from typing import Protocol, TypeVar, cast
 
-import numpy as np
-from numpy.typing import NDArray
-from sqlalchemy import delete, select, tuple_
+from sqlalchemy import Table, bindparam, delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -14,6 +13,32 @@ from server.metrics.points import Axis, Points
 _AXES_A_QUERY = 500
 # Decoded ones that are remembered within a transaction: those of a run's last chunks are asked for again and again.
 _MAX_REMEMBERED = 64
+
+_AXES = cast("Table", tables.MetricAxis.__table__)
+_DROP_UNUSED = delete(_AXES).where(
+    _AXES.c.run_id == bindparam("run"),
+    _AXES.c.id.not_in(
+        select(tables.MetricChunk.axis).where(
+            tables.MetricChunk.run_id == bindparam("run"), tables.MetricChunk.axis.is_not(None)
+        )
+    ),
+)
+
+
+class _Chunk(Protocol):
+    """As much of a chunk as its points take."""
+
+    @property
+    def run_id(self) -> str: ...
+    @property
+    def axis(self) -> str | None: ...
+    @property
+    def points(self) -> bytes: ...
+    @property
+    def count(self) -> int: ...
+
+
+_C = TypeVar("_C", bound=_Chunk)
 
 
 class AxisRepository:
@@ -34,7 +59,7 @@ class AxisRepository:
             self._kept.add((run_id, key))
         return key
 
-    def decoded(self, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, Points]]:
+    def decoded(self, chunks: Iterable[_C]) -> Iterator[tuple[_C, Points]]:
         """The chunks with their points, in order; an axis that many lie on is read and decoded once."""
         found = list(chunks)
         axes = self._axes({(chunk.run_id, chunk.axis) for chunk in found if chunk.axis is not None})
@@ -44,23 +69,9 @@ class AxisRepository:
             else:
                 yield chunk, Points.decode_parts(axes[chunk.run_id, chunk.axis], chunk.points, chunk.count)
 
-    def steps(self, chunks: Iterable[tables.MetricChunk]) -> Iterator[tuple[tables.MetricChunk, NDArray[np.int64]]]:
-        """The chunks with the steps of their points, in order, without a look at any value."""
-        found = list(chunks)
-        axes = self._axes({(chunk.run_id, chunk.axis) for chunk in found if chunk.axis is not None})
-        for chunk in found:
-            if chunk.axis is None:
-                yield chunk, Points.decode(chunk.points, chunk.count).steps
-            else:
-                yield chunk, axes[chunk.run_id, chunk.axis].steps[: chunk.count]
-
     def drop_unused(self, run_id: str) -> None:
         """Forget the axes of a run on which nothing lies any more."""
-        used = select(tables.MetricChunk.axis).where(
-            tables.MetricChunk.run_id == run_id, tables.MetricChunk.axis.is_not(None)
-        )
-        axis = tables.MetricAxis
-        self._session.execute(delete(axis).where(axis.run_id == run_id, axis.id.not_in(used)))
+        self._session.execute(_DROP_UNUSED, {"run": run_id})
         self._kept.clear()
 
     def _axes(self, keys: set[tuple[str, str]]) -> dict[tuple[str, str], Axis]:

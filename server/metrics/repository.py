@@ -8,13 +8,14 @@ from types import MappingProxyType
 from typing import NamedTuple, cast
 
 import numpy as np
-from sqlalchemy import Table, delete, func, insert, select
+from sqlalchemy import Table, bindparam, delete, func, insert, select
 from sqlalchemy.orm import Session, aliased
 
 from server.database import tables
 from server.http.abandoned import stop_if_abandoned
 from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
+from server.metrics.cutting import cut_chunks
 from server.metrics.latest import set_latest
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized, summary_of
@@ -30,6 +31,35 @@ _LONG = 4_096
 _INSERT_ROWS = 1_000
 _RUNS_A_QUERY = 1_000
 _ROWS = cast("Table", tables.MetricRow.__table__)
+_LATEST = cast("Table", tables.LatestMetric.__table__)
+# Put together once: a claim waits for them.
+_ROWS_BEYOND = delete(_ROWS).where(_ROWS.c.run_id == bindparam("run"), _ROWS.c.step > bindparam("step"))
+_ROWS_FROM_THE_END = (
+    select(_ROWS.c.step, _ROWS.c["values"])
+    .where(_ROWS.c.run_id == bindparam("run"))
+    .order_by(_ROWS.c.seq.desc())
+    .execution_options(yield_per=16)
+)
+_OF_THESE = (
+    tables.MetricChunk.run_id == bindparam("run"),
+    tables.MetricChunk.name.in_(bindparam("names", expanding=True)),
+)
+_LAST = (
+    select(tables.MetricChunk.name, func.max(tables.MetricChunk.first_step).label("first_step"))
+    .where(*_OF_THESE)
+    .group_by(tables.MetricChunk.name)
+    .subquery()
+)
+_LAST_CHUNKS = (
+    select(tables.MetricChunk)
+    .where(*_OF_THESE)
+    .join(_LAST, (_LAST.c.name == tables.MetricChunk.name) & (_LAST.c.first_step == tables.MetricChunk.first_step))
+)
+_LATEST_BEYOND = (
+    delete(_LATEST)
+    .where(_LATEST.c.run_id == bindparam("run"), _LATEST.c.step > bindparam("step"))
+    .returning(_LATEST.c.name)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,47 +154,41 @@ class MetricRepository:
 
     def drop_beyond(self, run_id: str, step: int) -> None:
         """Forget every point after `step`: what a lost attempt did after the checkpoint from which the next one resumes."""
-        self._session.execute(
-            delete(tables.MetricRow).where(tables.MetricRow.run_id == run_id, tables.MetricRow.step > step)
-        )
-        self._session.execute(
-            delete(tables.MetricChunk).where(tables.MetricChunk.run_id == run_id, tables.MetricChunk.first_step > step)
-        )
-        straddling = select(tables.MetricChunk).where(
-            tables.MetricChunk.run_id == run_id, tables.MetricChunk.last_step > step
-        )
-        for chunk, kept in self._axes.steps(self._session.scalars(straddling)):
-            # Counting them out is enough: packing a run's last chunks anew would take many times as long.
-            chunk.count = int(np.searchsorted(kept, step, side="right"))
-            chunk.last_step = int(kept[chunk.count - 1])
         self._session.flush()
-        self._axes.drop_unused(run_id)
+        beyond = {"run": run_id, "step": step}
+        self._session.execute(_ROWS_BEYOND, beyond)
+        left = cut_chunks(self._session, self._axes, run_id, step)
         self._summaries.cut(run_id, step)
         self._thinning.forget_beyond(run_id, step)
-        beyond = [tables.LatestMetric.run_id == run_id, tables.LatestMetric.step > step]
-        lost = set(self._session.scalars(select(tables.LatestMetric.name).where(*beyond)))
-        self._session.execute(delete(tables.LatestMetric).where(*beyond))
-        self._set_latest(run_id, self._newest(run_id, lost))
+        lost = set(self._session.scalars(_LATEST_BEYOND, beyond))
+        self._set_latest(run_id, self._newest(run_id, lost, left))
 
-    def _newest(self, run_id: str, names: Collection[str]) -> dict[str, tuple[int, float]]:
-        """Step and value of the newest number of each of these series, looked for from the end."""
+    def _newest(self, run_id: str, names: Collection[str], last: Mapping[str, Points]) -> dict[str, tuple[int, float]]:
+        """Step and value of the newest number of each of these series, looked for from the end.
+
+        Args:
+            run_id: whose they are.
+            names: of the series.
+            last: the points of the last chunks that are at hand, by series.
+        """
         newest: dict[str, tuple[int, float]] = {}
         if not names:
             return newest
-        rows = select(tables.MetricRow.step, tables.MetricRow.values).where(tables.MetricRow.run_id == run_id)
-        for step, values in self._session.execute(
-            rows.order_by(tables.MetricRow.seq.desc()).execution_options(yield_per=16)
-        ):
+        for step, values in self._session.execute(_ROWS_FROM_THE_END, {"run": run_id}):
             for name, value in values.items():
                 if name in names and value is not None:
                     newest.setdefault(name, (step, value))
             if len(newest) == len(names):
                 return newest
-        last_chunks = self._last_chunks(run_id, [name for name in names if name not in newest])
-        for chunk, points in self._axes.decoded(last_chunks.values()):
-            found = _last_finite(points) or _last_finite(self.read(run_id, [chunk.name])[chunk.name])
-            if found is not None:
-                newest[chunk.name] = found
+        missing = [name for name in names if name not in newest]
+        if unread := [name for name in missing if name not in last]:
+            chunks = self._axes.decoded(self._last_chunks(run_id, unread).values())
+            last = {**last, **{chunk.name: points for chunk, points in chunks}}
+        for name in missing:
+            if (points := last.get(name)) is not None:
+                found = _last_finite(points) or _last_finite(self.read(run_id, [name])[name])
+                if found is not None:
+                    newest[name] = found
         return newest
 
     def read(self, run_id: str, names: Collection[str] | None = None) -> dict[str, Points]:
@@ -364,18 +388,8 @@ class MetricRepository:
 
     def _last_chunks(self, run_id: str, names: Collection[str]) -> dict[str, tables.MetricChunk]:
         """The last chunk of each of these series that has one."""
-        of_these = [tables.MetricChunk.run_id == run_id, tables.MetricChunk.name.in_(names)]
-        last = (
-            select(tables.MetricChunk.name, func.max(tables.MetricChunk.first_step).label("first_step"))
-            .where(*of_these)
-            .group_by(tables.MetricChunk.name)
-            .subquery()
-        )
-        query = select(tables.MetricChunk).where(*of_these)
-        query = query.join(
-            last, (last.c.name == tables.MetricChunk.name) & (last.c.first_step == tables.MetricChunk.first_step)
-        )
-        return {chunk.name: chunk for chunk in self._session.scalars(query)}
+        found = self._session.scalars(_LAST_CHUNKS, {"run": run_id, "names": list(names)})
+        return {chunk.name: chunk for chunk in found}
 
     def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
         for part in _chunked(points):

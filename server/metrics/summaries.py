@@ -1,14 +1,29 @@
 """Summaries in SQL: as chunks are added, what a long series looks like is kept beside them."""
 
 from collections.abc import Collection
+from typing import cast
 
 import numpy as np
-from sqlalchemy import select
+from sqlalchemy import Table, bindparam, delete, select, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
+
+_SUMMARIES = cast("Table", tables.MetricSummary.__table__)
+_OF_RUN = _SUMMARIES.c.run_id == bindparam("run")
+_BEYOND = select(_SUMMARIES.c.name, _SUMMARIES.c.buckets, _SUMMARIES.c.data).where(
+    _OF_RUN, _SUMMARIES.c.last_step > bindparam("step")
+)
+# The newest point is left standing, which nobody reads any more: a row that keeps its length is changed where it lies, and
+# what it holds need not be written again.
+_CUT = (
+    update(_SUMMARIES)
+    .where(_OF_RUN, _SUMMARIES.c.name == bindparam("of_series"))
+    .values(buckets=bindparam("kept"), last_step=bindparam("until_step"))
+)
+_EMPTY = delete(_SUMMARIES).where(_OF_RUN, _SUMMARIES.c.buckets == 0)
 
 
 class SummaryRepository:
@@ -30,16 +45,16 @@ class SummaryRepository:
 
     def cut(self, run_id: str, step: int) -> None:
         """Forget every bucket that reaches beyond `step`, and the newest point with it."""
-        for summary in self.of([run_id]):
-            if summary.last_step <= step:
-                continue
-            steps = Buckets.steps_in(summary.data, summary.buckets)
-            summary.buckets = int(np.searchsorted(steps, step, side="right"))
-            if summary.buckets == 0:
-                self._session.delete(summary)
-            else:
-                summary.last_step, summary.newest = int(steps[summary.buckets - 1]), None
-        self._session.flush()
+        cuts: list[dict[str, str | int]] = []
+        for name, count, data in self._session.execute(_BEYOND, {"run": run_id, "step": step}):
+            steps = Buckets.steps_in(data, count)
+            kept = int(np.searchsorted(steps, step, side="right"))
+            last_step = int(steps[kept - 1]) if kept else -1
+            cuts.append({"run": run_id, "of_series": name, "kept": kept, "until_step": last_step})
+        if cuts:
+            self._session.execute(_CUT, cuts)
+        if not all(cut["kept"] for cut in cuts):
+            self._session.execute(_EMPTY, {"run": run_id})
 
 
 def summary_of(run_id: str, name: str, buckets: Buckets) -> tables.MetricSummary:

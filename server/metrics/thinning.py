@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sqlalchemy import func, select
+from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -17,6 +17,10 @@ from server.metrics.points import Points
 
 EVALUATIONS = "eval/"
 """What evaluations are reported as: never thinned."""
+
+_BEYOND = select(tables.ThinnedSeries).where(
+    tables.ThinnedSeries.run_id == bindparam("run"), tables.ThinnedSeries.last_step > bindparam("step")
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,8 +115,7 @@ class ThinningRepository:
 
     def forget_beyond(self, run_id: str, step: int) -> None:
         """Forget every bucket that reaches beyond a step."""
-        row = tables.ThinnedSeries
-        beyond = self._session.scalars(select(row).where(row.run_id == run_id, row.last_step > step)).all()
+        beyond = self._session.scalars(_BEYOND, {"run": run_id, "step": step}).all()
         for each in beyond:
             buckets = Buckets.decode(each.data, each.buckets)
             kept = buckets[: int(np.searchsorted(buckets.steps, step, side="right"))]

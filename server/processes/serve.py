@@ -9,6 +9,7 @@ import uvicorn
 
 from server.http.slow_clients import timed_protocol
 from server.processes.listening import listen, login_url
+from server.processes.settling import settle_in_background
 from server.settings import Settings
 from workers.logs import configure
 from workers.runtime.supervised import end_with_supervisor
@@ -29,6 +30,7 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
         if self.started:
             self._on_ready()
+            settle_in_background()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._end_streams()

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, Self
 
-from sqlalchemy import func, select
+from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session, contains_eager, joinedload
 
 from server.database import tables
@@ -16,7 +16,11 @@ from workers.reporting import EventLevel
 
 _TURN = tables.Run.priority.desc(), tables.Run.queued_at, tables.Run.id
 """Which run of one person is claimed first."""
+# The first can be trained nearly always; each is read with all of its settings.
+_AT_FIRST = 2
 _AT_ONCE = 50
+_RUN = select(tables.Run).where(tables.Run.id == bindparam("run")).options(joinedload(tables.Run.experiment))
+_LOCKED_RUN = _RUN.with_for_update(of=tables.Run)
 
 
 class PointsState(NamedTuple):
@@ -59,10 +63,7 @@ class RunRepository:
 
     def find(self, run_id: str, *, for_update: bool = False) -> tables.Run | None:
         """As `get`; None if there is none."""
-        query = select(tables.Run).where(tables.Run.id == run_id).options(joinedload(tables.Run.experiment))
-        if for_update:
-            query = query.with_for_update(of=tables.Run)
-        return self._session.scalar(query)
+        return self._session.scalar(_LOCKED_RUN if for_update else _RUN, {"run": run_id})
 
     def check(self, run_id: str) -> None:
         """Refuse a run that is not there, without reading what it is.
@@ -149,10 +150,10 @@ class RunRepository:
             .options(contains_eager(tables.Run.experiment))
             .order_by(priority, *shares.places(), *rest)
         )
-        offset = 0
-        while runs := self._session.scalars(query.offset(offset).limit(_AT_ONCE)).all():
+        offset, wanted = 0, _AT_FIRST
+        while runs := self._session.scalars(query.offset(offset).limit(wanted)).all():
             yield from runs
-            offset += len(runs)
+            offset, wanted = offset + len(runs), _AT_ONCE
 
     def take(self, run_id: str) -> tables.Run | None:
         """The run, locked, if it waits still; None where it does not, or another transaction is about to give it away."""

@@ -8,8 +8,9 @@ import heapq
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import cast
 
-from sqlalchemy import ColumnElement, and_, case, func, select, text
+from sqlalchemy import ColumnElement, Table, and_, bindparam, case, func, select, text, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -18,6 +19,20 @@ from server.runs.states import ACTIVE
 
 # Of PostgreSQL's locks that programs name: those who give runs away take turns, so that no two see the same slot free.
 _LOCK = 0x6D61706C
+_SHARES = cast("Table", tables.Share.__table__)
+_ACTIVE = (
+    select(
+        tables.Experiment.id,
+        func.coalesce(tables.Experiment.launched_by, ""),
+        tables.Experiment.parallel_runs,
+        func.count(tables.Run.id),
+    )
+    .join(tables.Run, tables.Run.experiment_id == tables.Experiment.id)
+    .where(tables.Run.state.in_(ACTIVE))
+    .group_by(tables.Experiment.id, tables.Experiment.launched_by, tables.Experiment.parallel_runs)
+)
+_TURNS = select(_SHARES.c.person, _SHARES.c.turn)
+_TAKE_TURN = update(_SHARES).where(_SHARES.c.person == bindparam("whose")).values(turn=bindparam("next_turn"))
 
 
 @dataclass(frozen=True)
@@ -99,25 +114,22 @@ class ShareRepository:
 
     def read(self, limits: Limits) -> Shares:
         """What people have now."""
-        experiment, run = tables.Experiment, tables.Run
-        active = (
-            select(experiment.id, func.coalesce(experiment.launched_by, ""), experiment.parallel_runs, func.count(run.id))
-            .join(run, run.experiment_id == experiment.id)
-            .where(run.state.in_(ACTIVE))
-            .group_by(experiment.id, experiment.launched_by, experiment.parallel_runs)
-        )
         by_person: Counter[str] = Counter()
         full = set()
-        for experiment_id, person, own, count in self._session.execute(active):
+        for experiment_id, person, own, count in self._session.execute(_ACTIVE):
             by_person[person] += count
             limit = own if own is not None else limits.experiment
             if limit is not None and count >= limit:
                 full.add(experiment_id)
-        turns = {share.person: share.turn for share in self._session.scalars(select(tables.Share))}
+        turns = {person: turn for person, turn in self._session.execute(_TURNS)}
         crowded = {person for person, count in by_person.items() if limits.person is not None and count >= limits.person}
         return Shares(by_person, turns, frozenset(full), frozenset(crowded))
 
-    def took(self, experiment: tables.Experiment) -> None:
-        """Somebody was given a slot: it is everybody else's turn before theirs comes again."""
-        turn = (self._session.scalar(select(func.max(tables.Share.turn))) or 0) + 1
-        self._session.merge(tables.Share(person=person_of(experiment), turn=turn))
+    def took(self, experiment: tables.Experiment, shares: Shares) -> None:
+        """Somebody was given a slot: it is everybody else's turn before theirs comes again; `shares` were read under `lock`."""
+        turn = max(shares.turns.values(), default=0) + 1
+        person = person_of(experiment)
+        if person in shares.turns:
+            self._session.execute(_TAKE_TURN, {"whose": person, "next_turn": turn})
+        else:
+            self._session.add(tables.Share(person=person, turn=turn))

@@ -2,8 +2,9 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import cast
 
-from sqlalchemy import ColumnElement, delete, select, update
+from sqlalchemy import ColumnElement, Table, bindparam, delete, select, update
 from sqlalchemy.orm import Session
 
 from server.database import tables
@@ -14,6 +15,14 @@ from workers.protocol import HEARTBEAT_SECONDS, Extensions, ExtensionState, Mach
 
 SILENCE_SECONDS = 3 * HEARTBEAT_SECONDS
 """A worker that was silent for longer is not counted on."""
+
+_WORKERS = cast("Table", tables.Worker.__table__)
+_TAKE_UP = (
+    update(_WORKERS)
+    .where(_WORKERS.c.name == bindparam("worker"))
+    .values(last_run_id=bindparam("run"))
+    .returning(_WORKERS.c.drained_at)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +74,9 @@ class WorkerRepository:
         worker.extensions = [extension.model_dump() for extension in extensions]
         worker.machine = machine.model_dump() if machine is not None else None
 
-    def took_up(self, name: str, run_id: str) -> None:
-        """Note which run a worker took up last."""
-        self._session.execute(update(tables.Worker).where(tables.Worker.name == name).values(last_run_id=run_id))
+    def takes_up(self, name: str, run_id: str) -> bool:
+        """Note which run a worker takes up; whether it was asked to take up no more."""
+        return self._session.scalar(_TAKE_UP, {"worker": name, "run": run_id}) is not None
 
     def _has_run(self, name: str) -> bool:
         query = select(tables.Run.id).where(tables.Run.state.in_(ACTIVE), tables.Run.worker == name).limit(1)

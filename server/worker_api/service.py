@@ -91,20 +91,22 @@ class WorkerService:
             if is_fresh and (limit := shares.waits_for(run)) is not None:
                 raise ConflictError(f"Run {run.id} waits: as many are under way as may be ({limit}).")
             # At once, not from the worker's next heartbeat on; a claim whose answer got lost is asked for once more.
-            if WorkerRepository(session).is_drained(request.worker) and run.claim_id != (request.claim_id or ""):
+            drained = WorkerRepository(session).takes_up(request.worker, run.id)
+            if drained and run.claim_id != (request.claim_id or ""):
                 raise ConflictError("This worker was asked to take up no more runs.")
             stored = read_training(run.experiment.training)
             _refuse_without_extensions(run, stored, request)
             training = _on_device(run, stored.training, request)
             if run.state in states.ACTIVE and run.claimed_with != principal.credential:
                 raise ConflictError(f"Run {run.id} was claimed with another token.")
-            checkpoint = attempts.begin(session, run, request, takers(session, run, stored.training))
+            # Who has lost it too often leaves it to others.
+            others = takers(session, run, stored.training) if exhausted(run, request.worker) else ()
+            checkpoint = attempts.begin(session, run, request, others)
             if principal.credential is not None and run.claimed_with != principal.credential:
                 RunRepository(session).add_event(run.id, "info", f"Claimed with the token {principal.name}.", run.step)
             run.claimed_with = principal.credential
-            WorkerRepository(session).took_up(request.worker, run.id)
             if is_fresh:
-                sharing.took(run.experiment)
+                sharing.took(run.experiment, shares)
             if stored.unreadable:
                 problem = stored.why_not
             try:
