@@ -9,6 +9,7 @@ from starlette.requests import HTTPConnection
 
 from server.arenas.store import ArenaStore
 from server.background import Wake
+from server.comparison.compared import KEPT, Compared
 from server.database.engine import Database
 from server.dispatch import Doorbell, Links, NoDoorbell, NoLinks
 from server.events.bus import EventBus
@@ -25,6 +26,7 @@ from server.people.gate import Gate
 from server.people.oidc.provider import Provider
 from server.playground.registry import Playgrounds
 from server.projects.repository import ProjectRepository
+from server.recent import Recent
 from server.security.limits import GuessLimiter
 from server.security.secrets import Secrets
 from server.settings import Settings
@@ -53,6 +55,7 @@ class Services:
     board: Board = field(default_factory=Board)
     instruments: Instruments = field(default_factory=Instruments)
     curves: AnswerCache = field(default_factory=AnswerCache)
+    compared: Recent[Compared] = field(default_factory=lambda: Recent(KEPT))
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)
     # Of the sweep that removes what rules have taken.

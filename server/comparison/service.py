@@ -5,11 +5,10 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy.orm import Session
 
-from server.checkpoints.repository import CheckpointRepository
+from server.comparison.compared import MADE_OF, Compared, read_compared
 from server.comparison.differences import differences
-from server.comparison.figures import FinalFigures, final_figures
+from server.comparison.figures import FinalFigures
 from server.comparison.following import Followed, digest_of, settled_of
 from server.comparison.grid import COUNTED_BY, Across, Curve, Grid, all_under_way, common_grid, resample
 from server.comparison.schemas import (
@@ -26,8 +25,6 @@ from server.comparison.verdicts import improvements, verdicts
 from server.database import tables
 from server.errors import InvalidRequestError
 from server.estimates import is_rate
-from server.experiments.repository import ExperimentRepository
-from server.experiments.told import state_of
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
@@ -52,14 +49,20 @@ class ComparisonService:
     def __init__(self, services: Services) -> None:
         self._services = services
 
+    def _compared(self, experiment_ids: Sequence[str]) -> Compared:
+        # Read before the tables are: what is written meanwhile counts as new.
+        written = self._services.database.writes.of(*MADE_OF)
+        return self._services.compared.get(
+            (tuple(experiment_ids), written), lambda: read_compared(self._services.database, experiment_ids)
+        )
+
     def state(self, experiment_ids: Sequence[str]) -> tuple[object, ...]:
         """What a comparison of these experiments depends on, beside what is asked of it.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
-        with self._services.database.read() as session:
-            return state_of(session, ExperimentRepository(session).get_many(experiment_ids))
+        return self._compared(experiment_ids).state
 
     def compare(
         self, experiment_ids: Sequence[str], margin: float, base: str | None = None, *, every_pair: bool = False
@@ -77,10 +80,8 @@ class ComparisonService:
             InvalidRequestError: the base is none of them, or there are too many for every pair.
         """
         held = _held(experiment_ids, base, every_pair=every_pair)
-        with self._services.database.read() as session:
-            experiments, figures = _final(session, experiment_ids)
-            warnings = _warnings(experiments, figures)
-            settings = [experiment.training for experiment in experiments]
+        compared = self._compared(experiment_ids)
+        figures = compared.figures
         by_id = {one.id: one for one in figures}
         pairs = [(by_id[one], by_id[other]) for one, other in held]
         told = verdicts(pairs, margin)
@@ -89,8 +90,8 @@ class ComparisonService:
             verdicts=told,
             comparisons=sum(verdict.word != "refused" for verdict in told),
             improvements=improvements(pairs),
-            differences=differences(settings),
-            warnings=warnings,
+            differences=differences([experiment.training for experiment in compared.experiments]),
+            warnings=_warnings(compared.experiments, figures),
         )
 
     def profiles(self, experiment_ids: Sequence[str]) -> Profiles:
@@ -99,8 +100,7 @@ class ComparisonService:
         Raises:
             NotFoundError: one of the experiments is missing.
         """
-        with self._services.database.read() as session:
-            _, figures = _final(session, experiment_ids)
+        figures = self._compared(experiment_ids).figures
         return Profiles(thresholds=_THRESHOLDS.tolist(), experiments=[_profile(one) for one in figures])
 
     def metrics(self, experiment_ids: Sequence[str]) -> ReportedMetrics:
@@ -109,10 +109,8 @@ class ComparisonService:
         Raises:
             NotFoundError: one of the experiments is missing.
         """
+        runs = self._compared(experiment_ids).run_ids
         with self._services.database.read() as session:
-            runs = [
-                run.id for experiment in ExperimentRepository(session).get_many(experiment_ids) for run in experiment.runs
-            ]
             names = MetricRepository(session).names(runs, MOST_METRICS)
         return ReportedMetrics(runs=len(runs), metrics=[ReportedMetric(name=name, runs=count) for name, count in names])
 
@@ -144,14 +142,13 @@ class ComparisonService:
         counter = COUNTED_BY.get(across)
         followable = counter is None and not logarithmic
         known = Followed.of(since) if since is not None and followable else None
+        compared = self._compared(experiment_ids)
+        experiments, run_ids, episodes = compared.experiments, compared.run_ids, compared.episodes
+        shown = None if lines is None else lines // len(experiments)
+        asked = (name, points, lines)
+        # What a run reports meanwhile is told as of the moment before, and anew once its row is read again.
         with self._services.database.read() as session:
-            experiments = ExperimentRepository(session).get_many(experiment_ids)
-            run_ids = [run.id for experiment in experiments for run in experiment.runs]
-            final = CheckpointRepository(session).final_evaluations(run_ids)
-            episodes = {run: evaluation.episode_count for run, evaluation in final.items()}
             repository = MetricRepository(session)
-            shown = None if lines is None else lines // len(experiments)
-            asked = (name, points, lines)
             if known is not None:
                 tails, began = repository.tails(run_ids, name, known.settled)
                 news = _beyond(tails, known, points)
@@ -212,13 +209,6 @@ def _held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) 
         return list(combinations(experiment_ids, 2))
     first = base or experiment_ids[0]
     return [(first, other) for other in experiment_ids if other != first]
-
-
-def _final(session: Session, experiment_ids: Sequence[str]) -> tuple[list[tables.Experiment], list[FinalFigures]]:
-    experiments = ExperimentRepository(session).get_many(experiment_ids)
-    run_ids = [run.id for experiment in experiments for run in experiment.runs]
-    final = CheckpointRepository(session).final_evaluations(run_ids, with_episodes=True)
-    return experiments, [final_figures(experiment, final) for experiment in experiments]
 
 
 def _profile(figures: FinalFigures) -> Profile:

@@ -331,8 +331,8 @@ class MetricSummary(Base):
     """What a long series looks like: `Buckets` of its first points, and the newest one that they do not hold.
 
     `last_step` is that of the last point that it knows; what follows is in chunks and rows. Where the newest point was
-    cut off, `last_step` is that of the last of the `buckets`, and `newest` says nothing any more; `data` may hold more of them,
-    which were cut off too.
+    cut off, `last_step` is that of the last of the `buckets`, and `newest` says nothing any more; `data` may hold more
+    buckets, which were cut off too.
     """
 
     __tablename__ = "metric_summaries"

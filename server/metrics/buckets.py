@@ -18,6 +18,7 @@ BUCKET_BYTES = 28
 """Of one bucket before it is compressed: step int64, points and finite points int32 each, min, mean and max float32."""
 
 _NONE = np.zeros(0, np.int64)
+_ONE, _NOUGHT = np.ones(1, np.int64), np.zeros(1, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +63,12 @@ class Buckets:
         return cls(points.steps, np.ones(len(points), np.int64), finite.astype(np.int64), values, values, values)
 
     @classmethod
+    def single_point(cls, step: int, value: float | None) -> "Buckets":
+        """One point, of which the value is not known where it was no number."""
+        values = np.array([np.nan if value is None else value], np.float64)
+        return cls(np.array([step], np.int64), _ONE, _NOUGHT if value is None else _ONE, values, values, values)
+
+    @classmethod
     def joined(cls, parts: Sequence["Buckets"]) -> "Buckets":
         """Buckets one after another."""
         columns = zip(*((p.steps, p.sizes, p.finite, p.low, p.mean, p.high) for p in parts), strict=True)
@@ -89,8 +96,11 @@ class Buckets:
         if len(self) <= limit:
             return self
         begins = np.cumsum(self.sizes) - self.sizes
+        if not stops.size:
+            wanted = np.linspace(0, begins[-1], limit, dtype=np.int64)
+            return self._grouped(_distinct(np.searchsorted(begins, wanted)))
         after = np.searchsorted(self.steps, stops, side="right")
-        alone = np.unique(np.concatenate([after - 1, after]))
+        alone = _distinct(np.sort(np.concatenate([after - 1, after])))
         # The first and the last bucket begin where they do anyway.
         alone = alone[(alone > 0) & (alone < len(self) - 1)]
         wanted = np.linspace(0, begins[-1], limit - alone.size, dtype=np.int64)
@@ -101,11 +111,15 @@ class Buckets:
             return self
         present = self.finite > 0
         finite = np.add.reduceat(self.finite, starts)
-        low = np.minimum.reduceat(np.where(present, self.low, np.inf), starts)
-        high = np.maximum.reduceat(np.where(present, self.high, -np.inf), starts)
-        mean = np.add.reduceat(np.where(present, self.mean * self.finite, 0.0), starts) / np.maximum(finite, 1)
-        for array in (low, mean, high):
-            array[finite == 0] = np.nan
+        if present.all():
+            low, high = np.minimum.reduceat(self.low, starts), np.maximum.reduceat(self.high, starts)
+            mean = np.add.reduceat(self.mean * self.finite, starts) / finite
+        else:
+            low = np.minimum.reduceat(np.where(present, self.low, np.inf), starts)
+            high = np.maximum.reduceat(np.where(present, self.high, -np.inf), starts)
+            mean = np.add.reduceat(np.where(present, self.mean * self.finite, 0.0), starts) / np.maximum(finite, 1)
+            for array in (low, mean, high):
+                array[finite == 0] = np.nan
         ends = np.append(starts[1:], len(self)) - 1
         # Rounding may push the mean of equal values a hair past them.
         return Buckets(self.steps[ends], np.add.reduceat(self.sizes, starts), finite, low, np.clip(mean, low, high), high)
@@ -143,3 +157,9 @@ class Buckets:
         sizes, finite = (np.frombuffer(raw, "<i4", kept, at * kept).astype(np.int64) for at in (8, 12))
         low, mean, high = (np.frombuffer(raw, "<f4", kept, at * kept).astype(np.float64) for at in (16, 20, 24))
         return cls(np.cumsum(np.frombuffer(raw, "<i8", kept)), sizes, finite, low, mean, high)[:count]
+
+
+def _distinct(ordered: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Each of these numbers, which are in order, once."""
+    kept: NDArray[np.bool_] = np.append(True, np.diff(ordered) > 0)[: ordered.size]
+    return ordered[kept]

@@ -33,9 +33,7 @@ _STRADDLING = (
 )
 _CUT = (
     update(_CHUNKS)
-    .where(
-        _OF_RUN, _CHUNKS.c.name == bindparam("of_series"), _CHUNKS.c.first_step == bindparam("from_step")
-    )
+    .where(_OF_RUN, _CHUNKS.c.name == bindparam("of_series"), _CHUNKS.c.first_step == bindparam("from_step"))
     .values(count=bindparam("kept"), last_step=bindparam("until_step"))
 )
 

@@ -56,9 +56,7 @@ _LAST_CHUNKS = (
     .join(_LAST, (_LAST.c.name == tables.MetricChunk.name) & (_LAST.c.first_step == tables.MetricChunk.first_step))
 )
 _LATEST_BEYOND = (
-    delete(_LATEST)
-    .where(_LATEST.c.run_id == bindparam("run"), _LATEST.c.step > bindparam("step"))
-    .returning(_LATEST.c.name)
+    delete(_LATEST).where(_LATEST.c.run_id == bindparam("run"), _LATEST.c.step > bindparam("step")).returning(_LATEST.c.name)
 )
 
 
@@ -272,12 +270,11 @@ class MetricRepository:
         for run_id, series in read.items():
             curves[run_id] = {}
             for name in sorted({*series, *(name for run, name in known if run == run_id)}):
-                points, summary = series.get(name, Points.joined([])), known.get((run_id, name))
+                points, summary = series.get(name), known.get((run_id, name))
                 if summary is None:
-                    buckets = joined(thinned.get((run_id, name)), points)
+                    buckets = joined(thinned.get((run_id, name)), Points.joined([]) if points is None else points)
                 else:
-                    after = int(np.searchsorted(points.steps, summary.last_step, side="right"))
-                    buckets = Buckets.joined([summarized(summary), Buckets.of(points[after:])])
+                    buckets = summarized(summary, points)
                 curves[run_id][name] = buckets.cut(limit)
         return curves
 

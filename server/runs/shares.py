@@ -121,12 +121,17 @@ class ShareRepository:
             limit = own if own is not None else limits.experiment
             if limit is not None and count >= limit:
                 full.add(experiment_id)
-        turns = {person: turn for person, turn in self._session.execute(_TURNS)}
+        turns = {row.person: row.turn for row in self._session.execute(_TURNS)}
         crowded = {person for person, count in by_person.items() if limits.person is not None and count >= limits.person}
         return Shares(by_person, turns, frozenset(full), frozenset(crowded))
 
     def took(self, experiment: tables.Experiment, shares: Shares) -> None:
-        """Somebody was given a slot: it is everybody else's turn before theirs comes again; `shares` were read under `lock`."""
+        """Somebody was given a slot: it is everybody else's turn before theirs comes again.
+
+        Args:
+            experiment: of the run that was given away.
+            shares: as they were read under `lock`.
+        """
         turn = max(shares.turns.values(), default=0) + 1
         person = person_of(experiment)
         if person in shares.turns:
