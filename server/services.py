@@ -1,6 +1,6 @@
 """What every request and background task shares; `app.state.services` holds the one of an application."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -20,6 +20,7 @@ from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
+from server.metrics.buckets import Buckets
 from server.metrics.cache import AnswerCache
 from server.monitoring.instruments import Instruments
 from server.people.gate import Gate
@@ -55,6 +56,8 @@ class Services:
     board: Board = field(default_factory=Board)
     instruments: Instruments = field(default_factory=Instruments)
     curves: AnswerCache = field(default_factory=AnswerCache)
+    # All series of the runs whose pages are being opened: some megabytes each where a run is long.
+    series: Recent[Mapping[str, Buckets]] = field(default_factory=lambda: Recent(4))
     compared: Recent[Compared] = field(default_factory=lambda: Recent(KEPT))
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)

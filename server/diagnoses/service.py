@@ -3,8 +3,9 @@
 from server.diagnoses.schemas import Diagnoses
 from server.experiments.stored import training_of
 from server.metrics.buckets import SUMMARY_WIDTH
-from server.metrics.repository import MetricRepository
-from server.runs.repository import RunRepository
+from server.metrics.repository import MetricRepository, cut_curves
+from server.metrics.service import curves_of_run
+from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 from workers.diagnoses import History, Series, diagnose
 
@@ -24,7 +25,7 @@ class DiagnosisService:
         with self._services.database.read() as session:
             run = RunRepository(session).get(run_id)
             training = training_of(run.experiment)
-            series = MetricRepository(session).curves([run_id], None, SUMMARY_WIDTH)[run_id]
-        curves = {name: Series(buckets.steps, buckets.mean) for name, buckets in series.items()}
+            series = curves_of_run(self._services, MetricRepository(session), PointsState.of(run))
+        curves = {name: Series(buckets.steps, buckets.mean) for name, buckets in cut_curves(series, SUMMARY_WIDTH).items()}
         history = History(training, curves)
         return Diagnoses(run_id=run_id, step=history.step, diagnoses=diagnose(history))

@@ -262,20 +262,33 @@ class MetricRepository:
 
         Of a long series its summary is read, and what came after it, unless more is asked for than the summary shows.
         """
-        summaries = self._summaries.of(run_ids, names) if limit <= SUMMARY_WIDTH else []
+        whole = self._whole(run_ids, names, by_summaries=limit <= SUMMARY_WIDTH)
+        return {run_id: cut_curves(series, limit) for run_id, series in whole.items()}
+
+    def curves_by_summaries(self, run_id: str) -> dict[str, Buckets]:
+        """All of a run's series as fine as they are known without their points: good for any `SUMMARY_WIDTH` or less."""
+        return self._whole([run_id], None, by_summaries=True)[run_id]
+
+    def _whole(
+        self, run_ids: Collection[str], names: Collection[str] | None, *, by_summaries: bool
+    ) -> dict[str, dict[str, Buckets]]:
+        summaries = self._summaries.of(run_ids, names) if by_summaries else []
         known = {(summary.run_id, summary.name): summary for summary in summaries}
         thinned = self._thinning.of(run_ids, names)
         read = self._read(run_ids, names, beyond_summaries=bool(known))
+        summarised: dict[str, list[str]] = defaultdict(list)
+        for run_id, name in known:
+            summarised[run_id].append(name)
         curves: dict[str, dict[str, Buckets]] = {}
         for run_id, series in read.items():
             curves[run_id] = {}
-            for name in sorted({*series, *(name for run, name in known if run == run_id)}):
+            for name in sorted({*series, *summarised[run_id]}):
                 points, summary = series.get(name), known.get((run_id, name))
                 if summary is None:
                     buckets = joined(thinned.get((run_id, name)), Points.joined([]) if points is None else points)
                 else:
                     buckets = summarized(summary, points)
-                curves[run_id][name] = buckets.cut(limit)
+                curves[run_id][name] = buckets
         return curves
 
     def since(self, run_id: str, names: Collection[str] | None, step: int) -> dict[str, Points] | None:
@@ -394,6 +407,11 @@ class MetricRepository:
 
     def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
         set_latest(self._session, {(run_id, name): last for name, last in newest.items()})
+
+
+def cut_curves(series: Mapping[str, Buckets], limit: int) -> dict[str, Buckets]:
+    """Series at most `limit` (at least 2) buckets wide, by name."""
+    return {name: buckets.cut(limit) for name, buckets in series.items()}
 
 
 @dataclass(frozen=True)

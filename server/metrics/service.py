@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
-from server.metrics.buckets import Buckets
+from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.points import Points
-from server.metrics.repository import MetricRepository
+from server.metrics.repository import MetricRepository, cut_curves
 from server.metrics.schemas import Metrics, Series
 from server.metrics.thinning import ThinningRepository
 from server.metrics.views import thinned_view
@@ -60,7 +60,7 @@ class MetricService:
                 if known is not None and fresh is not None:
                     series, since = {name: Buckets.of(each).cut(points) for name, each in fresh.items()}, known.step
                 else:
-                    series = repository.curves([run_id], names, points)[run_id]
+                    series = self._curves(repository, run, names, points)
                 metrics = Metrics(
                     series=[_view(name, buckets) for name, buckets in series.items()],
                     attempt=run.attempt,
@@ -70,6 +70,18 @@ class MetricService:
                 return metrics.model_dump_json().encode()
 
             return self._services.curves.get((run, frozenset(names or ()), points, known), read)
+
+    def _curves(
+        self, repository: MetricRepository, run: PointsState, names: Collection[str] | None, points: int
+    ) -> dict[str, Buckets]:
+        if names is None and points <= SUMMARY_WIDTH:
+            return cut_curves(curves_of_run(self._services, repository, run), points)
+        return repository.curves([run.run_id], names, points)[run.run_id]
+
+
+def curves_of_run(services: Services, repository: MetricRepository, run: PointsState) -> Mapping[str, Buckets]:
+    """All series of a run, fine enough for `SUMMARY_WIDTH`: read once for its curves and its diagnoses."""
+    return services.series.get(run, lambda: repository.curves_by_summaries(run.run_id))
 
 
 def _goes_on(session: Session, run: PointsState, known: Known) -> bool:

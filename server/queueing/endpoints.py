@@ -6,11 +6,12 @@ from fastapi import APIRouter, Depends, status
 
 from server.http.paging import PartDep, WindowDep
 from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
-from server.queueing.schemas import Priority, QueuePage, QueuePlace, WorkerName, Workers
+from server.queueing.schemas import Priority, QueuePage, QueuePlace, Workers
 from server.queueing.service import QueueService
 from server.security.permissions import ADMINISTRATE, SIGNED_IN, edit
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
+from server.system.schemas import WorkerName
 
 router = APIRouter(tags=["queue"])
 

@@ -98,9 +98,3 @@ class Workers(Schema):
     """All workers that have not been removed."""
 
     items: list[Worker] = Field(description="Those that are there first, by name.")
-
-
-class WorkerName(Schema):
-    """Which worker is meant."""
-
-    worker: str = Field(min_length=1, max_length=120, description='Its name, "worker@host" for all of its processes.')

@@ -10,7 +10,7 @@ from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 from server.system import service
 from server.system.readiness import ReadinessProbe
-from server.system.schemas import DrainRequest, Readiness, Status, Version
+from server.system.schemas import Readiness, Status, Version, WorkerName
 
 router = APIRouter(tags=["system"])
 
@@ -36,7 +36,7 @@ def get_status(services: ServicesDep, principal: PrincipalDep) -> Status:
 
 
 @router.post("/api/workers/drain", responses=NOT_FOUND, dependencies=[ADMINISTRATE])
-def drain_worker(request: DrainRequest, services: ServicesDep) -> Status:
+def drain_worker(request: WorkerName, services: ServicesDep) -> Status:
     """Let a worker finish its runs, take up no more, and end."""
     return service.drain(services, request.worker)
 

@@ -31,8 +31,8 @@ class Readiness(Schema):
     checks: dict[str, str] = Field(description="Of each part `ok`, or what is wrong.")
 
 
-class DrainRequest(Schema):
-    """Which worker should finish its runs, take up no more, and end."""
+class WorkerName(Schema):
+    """Which worker is meant."""
 
     worker: str = Field(min_length=1, max_length=120, description='Its name, "worker@host" for all of its processes.')
 

@@ -91,6 +91,7 @@ class Reports:
             first = max(waiting, session.get_one(tables.Run, run["id"]).last_seq) + 1
             rows = [ReportedRow(seq, step, 0.0, each) for seq, (step, each) in enumerate(values.items(), start=first)]
             MetricRepository(session).append({run["id"]: rows})
+            session.get_one(tables.Run, run["id"]).last_seq = rows[-1].seq
 
     def cut(self, run: dict[str, Any], step: int) -> None:
         """Forget what was reported beyond a step."""

@@ -526,3 +526,21 @@ def test_what_cannot_be_compared(client: TestClient, reports: Reports, path: str
     assert client.get(path).status_code == 422
     assert client.get(path, params={"experiment": [reports.experiment()["id"], "nobody"]}).status_code == 404
     assert client.get(path, params={"experiment": [str(i) for i in range(51)]}).status_code == 422
+
+
+def test_fifty_are_compared_and_more_are_refused_in_a_sentence(client: TestClient, reports: Reports) -> None:
+    ids = [reports.experiment(f"Training {number}", seeds=(0,))["id"] for number in range(51)]
+    parameters = [("experiment", one) for one in ids]
+
+    for path in ("", "/metrics", "/profiles", "/curves"):
+        answer = client.get(f"/api/compare{path}", params=parameters[:50])
+        assert answer.status_code == 200, path
+        assert path == "/metrics" or len(answer.json()["experiments"]) == 50
+    assert len(client.get("/api/compare", params=parameters[:50]).json()["verdicts"]) >= 49
+
+    refused = client.get("/api/compare", params=parameters)
+    assert refused.status_code == 422
+    assert len(refused.text) < 2_000
+    in_pairs = client.get("/api/compare", params=[*parameters[:50], ("pairs", "true")])
+    assert in_pairs.status_code == 422
+    assert "12 experiments at most" in in_pairs.json()["detail"]

@@ -8,10 +8,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.database import tables
+from server.http.paging import MAX_PAGE
 from server.services import Services
 from server.settings import Settings
 from server.workbench.indexing import index_some
 from tests.server.harness import Reports
+from workers.config import TrainingConfig
 
 
 @pytest.fixture
@@ -240,3 +242,43 @@ def test_what_an_older_version_stored_is_found_once_it_is_written_down(
     assert index_some(services) == 3
     assert index_some(services) == 0
     assert names(client, "algorithm = sac") == ["Gamma élan"]
+
+
+@pytest.mark.parametrize("sort", ["-created", "name", "-train/return", "seeds"])
+def test_a_list_of_hundreds_goes_on_to_its_end_with_each_once(client: TestClient, services: Services, sort: str) -> None:
+    count = 2 * MAX_PAGE + 50
+    training = TrainingConfig().model_dump(mode="json")
+    with services.database.write() as session:
+        session.add_all(
+            # Many are alike in what they are sorted by.
+            tables.Experiment(id=f"e{number:03}", name=f"Märkte {number // 7}", training=training, created_at=number // 9)
+            for number in range(count)
+        )
+
+    def part(**parameters: Any) -> dict[str, Any]:
+        response = client.get("/api/experiments", params={"sort": sort, "limit": MAX_PAGE, **parameters})
+        assert response.status_code == 200, response.text
+        page: dict[str, Any] = response.json()
+        return page
+
+    pages = [part()]
+    while (following := pages[-1]["next"]) is not None:
+        pages.append(part(after=following))
+    by_ends = [item["id"] for page in pages for item in page["items"]]
+    by_places = [item["id"] for start in range(0, count, MAX_PAGE) for item in part(offset=start)["items"]]
+
+    assert [page["total"] for page in pages] == [count] * 3
+    assert len(by_ends) == len(set(by_ends)) == count
+    assert by_places == by_ends
+
+
+@pytest.mark.parametrize("name", ["Märkte", "ÉCOLE supérieure", "Жук", "Ωμέγα", "straße", "ığdır"])
+def test_a_name_is_found_whatever_its_letters_and_their_case(client: TestClient, reports: Reports, name: str) -> None:
+    reports.experiment("Other")
+    reports.experiment(f"The {name} run")
+
+    assert names(client, f'"{name}"') == [f"The {name} run"]
+    assert names(client, f'"{name.lower()}"') == [f"The {name} run"]
+    upper = name.upper()
+    # What has no capital of its own, or shares one, is another word in capitals.
+    assert names(client, f'"{upper}"') == ([f"The {name} run"] if upper.lower() == name.lower() else [])

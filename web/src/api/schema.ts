@@ -5801,17 +5801,6 @@ export interface components {
             yaw: number;
         };
         /**
-         * DrainRequest
-         * @description Which worker should finish its runs, take up no more, and end.
-         */
-        DrainRequest: {
-            /**
-             * Worker
-             * @description Its name, "worker@host" for all of its processes.
-             */
-            worker: string;
-        };
-        /**
          * Entry
          * @description Something that was measured on the suite.
          */
@@ -23767,7 +23756,7 @@ export interface operations {
                  *       "worker": "gpu-1@lab"
                  *     }
                  */
-                "application/json": components["schemas"]["DrainRequest"];
+                "application/json": components["schemas"]["WorkerName"];
             };
         };
         responses: {
