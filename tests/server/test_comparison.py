@@ -542,5 +542,5 @@ def test_fifty_are_compared_and_more_are_refused_in_a_sentence(client: TestClien
     assert refused.status_code == 422
     assert len(refused.text) < 2_000
     in_pairs = client.get("/api/compare", params=[*parameters[:50], ("pairs", "true")])
-    assert in_pairs.status_code == 422
+    assert in_pairs.status_code == 400
     assert "12 experiments at most" in in_pairs.json()["detail"]
