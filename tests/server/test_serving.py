@@ -157,3 +157,10 @@ def test_help_does_not_wait_for_the_server_nor_for_the_workers() -> None:
     loaded = imported_by("import server.cli")
 
     assert loaded.isdisjoint({"torch", "pymunk", "numba", "numpy", "fastapi", "sqlalchemy", "celery"})
+
+
+def test_a_server_that_answers_imports_what_intervals_take_and_hides_what_lasts_from_the_collector() -> None:
+    look = "print('scipy.special' in sys.modules, gc.get_freeze_count() > 0)"
+    code = f"import gc, sys; from server.processes.settling import settle; settle(); {look}"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.split() == ["True", "True"]
