@@ -56,7 +56,7 @@ _BARN_RULES = SuiteRules(
 
 # Worlds of the benchmark's kind: how many, and the seed that they are drawn from, the first eight digits of the commit that
 # froze the recipe of the policy trained for them (fb5bf6af).
-_BARN = {"barn-jackal-300": (300, 0xfb5bf6af)}
+_BARN = {"barn-jackal-300": (300, 0xFB5BF6AF)}
 
 # Arenas that bring a start and a target each: their geometry is in the suite's file.
 _OWN_SCENARIOS = ("barn-20",)
