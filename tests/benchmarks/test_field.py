@@ -84,6 +84,6 @@ def test_the_docs_are_its_output() -> None:
 
 
 def test_every_shipped_policy_stands_in_every_family() -> None:
-    measured = {(row.policy, row.suite) for row in field().rows if row.policy}
+    measured = {(row.policy, row.suite) for row in field().rows if row.policy and row.part == "families"}
     shipped = {each.policy for each in policies([row.policy for row in field().rows if row.policy], None)}
     assert measured == {(policy, family) for policy in shipped for family in FAMILIES}
