@@ -35,7 +35,7 @@ from server.files import FileStore
 from server.http import pages
 from server.http.abandoned import AbandonedRequestsMiddleware
 from server.http.prefix import PathPrefixMiddleware
-from server.http.problems import UNAUTHORIZED, install_error_handlers
+from server.http.problems import AWAY, UNAUTHORIZED, install_error_handlers
 from server.http.slow_clients import SlowClientMiddleware
 from server.http.switchboard import Switchboard
 from server.jobs import endpoints as jobs
@@ -238,7 +238,7 @@ def describe(
         # Swagger's pages load scripts from elsewhere, which the content security policy forbids.
         docs_url=None,
         redoc_url=None,
-        responses=UNAUTHORIZED,
+        responses=UNAUTHORIZED | AWAY,
         max_body_size=max_body_size,
     )
     install_error_handlers(app)
@@ -249,7 +249,7 @@ def describe(
 @functools.cache
 def _routes(max_body_size: int | None) -> list[BaseRoute]:
     """Every router's, ready to answer: they know no service, and building their models takes a fifth of a second."""
-    builder = FastAPI(responses=UNAUTHORIZED, max_body_size=max_body_size, openapi_url=None)
+    builder = FastAPI(responses=UNAUTHORIZED | AWAY, max_body_size=max_body_size, openapi_url=None)
     for router in ROUTERS:
         check_permissions(router)
         for route in router.routes:

@@ -23,6 +23,12 @@ MAX_REASON = 120
 """Bytes that a closing socket may say; ours are of one byte a character."""
 
 UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
+AWAY: Responses = {
+    503: {
+        "model": ErrorBody,
+        "description": "The database or the store can't be reached now, or is busy: Retry-After says when to come again",
+    }
+}
 FORBIDDEN: Responses = {403: {"model": ErrorBody, "description": "Takes more rights"}}
 INVALID: Responses = {400: {"model": ErrorBody, "description": "Makes no sense as a whole"}}
 NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}

@@ -48,6 +48,11 @@ def test_every_operation_says_how_it_may_be_refused(document: dict[str, Any]) ->
         assert expected <= set(operation["responses"]), name
 
 
+def test_every_operation_says_that_what_it_needs_may_be_away(document: dict[str, Any]) -> None:
+    silent = [name for name, operation in operations(document) if "503" not in operation["responses"]]
+    assert silent == []
+
+
 def test_the_workers_part_is_not_the_pages_business(document: dict[str, Any]) -> None:
     assert [name for name, _ in operations(document) if "/api/worker/" in name] == []
 
