@@ -21,7 +21,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.field.candidates import Candidate, baselines, knows_the_map, policies
+from benchmarks.field.candidates import Candidate, baselines, knows_the_map, of_the_default_robot, policies
 from benchmarks.field.report import DOCS, tables, written
 from benchmarks.field.results import Kept, drive, key_of, rows
 from benchmarks.field.suites import FAMILIES, FROZEN, Piece, pieces
@@ -83,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     begun, kept = time.time(), Kept(options.keep)
     trained = policies(options.policies, options.seeds)
     who: dict[Part, list[Candidate]] = {part: [*trained, *baselines(options.baselines, part)] for part in PARTS}
+    who["families"] = of_the_default_robot(who["families"])
     if options.baselines:
         who["barn"] = [knows_the_map(), *who["barn"]]
     for candidate, piece in asked(tuple(options.only), tuple(options.families), options.size, who):

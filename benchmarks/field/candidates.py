@@ -88,6 +88,11 @@ def policies(names: Sequence[str], seeds: Path | None) -> list[Candidate]:
     return drivers
 
 
+def of_the_default_robot(drivers: Sequence[Candidate]) -> list[Candidate]:
+    """Those that drive it: in families, which ask for no robot, they alone stand beside one another on equal terms."""
+    return [each for each in drivers if each.task_under(SuiteRules()).robot == TaskConfig().robot]
+
+
 def _baseline(name: str, task_under: Callable[[SuiteRules], TaskConfig]) -> Candidate:
     return Candidate(name, None, None, task_under, lambda task, _: controller_of(TABLED[name], task))
 
