@@ -145,7 +145,8 @@ class Recording:
             ValueError: it is not such a file, or a torn one.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
+            # Opened here: of a damaged file the library would leave it open.
+            with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 arrays = dict(file)
             return cls(
                 evaluation=EvaluationResult.model_validate_json(arrays.pop("evaluation").tobytes()),
