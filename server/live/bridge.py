@@ -41,6 +41,12 @@ class _Camera(msgspec.Struct, tag="ViewerCameraMessage"):
     """Where somebody looks from."""
 
 
+class _Watched(msgspec.Struct):
+    """All that somebody who only watches may send: the same, whose tag could be left out where there is no other."""
+
+    type: Literal["ViewerCameraMessage"]
+
+
 class _Click(msgspec.Struct, tag="ScenePointerMessage", forbid_unknown_fields=True):
     """Somebody clicked into the scene."""
 
@@ -77,7 +83,7 @@ class _DragEnd(msgspec.Struct, tag="TransformControlsDragEndMessage", forbid_unk
 Allowed: TypeAlias = "msgspec.msgpack.Decoder[Any]"
 """What a browser may send."""
 
-WATCH: Allowed = msgspec.msgpack.Decoder(_Camera)
+WATCH: Allowed = msgspec.msgpack.Decoder(_Watched)
 PLAY: Allowed = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _DragStart | _DragEnd)
 
 

@@ -14,7 +14,7 @@ import pytest
 import zstandard
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
@@ -491,6 +491,7 @@ def test_the_camera_gets_through_and_nothing_else(client: TestClient, services: 
 
 
 @given(st.text(max_size=30).filter(lambda name: name != "ViewerCameraMessage"), st.binary(max_size=50))
+@example("", b"\x80")  # an empty message, without a name
 def test_messages_pass_by_name_only(name: str, noise: bytes) -> None:
     assert may_pass(msgspec.msgpack.encode(CAMERA))
     assert not may_pass(msgspec.msgpack.encode(CAMERA | {"type": name}))

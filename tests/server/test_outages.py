@@ -81,7 +81,9 @@ def test_a_database_that_is_away_is_said_once_and_everybody_is_asked_to_come_aga
     assert "can't be reached" in gone.getMessage()
     assert str(proxy.port) in gone.getMessage()
     assert "is back after" in back.getMessage()
-    assert AWAY_SECONDS - 1.0 < float(back.getMessage().split(" after ")[1].split(" s")[0]) <= lasted
+    assert (
+        AWAY_SECONDS - 1.0 < float(back.getMessage().split(" after ")[1].split(" s")[0]) <= lasted + 0.05
+    )  # told in tenths
     assert not any(record.exc_info for record in caplog.records)
 
 

