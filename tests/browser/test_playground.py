@@ -88,5 +88,5 @@ def test_a_moment_that_is_kept_is_a_scenario_to_measure_others_on(context: Brows
     page.get_by_role("button", name="Evaluate, 1 time").click()
     row = page.get_by_test_id("evaluation").filter(has_text="Hard corners")
     expect(row).to_have_attribute("data-state", "done", timeout=SOON)
-    page.get_by_role("link", name="Go-to-goal").click()
+    row.get_by_role("link", name="Go-to-goal").click()
     expect(page.get_by_test_id("episode")).to_have_count(1)
