@@ -58,6 +58,26 @@ def _with_trail(batches: int) -> ObservationConfig:
     )
 
 
+def _along_the_path(collision: float) -> RewardConfig:
+    """A reward for the shortest path made shorter, with what a collision adds."""
+    return RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=collision), TimeoutTerm(), PathProgressTerm()))
+
+
+def _told_the_way(hidden_sizes: tuple[int, ...], *, entropy_coefficient: float, gamma: float) -> PpoConfig:
+    """PPO with many robots and large minibatches, whose critic knows the shortest path."""
+    return PpoConfig(
+        network=MlpNetwork(hidden_sizes=hidden_sizes),
+        robots=512,
+        rollout_steps=64,
+        minibatch_size=4096,
+        epochs=4,
+        learning_rate=4e-4,
+        entropy_coefficient=entropy_coefficient,
+        gamma=gamma,
+        critic_sees="path",
+    )
+
+
 RECIPES: tuple[Recipe, ...] = (
     Recipe(
         name="simple",
@@ -122,20 +142,11 @@ RECIPES: tuple[Recipe, ...] = (
                 arena=GeneratedArenaConfig(name="varied", difficulty=1.0, maps=1024, seed=0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0),
                 observation=_with_trail(batches=60),
-                reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-1000.0), TimeoutTerm(), PathProgressTerm())),
+                reward=_along_the_path(-1000.0),
                 step_limit=1000,
                 arrival_ends=True,
             ),
-            algorithm=PpoConfig(
-                network=MlpNetwork(hidden_sizes=(256, 128)),
-                robots=512,
-                rollout_steps=64,
-                minibatch_size=4096,
-                epochs=4,
-                learning_rate=4e-4,
-                entropy_coefficient=0.005,
-                critic_sees="path",
-            ),
+            algorithm=_told_the_way((256, 128), entropy_coefficient=0.005, gamma=0.995),
             steps=16_000_000,
             # At the end only: 200 scenarios are too few to tell its checkpoints apart, and the last are the best.
             evaluation=EvaluationConfig(every_steps=16_000_000),
@@ -154,7 +165,7 @@ RECIPES: tuple[Recipe, ...] = (
                 robot=JackalConfig(max_linear_acceleration=20.0, max_angular_acceleration=25.0),
                 lidar=LidarConfig(rays=180, field_of_view=270.0, range=10.0, mount=SingleMount(x=0.055)),
                 observation=_with_trail(batches=90),
-                reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-3000.0), TimeoutTerm(), PathProgressTerm())),
+                reward=_along_the_path(-3000.0),
                 control_period=0.1,
                 arrival_distance=1.0,
                 collision_distance=0.0,
@@ -162,17 +173,7 @@ RECIPES: tuple[Recipe, ...] = (
                 step_limit=500,
                 arrival_ends=True,
             ),
-            algorithm=PpoConfig(
-                network=MlpNetwork(hidden_sizes=(256, 128)),
-                robots=512,
-                rollout_steps=64,
-                minibatch_size=4096,
-                epochs=4,
-                learning_rate=4e-4,
-                entropy_coefficient=0.005,
-                gamma=0.99,
-                critic_sees="path",
-            ),
+            algorithm=_told_the_way((256, 128), entropy_coefficient=0.005, gamma=0.99),
             steps=8_000_000,
             # At the end only, as with rooms.
             evaluation=EvaluationConfig(every_steps=8_000_000),
@@ -191,23 +192,13 @@ RECIPES: tuple[Recipe, ...] = (
                 robot=RoundConfig(radius=0.25, max_linear_speed=1.0, max_angular_speed=2.0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0, range=6.0),
                 observation=ObservationConfig.preset("improved", batches=60, frames=3),
-                reward=RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=-2000.0), TimeoutTerm(), PathProgressTerm())),
+                reward=_along_the_path(-2000.0),
                 arrival_distance=0.3,
                 collision_distance=0.0,
                 step_limit=300,
                 arrival_ends=True,
             ),
-            algorithm=PpoConfig(
-                network=MlpNetwork(hidden_sizes=(128, 128)),
-                robots=512,
-                rollout_steps=64,
-                minibatch_size=4096,
-                epochs=4,
-                learning_rate=4e-4,
-                entropy_coefficient=0.003,
-                gamma=0.99,
-                critic_sees="path",
-            ),
+            algorithm=_told_the_way((128, 128), entropy_coefficient=0.003, gamma=0.99),
             steps=12_000_000,
             # At the end only, as with rooms.
             evaluation=EvaluationConfig(every_steps=12_000_000),
