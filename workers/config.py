@@ -1,8 +1,8 @@
 """What a training is: algorithm, network and budget, from the form to the file inside a checkpoint (pydantic only)."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from sim.config import ADVANCED, HIDDEN, Frozen, TaskConfig
 from sim.extending.discovery import MAX_EXTENSIONS, UsedExtension, added, complete, used_by, with_added
@@ -315,6 +315,14 @@ class TrainingConfig(Frozen):
         description="Whose parts it is made of, as they were when it was launched.",
         json_schema_extra=HIDDEN,
     )
+
+    @model_validator(mode="after")
+    def _groups_are_whole(self) -> Self:
+        if self.algorithm.robots % self.task.together:
+            raise ValueError(
+                f"robots must be a multiple of task.together, {self.task.together}, and {self.algorithm.robots} is none"
+            )
+        return self
 
     def as_installed(self) -> "TrainingConfig":
         """The same with the extensions that it needs as they are installed here: what is launched."""

@@ -34,8 +34,11 @@ MAX_WAYPOINTS = 32
 MIN_SIDE = 0.5
 """Shortest side of an imported arena, metres."""
 
+MIN_EXTENT = 1e-6
+"""Smallest size of an obstacle, metres: half of it is still more than nothing."""
+
 Coordinate = Annotated[float, Field(ge=-MAX_SIDE, le=MAX_SIDE, allow_inf_nan=False)]
-Extent = Annotated[float, Field(gt=0.0, le=MAX_SIDE, allow_inf_nan=False)]
+Extent = Annotated[float, Field(ge=MIN_EXTENT, le=MAX_SIDE, allow_inf_nan=False)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)]
 
 

@@ -13,6 +13,9 @@ from sim.config.reward import RewardConfig
 from sim.config.robot import AnyRobotConfig, BurgerConfig
 from sim.config.sensing import MAX_DELAY, LidarConfig, OdometryConfig, RandomisationConfig
 
+MAX_TOGETHER = 8
+"""Robots that may see one another."""
+
 
 class TaskConfig(Frozen):
     """Everything that defines the environment: arena, robot, LiDAR, observation, reward, limits."""
@@ -74,6 +77,14 @@ class TaskConfig(Frozen):
         description="The robot then starts anew, in another map where there are more; else it goes on to its next target.",
         json_schema_extra=ADVANCED,
     )
+    together: int = Field(
+        1,
+        ge=1,
+        le=MAX_TOGETHER,
+        title="Together in one arena",
+        description="So many share an arena and see one another, each with a target of its own; 1 is a robot alone.",
+        json_schema_extra=ADVANCED,
+    )
     command_delay: int = Field(
         0,
         ge=0,
@@ -97,6 +108,12 @@ class TaskConfig(Frozen):
             beyond = abs(x) > length or abs(y) > width
             if beyond or (self.robot.half_extents is None and math.hypot(x, y) > self.robot.circumscribed_radius):
                 raise ValueError(f"lidar.mount has a LiDAR at ({x:g}, {y:g}) m, which is not on the robot's body")
+        return self
+
+    @model_validator(mode="after")
+    def _who_gives_way_meets_one_robot(self) -> Self:
+        if self.together > 1 and self.arena.movers.count and self.arena.movers.sees_robots:
+            raise ValueError("together must be 1 where movers see robots: they give way to one robot, not to several")
         return self
 
     @model_validator(mode="before")

@@ -31,10 +31,12 @@ class Movers:
         alike: whether all copies of an arena have the same movers in the same places.
         robots: how many there are, for movers that see them.
         robot_radius: metres that these take a robot to fill around its centre.
+        others: robots that each robot sees in its tile: they have the last slots, see `sim.kernels.together`.
 
     Attributes:
         discs: (tiles, K, 5) float32 x, y, radius, metres in the arena's frame, and how far each came in the last step, in
             x and y; a radius below zero is an empty slot.
+        walking: (tiles, K - others, 5) those of them that are no robots.
         fastest: m/s, the highest top speed of them all.
     """
 
@@ -48,9 +50,12 @@ class Movers:
         alike: bool,
         robots: int = 0,
         robot_radius: float = 0.0,
+        others: int = 0,
     ) -> None:
-        tiles, slots = len(origins), max(len(arena.movers) for arena in arenas)
+        tiles, walking = len(origins), max(len(arena.movers) for arena in arenas)
+        slots = walking + others
         self.discs: NDArray[np.float32] = np.full((tiles, slots, DISC_COLUMNS), -1.0, dtype=np.float32)
+        self.walking = self.discs[:, :walking]
         self.fastest = max((mover.fastest for arena in arenas for mover in arena.movers), default=0.0)
         table = np.zeros((tiles, slots), dtype=MOVER)
         table["radius"] = -1.0

@@ -93,6 +93,8 @@ def pack_parameters(task: TaskConfig, *, arrival_ends: bool, starts_anew: bool) 
         "spawn_clearance": task.passable_clearance + SPAWN_MARGIN,
         "min_target_distance": max(float(MIN_TARGET_DISTANCE), task.arrival_distance + ARRIVAL_MARGIN),
         "path_samples": _path_samples(task),
+        "together": task.together,
+        "body": task.robot.circumscribed_radius,
     }
     for name, value in (values | pack_parts(task) | pack_terms(task.reward)).items():
         parameters[name] = value

@@ -1,4 +1,4 @@
-"""The engine below the Gymnasium interfaces: many robots, each alone in its arena, stepped together."""
+"""The engine below the Gymnasium interfaces: many robots, each alone in its arena or in a group, stepped together."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from sim.engine.paths import PathProgress, Paths
 from sim.engine.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.engine.rewards import Formulas, reads_changes
 from sim.engine.shapes import pack_shapes
-from sim.errors import PlacementError
+from sim.errors import ArenaError, PlacementError
 from sim.extending.expression import QUANTITIES
 from sim.extending.observing import Sight
 from sim.kernels.bundles import Geometry, Robots
@@ -41,6 +41,7 @@ from sim.kernels.records import (
     ROBOT,
 )
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
+from sim.kernels.together import see_one_another
 from sim.kernels.trail import TRAIL_ROOM
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.observations import observation_size
@@ -66,7 +67,11 @@ class World:
 
     A robot goes on after an arrival, with a new target, unless that ends the episode; after a collision or a time-out it
     starts anew, in an arena drawn from the pool. Its fate depends on the seed and its own index, never on the number of
-    robots. Robots do not see one another; they see movers, which take no notice of them unless they are made to.
+    robots. Robots see movers, which take no notice of them unless they are made to, and one another only where the task puts
+    them together.
+
+    Robots that are together are groups by their order, the last one as many as are left. A group stays in its arena, the
+    first groups in the first ones; in its copy of it each robot meets the others as movers, as discs around their bodies.
 
     Movers that see robots go otherwise for each robot that is among them: there is then a copy of the arenas for every robot
     and arena, in which a robot is alone if `reset` is told arenas, and meets few others where it draws them.
@@ -108,10 +113,17 @@ class World:
         guides: bool = False,
     ) -> None:
         self.task = task
-        self.arenas = tuple(arenas)
+        groups = -(-robots // task.together)
+        # No group leaves its arena: the others would stand empty.
+        self.arenas = tuple(arenas[:groups] if respawn and task.together > 1 else arenas)
         watched = any(mover.sees_robots for arena in self.arenas for mover in arena.movers)
-        self._crowding = crowding = (1 if watched else ROBOTS_PER_TILE) * len(self.arenas)
+        if watched and task.together > 1:
+            raise ArenaError("here people give way to one robot, not to several: have no robots together")
+        in_copies = watched or task.together > 1
+        crowding = (1 if in_copies else ROBOTS_PER_TILE) * len(self.arenas)
         replicas = math.ceil(robots / crowding)
+        if respawn and task.together > 1:
+            replicas = task.together * -(-groups // len(self.arenas))
         origins = tile_origins(self.arenas, replicas)
         nowhere = np.empty((0, 2), dtype=np.float32)
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
@@ -121,9 +133,10 @@ class World:
             shapes,
             origins,
             task.control_period,
-            alike=not respawn,
+            alike=not respawn or task.together > 1,
             robots=robots,
             robot_radius=task.passable_clearance,
+            others=task.together - 1,
         )
         spans = quantity_spans(task)
         fields = np.full(robots if task.randomisation.field_of_view else 1, spans[FIELD_OF_VIEW, 0])
@@ -182,18 +195,22 @@ class World:
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
         # What extensions see of a step that ends an episode, and how far it was, has to be seen before the next one begins.
-        self._looks_back = bool(self._added_parts) or bool(self._path_progress) or guides
+        # Who begins anew has to be clear of the others, wherever they have come to.
+        self._looks_back = bool(self._added_parts) or bool(self._path_progress) or guides or task.together > 1
         starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         usual_drive = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
         self._is_usual = usual_drive and not sees_trail
         self._action_size = action_size
         self._parameters["replica_stride"] = len(self.arenas)
-        self._parameters["closing"] = (
-            fastest_way(task.robot, spans[MAX_LINEAR, 1], spans[MAX_ANGULAR, 1]) + self.movers.fastest
-        ) * task.control_period
-        self._alone = watched and not respawn
+        own_pace = fastest_way(task.robot, spans[MAX_LINEAR, 1], spans[MAX_ANGULAR, 1])
+        others_pace = max(self.movers.fastest, own_pace if task.together > 1 else 0.0)
+        self._parameters["closing"] = (own_pace + others_pace) * task.control_period
+        self._alone = task.together > 1 or (watched and not respawn)
         self.robots.records["replica"] = np.arange(robots) // crowding
+        if respawn and task.together > 1:
+            maps = (np.arange(robots) // task.together % len(self.arenas)).astype(np.int32)
+            self.robots.records["map"], self.robots.records["replica"] = maps, self._replicas_of_their_own(maps)
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self._placed = np.zeros(robots, dtype=np.int32)
         self._restart, self._stream = restart, stream
@@ -226,6 +243,9 @@ class World:
         maps = self.robots.records["map"] if arenas is None else np.broadcast_to(np.asarray(arenas, dtype=np.int32), (n,))
         if arenas is not None and ((maps < 0) | (maps >= len(self.arenas))).any():
             raise PlacementError(f"arenas must be between 0 and {len(self.arenas) - 1}")
+        together = self.task.together
+        if (maps != maps[np.arange(n) // together * together]).any():
+            raise PlacementError(f"robots that are together, {together} one after another, need one arena")
         if targets is not None and poses is None and len(self.arenas) > 1:
             raise PlacementError("targets without poses make sense in a single arena only: give poses too")
         placed = self._placements("poses", poses, 3, maps)
@@ -260,8 +280,8 @@ class World:
         copies = len(self.geometry.origins) // len(self.arenas)
         if ranks.max(initial=0) >= copies:
             raise PlacementError(
-                f"movers that see robots need a copy of an arena for each: there are {copies}, and {ranks.max() + 1} robots "
-                "in one; spread them evenly over the arenas"
+                f"robots that movers or other robots see need a copy of an arena each: there are {copies}, and "
+                f"{ranks.max() + 1} robots in one; spread them evenly over the arenas"
             )
         return ranks
 
@@ -335,6 +355,8 @@ class World:
         if len(self.movers):
             self.movers.step(space.command, len(self))
         space.step(self.task.control_period)
+        if self.task.together > 1:
+            see_one_another(space.state, self.robots, self.geometry, self._parameters)
         count = step(space.state, self._placed, self.robots, self.geometry, self._parameters)
         if count:
             space.put(self._placed[:count])

@@ -152,9 +152,13 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.arena_indices: NDArray[np.int32] = records["map"]
         """(N,) which of `arenas` each robot is in."""
 
-        self.discs = self._world.movers.discs
+        self.discs = self._world.movers.walking
         """(tiles, K, 5) movers of every copy of an arena: x, y, radius, and how far each came in the last step in x and y,
         metres; a radius below zero is none. `tiles` says which row a robot meets."""
+
+    def places(self) -> NDArray[np.int32]:
+        """(N,) row of `discs` of each robot, of robots that are together that of the first: the same for all that meet."""
+        return self.tiles()[np.arange(self.num_envs) // self.task.together * self.task.together]
 
     def tiles(self) -> NDArray[np.int32]:
         """(N,) which copy of an arena each robot is in; modulo the number of arenas it is the arena."""

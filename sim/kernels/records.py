@@ -126,6 +126,8 @@ PARAMETERS = np.dtype(
         ("path_samples", "i4"),  # points of a step at which the body is checked
         ("replica_stride", "i4"),  # tiles between one replica of the pool and the next
         ("closing", "f4"),  # m that a robot and a mover may come nearer in one step
+        ("together", "i4"),  # robots of a group, one after another, that see one another; 1 where each is alone
+        ("body", "f4"),  # m, radius of the disc that the others of a group take a robot for
     ],
     align=True,
 )

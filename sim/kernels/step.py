@@ -22,6 +22,7 @@ from sim.kernels.records import (
 )
 from sim.kernels.rewards import ahead_of_mounts, reward, tabulate
 from sim.kernels.sensing import FAR, FAST, clearance_at, disc_clearance, nearest_of, sense, sense_discs, swept_clearance
+from sim.kernels.together import see_others_placed
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -77,12 +78,12 @@ def _draw_target(i, robots, geometry, p):
 
 @kernel()
 def _draw_start(i, robots, geometry, p, state):
-    """Put robot i, at rest, somewhere free in an arena of the pool."""
+    """Put robot i, at rest, somewhere free in an arena of the pool; who belongs to a group stays in its arena."""
     records = robots.records
     if geometry.starts.shape[0] == 0:
         return
     arenas = geometry.bounds.shape[0]
-    if arenas > 1:
+    if arenas > 1 and p.together == 1:
         records[i].map = np.int32(uniform(records, i) * arenas)
     index = records[i].map
     first = geometry.start_offsets[index]
@@ -156,6 +157,8 @@ def reset_robots(which, poses, targets, robots, geometry, parameters, state):
     for i in range(poses.shape[0]):
         if not which[i]:
             continue
+        if p.together > 1:
+            see_others_placed(i, which, i, robots, geometry, p)
         if math.isnan(poses[i, 0]):
             _draw_start(i, robots, geometry, p, state)
         else:
@@ -168,6 +171,12 @@ def reset_robots(which, poses, targets, robots, geometry, parameters, state):
             robots.records[i].distance = _distance_to_target(i, robots)
         _forget_attempt(robots.records[i])
         _nothing_happened(i, robots)
+    # Who sees the others begins once all of them have their places.
+    for i in range(poses.shape[0]):
+        if p.together > 1:
+            see_others_placed(i, which, poses.shape[0], robots, geometry, p)
+        if not which[i]:
+            continue
         begin_episode(i, robots, geometry, p)
         _sense_as_mounted(i, robots, geometry, p)
         if p.perceives:

@@ -53,7 +53,8 @@ class Situation:
         targets: (n, 2).
         robots: (n,) which scenario each of them drives, for controllers that remember.
         velocities: (n, 2) of the last step, m/s and rad/s.
-        discs: (n, K, 5) what moves around each, see `sim.kernels.records.DISC_COLUMNS`: for controllers that are told.
+        discs: (n, K, 5) what moves around each, other robots too, see `sim.kernels.records.DISC_COLUMNS`: for controllers
+            that are told.
     """
 
     observations: Floats
@@ -78,7 +79,7 @@ def run_controller(
 
     Args:
         controller: situations of the robots under way to their actions (n, A); called with fewer robots as they finish.
-        task: robot, LiDAR, observation, reward and limits; the arenas are the suite's.
+        task: robot, LiDAR, observation, reward and limits; the arenas, and who is together, are the suite's.
         suite: the scenarios.
         observer: looks on.
 
@@ -87,7 +88,7 @@ def run_controller(
     """
     suite.rules.check(suite.name, task)
     limits = suite.rules.step_limits(task, suite.shortest_paths)
-    task = task.model_copy(update={"step_limit": int(limits.max())})
+    task = task.model_copy(update={"step_limit": int(limits.max()), "together": suite.together})
     world = scenario_world(task, suite.arenas, len(suite))
     try:
         world.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)

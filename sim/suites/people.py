@@ -116,7 +116,7 @@ def run_among_people(controller: Callable[[Situation], Floats], task: TaskConfig
     intrusion, delay, detour = np.zeros((3, count))
     before = np.zeros((count, 3))
     walks: list[_Walks] = []
-    alone = scenario_world(task, suite.arenas, count)
+    alone = scenario_world(task.model_copy(update={"together": suite.together}), suite.arenas, count)
     alone.reset(poses=suite.starts, targets=suite.targets, arenas=suite.arena_indices)
     alone.park(np.arange(count))
     standing = np.zeros((count, 2), dtype=np.float32)

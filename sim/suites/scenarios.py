@@ -3,6 +3,7 @@
 import hashlib
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from sim.arenas import Arena, free_distance
 from sim.arenas.document import to_arena
 from sim.arenas.planner import Planner
 from sim.config import ArenaFile, TaskConfig
+from sim.engine.movers import Movers
 from sim.engine.world import World, spawn_space
 from sim.errors import PlacementError
 from sim.kernels.records import CELL
@@ -38,8 +40,9 @@ def draw_scenarios(name: str, arenas: Sequence[Arena], count: int, task: TaskCon
     Args:
         name: of the suite; it seeds the generator, which is used for nothing else.
         arenas: the places.
-        count: how many in all, rounded up to fill every arena evenly.
-        task: whose robot must fit at the starts and targets; the default one's if not given.
+        count: how many in all, rounded up to fill every arena evenly, and with whole groups.
+        task: whose robot must fit at the starts and targets; the default one's if not given. Where robots are together,
+            so many scenarios one after another are of one arena, and their starts as clear of one another as of movers.
 
     Returns:
         A list of `COLUMNS` for each scenario; the shortest path is that of the robot's body, which may touch obstacles and
@@ -56,13 +59,17 @@ def draw_scenarios(name: str, arenas: Sequence[Arena], count: int, task: TaskCon
     for index, arena in enumerate(arenas):
         planner = Planner(arena, task.robot.circumscribed_radius)
         space = spawn_space(task, arena)
-        for _ in range(-(-count // len(arenas))):
+        group: list[NDArray[np.float64]] = []  # where those start that start together
+        room = partial(_room, movers, index, group, task.robot.circumscribed_radius)
+        for turn in range(-(-count // len(arenas) // task.together) * task.together):
+            if turn % task.together == 0:
+                group.clear()
             start = _draw(rng, arena, space.starts, space.clearance)
             for _ in range(SPAWN_TRIES):
-                if movers.distance(index, start) >= MOVER_ROOM:
+                if room(start) >= MOVER_ROOM:
                     break
-                other = _draw(rng, arena, space.starts, space.clearance)
-                start = max(start, other, key=lambda place: movers.distance(index, place))
+                start = max(start, _draw(rng, arena, space.starts, space.clearance), key=room)
+            group.append(start)
             target = _draw(rng, arena, space.targets, space.clearance)
             while np.hypot(*(target - start)) < MIN_TARGET_DISTANCE:
                 target = _draw(rng, arena, space.targets, space.clearance)
@@ -127,6 +134,13 @@ def barn_scenarios(places: Sequence[BarnPlace]) -> list[list[float]]:
         row = [*world.start, *world.target, world.path_length()]
         scenarios.append([index, *(round(value, _DECIMALS) for value in row)])
     return scenarios
+
+
+def _room(
+    movers: Movers, index: int, group: Sequence[NDArray[np.float64]], radius: float, place: NDArray[np.float64]
+) -> float:
+    """Metres from a place (2,) in an arena to the nearest surface of a mover, or of a robot that stands in a group."""
+    return min([movers.distance(index, place), *(float(np.hypot(*(place - other))) - radius for other in group)])
 
 
 def _draw(rng: np.random.Generator, arena: Arena, cells: NDArray[np.float32], clearance: float) -> NDArray[np.float64]:

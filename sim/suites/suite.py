@@ -9,7 +9,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 
 import numpy as np
@@ -45,6 +45,8 @@ class Suite:
         targets: (S, 2).
         shortest_paths: (S,) metres, for the default robot's body around the obstacles, or that of the suite's rules.
         rules: what it asks of a robot; by default nothing.
+        together: so many scenarios, one after another, are driven in one arena by robots that see one another; who has ended
+            its attempt is gone. 1 where each robot is alone, whatever it was trained among.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Suite:
     targets: NDArray[np.float64]
     shortest_paths: NDArray[np.float64]
     rules: SuiteRules = field(default_factory=SuiteRules)
+    together: int = 1
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -130,16 +133,18 @@ def suite_for(task: TaskConfig) -> Suite:
     A drawn suite depends on the arena alone, so all policies that were trained for it meet the same scenarios: 20 generated
     maps of the same family and difficulty, none of which is in any training, or the imported arena itself, whose own
     start and target are the first scenario if it has them; with the movers of the training's arena. A robot that needs more
-    room than the default one gets a suite with that room, and its clearance in the suite's name.
+    room than the default one gets a suite with that room, and its clearance in the suite's name; robots that are together
+    get one in which they are, some more scenarios if groups need them.
 
     Raises:
         ArenaError: the robot has no room in the arena.
     """
-    usual = TaskConfig()
+    usual = TaskConfig(together=task.together)
     fits = task.passable_clearance <= usual.passable_clearance
-    if fits and isinstance(task.arena, ArenaConfig) and not task.arena.movers.count:
+    if fits and isinstance(task.arena, ArenaConfig) and not task.arena.movers.count and task.together == 1:
         return load_suite(f"{task.arena.name}-{_DRAWN_SCENARIOS}")
-    large = TaskConfig(robot=task.robot, collision_distance=task.collision_distance, way_clearance=task.way_clearance)
+    body = ("robot", "collision_distance", "way_clearance", "together")
+    large = TaskConfig.model_validate({name: getattr(task, name) for name in body})
     return _draw_suite(task.arena, usual if fits else large)
 
 
@@ -155,9 +160,8 @@ def suite_named(name: str, task: TaskConfig) -> Suite:
 
 @lru_cache(maxsize=8)
 def _draw_suite(arena: AnyArenaConfig, task: TaskConfig) -> Suite:
-    """Scenarios for the robot and collision distance of `task`."""
+    """Scenarios for the robot and collision distance of `task`, and for as many together."""
     usual = task.passable_clearance <= TaskConfig().passable_clearance
-    ending = f"{_DRAWN_SCENARIOS}" if usual else f"{task.passable_clearance:.2f}m-{_DRAWN_SCENARIOS}"
     if isinstance(arena, ArenaPool):
         name = f"{arena.name}-{arena.difficulty:g}{_variant(arena)}"
         seeds = SUITE_SEEDS[:_DRAWN_MAPS]
@@ -167,12 +171,17 @@ def _draw_suite(arena: AnyArenaConfig, task: TaskConfig) -> Suite:
         name = arenas[0].name[:_NAME]
     if arena.movers.count:
         name += f"-{arena.movers.count}-{arena.movers.kind}" + ("-seeing" if arena.movers.sees_robots else "")
-    name += f"-{ending}"
-    scenarios = draw_scenarios(name, arenas, _DRAWN_SCENARIOS, task)
-    if isinstance(arena, ImportedArenaConfig) and arena.arena and arena.arena.start and arena.arena.target:
+    if task.together > 1:
+        name += f"-{task.together}-together"
+    each = -(-_DRAWN_SCENARIOS // len(arenas) // task.together) * task.together
+    name += "" if usual else f"-{task.passable_clearance:.2f}m"
+    name += f"-{each * len(arenas)}"
+    scenarios = draw_scenarios(name, arenas, each * len(arenas), task)
+    brought = arena.arena if isinstance(arena, ImportedArenaConfig) else None
+    if brought and brought.start and brought.target and task.together == 1:
         with suppress(PlacementError):  # a start or target that this robot does not fit at
-            scenarios[:1] = own_scenarios([arena.arena], task)
-    return _suite(name, content_hash(arenas, scenarios), arenas, scenarios)
+            scenarios[:1] = own_scenarios([brought], task)
+    return replace(_suite(name, content_hash(arenas, scenarios), arenas, scenarios), together=task.together)
 
 
 def _variant(arena: ArenaPool) -> str:

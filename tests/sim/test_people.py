@@ -111,7 +111,7 @@ def test_a_scenario_is_the_same_whoever_drives_beside_it() -> None:
             break
         assert (both.movers.discs[1] == alone.movers.discs[0]).all()
     assert not (both.movers.discs[0] == both.movers.discs[1]).all()
-    with pytest.raises(PlacementError, match="a copy of an arena for each"):
+    with pytest.raises(PlacementError, match="need a copy of an arena each"):
         scenario_world(TASK, (arena, arena), 2).reset(poses=poses, targets=((4.0, 4.0), (-4.0, 4.0)), arenas=(0, 0))
 
 

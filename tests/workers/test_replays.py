@@ -9,16 +9,17 @@ from sim.arenas import build_arena
 from sim.config import ArenaFile, ImportedArenaConfig
 from sim.config.arena_file import Pedestrian
 from sim.scan import scan
-from sim.suites import load_suite
+from sim.suites import load_suite, run_suite, suite_for
 from workers.checkpoints import read_policy
 from workers.errors import EpisodesTooLongError
 from workers.job_protocol import ArenaSuite, NamedSuite, ShippedPolicyName
 from workers.policy import torch_policy
 from workers.replays import record as recorder
-from workers.replays.record import record
+from workers.replays.record import Moments, record
 from workers.replays.recording import Recording
 from workers.shipped.library import shipped_policy
 from workers.training.evaluation import evaluate
+from workers.training.measuring import Driven
 
 POLICY = shipped_policy("complex")
 SHIPPED = ShippedPolicyName(name="complex")
@@ -86,6 +87,25 @@ def test_people_who_give_way_are_where_the_rays_met_them() -> None:
                 ranges, scan(build_arena(suite.arena, 0), pose[None], task.lidar, movers=movers)[0], atol=2e-3
             )
     assert len(ways) > 1
+
+
+def test_robots_that_are_together_are_one_anothers_traffic() -> None:
+    task = POLICY.card.training.task.model_copy(update={"together": 3})
+    suite, moments = suite_for(task), Moments(task)
+    table = run_suite(torch_policy(read_policy(POLICY.archive)[1]), task, suite, moments)
+    recording = moments.recording(Driven(suite, task, table))
+    tracks = [recording.track(episode) for episode in range(3)]
+    for own, track in enumerate(tracks):
+        arena = suite.arenas[suite.arena_indices[own]]
+        others = [each for other, each in enumerate(tracks) if other != own]
+        for moment, (pose, ranges, movers) in enumerate(zip(track.poses, track.ranges, track.movers, strict=True)):
+            seen = scan(arena, pose[None], task.lidar, movers=movers)[0]
+            np.testing.assert_allclose(ranges, seen, atol=4e-3)
+            for mover, other in zip(movers, others, strict=True):
+                # Who has ended its attempt is gone: a point is left of it.
+                under_way = moment < len(other.poses)
+                np.testing.assert_allclose(mover[:2], other.poses[moment if under_way else -1, :2], atol=1e-5)
+                assert (mover[2] > 0.01) == under_way
 
 
 def test_commands_speeds_and_reward_terms_are_those_of_each_step(recording: Recording) -> None:

@@ -156,6 +156,38 @@ def test_a_showcase_shows_movers_as_smoothly_as_robots_and_scans_them_where_it_s
     assert moved.mean() > 0.5 / 30
 
 
+def test_a_showcase_shows_no_more_than_are_together_and_what_they_see_of_one_another() -> None:
+    task = TASK.model_copy(update={"together": 3})
+    showcase = Showcase(task, 8)
+    assert showcase.robots == 3
+    still, body = build_arenas(task.arena)[0], task.robot.circumscribed_radius
+    met = 0
+    for _ in range(120):
+        showcase.advance(curve_left, 1 / 10)
+        frame = showcase.frame(step=7, speed=1.0)
+        assert len(frame.movers) == 0
+        discs = np.column_stack([frame.poses[:, :2], np.full(3, body)])
+        for i in range(3):
+            seen = scan(still, frame.poses[i], task.lidar, movers=np.delete(discs, i, axis=0))
+            np.testing.assert_allclose(frame.ranges[i], seen[0], atol=1e-5)
+            met += int((seen < scan(still, frame.poses[i], task.lidar)).any())
+    assert met
+
+
+def test_a_clip_shows_a_group_as_robots() -> None:
+    task = TASK.model_copy(update={"together": 4})
+    env = NavigationVectorEnv(task, 12, seed=5)
+    env.reset()
+    recorder = ClipRecorder(robots=64, control_period=0.2, frame_rate=30.0)
+    for step in range(20):
+        env.step(np.tile(np.array([0.3, 0.5], np.float32), (12, 1)))
+        recorder.record(env, step)
+        frame = recorder.take()
+        assert frame is not None
+        assert len(frame.movers) == 0
+        np.testing.assert_array_equal(frame.poses, env.poses[:4])
+
+
 def test_a_showcase_at_ten_times_real_time_makes_every_control_step() -> None:
     calls = 0
 

@@ -113,4 +113,4 @@ class ClipRecorder:
 
 def _places(env: "NavigationVectorEnv") -> NDArray[np.int32]:
     """(N,) where each robot is: robots of the same number drive among the same things."""
-    return env.tiles() if env.discs.shape[1] else env.arena_indices
+    return env.places() if env.discs.shape[1] or env.task.together > 1 else env.arena_indices

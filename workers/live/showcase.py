@@ -54,11 +54,12 @@ def _in_first_map(task: TaskConfig) -> TaskConfig:
 class Showcase:
     """Robots that show what a policy can do, moment by moment; between two control steps they are interpolated.
 
-    All of them drive in the same arena, the first where the training has a pool of them.
+    All of them drive in the same arena, the first where the training has a pool of them, and no more than are together there
+    where they see one another.
 
     Args:
         task: environment of the training.
-        robots: how many.
+        robots: how many, at most.
 
     Attributes:
         world: where they drive; another one of as many robots may take its place between two steps.
@@ -67,6 +68,8 @@ class Showcase:
 
     def __init__(self, task: TaskConfig, robots: int) -> None:
         task = _in_first_map(task)
+        self._together = task.together
+        robots = min(robots, task.together) if task.together > 1 else robots
         self.world = World(task, build_task_arenas(task), robots)
         self.world.reset()
         self._lidar = task.lidar
@@ -119,12 +122,22 @@ class Showcase:
             speed=speed,
             poses=poses,
             targets=self._targets,
-            ranges=scan(self.world.arenas[0], poses, self._lidar, movers=movers, fields_of_view=self._fields),
+            ranges=self._scans(poses, movers),
             fields_of_view=self._fields,
             rewards=self._rewards,
             outcomes=self._outcomes,
             movers=movers,
         )
+
+    def _scans(self, poses: NDArray[np.float32], movers: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(N, rays) metres that robots at poses (N, 3) see of movers (n, 3), and of one another where they are together."""
+        arena, lidar, fields = self.world.arenas[0], self._lidar, self._fields
+        if self._together == 1:
+            return scan(arena, poses, lidar, movers=movers, fields_of_view=fields)
+        discs = np.column_stack([poses[:, :2], np.full(self.robots, self._robot.circumscribed_radius, np.float32)])
+        met = [np.vstack([movers, np.delete(discs, i, axis=0)]) for i in range(self.robots)]
+        rows = [slice(i, i + 1) for i in range(self.robots)]
+        return np.vstack([scan(arena, poses[i], lidar, movers=met[i.start], fields_of_view=fields[i]) for i in rows])
 
     def _step(self, driver: Driver) -> None:
         """One control step. What is shown during it is how things stood when it began."""
@@ -136,7 +149,7 @@ class Showcase:
         ended = robots.terminations | robots.truncations
         driver.forget(ended)
         self._velocities = np.where(ended[:, None], twists(self._robot, actions).astype(np.float32), world.twists())
-        self._moved = world.movers.discs[0, :, 3:].copy()
+        self._moved = world.movers.walking[0, :, 3:].copy()
         self._last_outcomes = np.where(robots.outcomes > 0, robots.outcomes, self._last_outcomes)
 
     def _begin(self) -> None:
@@ -147,4 +160,4 @@ class Showcase:
         # A reward that belongs to an attempt that has just ended is history.
         self._rewards = np.where(robots.outcomes > 0, 0.0, robots.records["attempt_reward"]).astype(np.float32)
         self._outcomes = self._last_outcomes.copy()
-        self._discs = self.world.movers.discs[0, :, :3].copy()
+        self._discs = self.world.movers.walking[0, :, :3].copy()

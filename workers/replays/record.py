@@ -107,8 +107,9 @@ class Moments:
 def _mover_rows(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows (G,) of the movers' discs that differ, and (S,) which of them each scenario meets."""
     tiles = world.tiles().astype(np.int64)
-    if not any(mover.sees_robots for arena in world.arenas for mover in arena.movers):
-        # Nobody gives way to a robot: all copies of an arena have the same movers in the same places.
+    sees = any(mover.sees_robots for arena in world.arenas for mover in arena.movers)
+    if not sees and world.task.together == 1:
+        # Nobody gives way to a robot, or is one: all copies of an arena have the same movers in the same places.
         tiles %= len(world.arenas)
     rows, indices = np.unique(tiles, return_inverse=True)
     return rows, indices

@@ -15,6 +15,8 @@ from workers.reporting import EvaluationResult
 
 _ARENAS = TypeAdapter(tuple[ArenaFile, ...])
 
+_GONE = 0.001  # m, the radius that is drawn of what was there at first and is no more
+
 
 @dataclass(frozen=True, eq=False)
 class Track:
@@ -69,7 +71,8 @@ class Recording:
         fields_of_view: (M,) float32.
         movers: (T, G, K, 3) float32 x, y, radius of what moves, from the first moment of all episodes to the last of the
             longest; a radius below zero is none.
-        mover_indices: (S,) which of the G each episode met: one for each arena, or for each episode where people give way.
+        mover_indices: (S,) which of the G each episode met: one for each arena, or for each episode where people give way or
+            robots are together.
         commands: (M, A) float32.
         twists: (M, 3) float32.
         terms: (M, terms) float32.
@@ -106,7 +109,7 @@ class Recording:
             ranges=self.ranges[moments].astype(np.float32),
             fields_of_view=self.fields_of_view[moments],
             target=self.targets[episode],
-            movers=discs[:, discs[0, :, 2] > 0.0],
+            movers=_with_who_is_gone(discs[:, discs[0, :, 2] > 0.0]),
             commands=self.commands[moments],
             twists=self.twists[moments],
             terms=self.terms[moments],
@@ -156,3 +159,10 @@ class Recording:
             )
         except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError) as error:
             raise ValueError(f"{path.name} is not a recording: {error}") from error
+
+
+def _with_who_is_gone(discs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Discs (n, movers, 3) of which each has a radius all the time: a robot that has ended its attempt leaves a point."""
+    kept = discs.copy()
+    kept[..., 2] = np.where(discs[..., 2] > 0.0, discs[..., 2], _GONE)
+    return kept
