@@ -6,7 +6,6 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontext
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import BaseRoute
 
 from server.alerts import endpoints as alerts
@@ -34,8 +33,10 @@ from server.field import endpoints as field
 from server.files import FileStore
 from server.http import pages
 from server.http.abandoned import AbandonedRequestsMiddleware
+from server.http.compression import CompressionMiddleware
 from server.http.prefix import PathPrefixMiddleware
-from server.http.problems import AWAY, UNAUTHORIZED, install_error_handlers
+from server.http.problems import install_error_handlers
+from server.http.refusals import with_refusals
 from server.http.slow_clients import SlowClientMiddleware
 from server.http.switchboard import Switchboard
 from server.jobs import endpoints as jobs
@@ -44,6 +45,7 @@ from server.leaderboards import endpoints as leaderboards
 from server.lineage import endpoints as lineage
 from server.live import endpoints as live
 from server.metrics import endpoints as metrics
+from server.metrics.compaction import keep_compacted
 from server.monitoring import endpoints as monitoring
 from server.monitoring.run_logs import RunLogsMiddleware
 from server.monitoring.state import StateCollector
@@ -130,17 +132,13 @@ ROUTERS: tuple[APIRouter, ...] = (
     monitoring.router,
 )
 
-# Bytes; less fits into one packet anyway.
-_COMPRESS_FROM = 1_000
-# Curves shrink to a fifth; higher levels take several times the time for a few per cent.
-_COMPRESS_LEVEL = 3
-
 # What runs as long as the service does, entered in order at start and left in reverse. Each may put its own parts into the
 # services that it is given (`services.doorbell`, `services.links`).
 Background = Callable[[Services], AbstractAsyncContextManager[None]]
 BACKGROUND: tuple[Background, ...] = (
     dispatch,
     keep_swept,
+    keep_compacted,
     keep_indexed,
     keep_emptied,
     keep_thinned,
@@ -196,7 +194,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.router.middleware_stack = Switchboard(app.router)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)
-    app.add_middleware(GZipMiddleware, minimum_size=_COMPRESS_FROM, compresslevel=_COMPRESS_LEVEL)
+    app.add_middleware(CompressionMiddleware)
     app.add_middleware(PositionMiddleware, bus=services.bus)
     app.add_middleware(
         AccessMiddleware,
@@ -219,8 +217,8 @@ class _Application(FastAPI):
     """Says of itself more than FastAPI finds out."""
 
     def openapi(self) -> dict[str, Any]:
-        """The description, with examples."""
-        return with_examples(super().openapi())
+        """The description, with examples and with what every request may be refused with."""
+        return with_refusals(with_examples(super().openapi()))
 
 
 def describe(
@@ -238,7 +236,6 @@ def describe(
         # Swagger's pages load scripts from elsewhere, which the content security policy forbids.
         docs_url=None,
         redoc_url=None,
-        responses=UNAUTHORIZED | AWAY,
         max_body_size=max_body_size,
     )
     install_error_handlers(app)
@@ -249,7 +246,7 @@ def describe(
 @functools.cache
 def _routes(max_body_size: int | None) -> list[BaseRoute]:
     """Every router's, ready to answer: they know no service, and building their models takes a fifth of a second."""
-    builder = FastAPI(responses=UNAUTHORIZED | AWAY, max_body_size=max_body_size, openapi_url=None)
+    builder = FastAPI(max_body_size=max_body_size, openapi_url=None)
     for router in ROUTERS:
         check_permissions(router)
         for route in router.routes:

@@ -94,6 +94,7 @@ class Lanes:
     imports: Lane = field(default_factory=lambda: Lane("imports", threads=2))
     # Of arenas that are being drawn: 10 ms to a second of a core each.
     reviews: Lane = field(default_factory=lambda: Lane("arenas to look over", threads=1, queue=8))
+    compaction: Lane = field(default_factory=lambda: Lane("curves to compact", threads=1))
     # Of alerts: names are looked up and mail is sent there, each of which may take its time.
     alerts: Lane = field(default_factory=lambda: Lane("alerts", threads=4))
 
@@ -110,5 +111,6 @@ class Lanes:
             self.sweeper,
             self.imports,
             self.reviews,
+            self.compaction,
             self.alerts,
         )

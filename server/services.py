@@ -22,6 +22,7 @@ from server.live.hub import LiveHub
 from server.live.views import open_view
 from server.metrics.buckets import Buckets
 from server.metrics.cache import AnswerCache
+from server.metrics.grown import GrownRuns
 from server.monitoring.instruments import Instruments
 from server.people.gate import Gate
 from server.people.oidc.provider import Provider
@@ -58,6 +59,8 @@ class Services:
     curves: AnswerCache = field(default_factory=AnswerCache)
     # All series of the runs whose pages are being opened: some megabytes each where a run is long.
     series: Recent[Mapping[str, Buckets]] = field(default_factory=lambda: Recent(4))
+    # Of which enough rows may wait to be compacted.
+    grown: GrownRuns = field(default_factory=GrownRuns)
     compared: Recent[Compared] = field(default_factory=lambda: Recent(KEPT))
     lanes: Lanes = field(default_factory=Lanes)
     pulse: Pulse = field(default_factory=Pulse)

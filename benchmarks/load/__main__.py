@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import psutil
 
+from benchmarks.load.answers import answered
 from benchmarks.load.meter import Meter
 from benchmarks.load.plan import PagesTold, Plan, StreamsTold, ViewsTold, WorkersTold
 from benchmarks.load.served import TOKEN, WORKER_TOKEN, Database, Part, cores, launch, server_on_a_core
@@ -39,6 +40,7 @@ def load(
     views: int,
     seconds: float,
     page_seconds: float = 10.0,
+    history: int = 0,
 ) -> dict[str, object]:
     """Make the load for a while; the figures."""
     own, others = cores()
@@ -57,6 +59,7 @@ def load(
             experiment_ids=experiment_ids,
             series=series,
             batches=batches,
+            history=history,
             browsers=browsers,
             page_seconds=page_seconds,
             views=views,
@@ -76,6 +79,7 @@ def load(
         for part in parts:
             part.await_readiness()
         meter = Meter(pid)
+        before = answered(url)
         clients_before = psutil.cpu_times(percpu=True)
         end = time.time() + seconds
         for part in parts:
@@ -84,6 +88,7 @@ def load(
         streams = parts[1].told(StreamsTold, patience)
         watched = parts[2].told(ViewsTold, patience)
         pages = parts[3].told(PagesTold, patience)
+        answers = answered(url) - before
         started.close()
         idle = sum(
             after.idle - before.idle
@@ -91,6 +96,7 @@ def load(
             if core in others
         )
         cpu = meter.close()
+        loop = meter.event_loop
         mean_memory, slope = meter.second_half()
         errors = {**workers.errors, **{f"page: {text}": count for text, count in pages.errors.items()}}
         return {
@@ -105,10 +111,24 @@ def load(
             "pages": len(pages.seconds),
             "page_p50_milliseconds": _percentile(pages.seconds, 50),
             "page_p95_milliseconds": _percentile(pages.seconds, 95),
+            "page_p95_milliseconds_by_tenth": _by_tenth(pages, seconds),
+            "page_milliseconds_by_route": {
+                route: {**spread(took), "server": answers.milliseconds(route)}
+                for route, took in sorted(pages.routes.items())
+            },
+            "pages_asked_again": pages.asked_again,
+            "clients": {
+                name: {
+                    "core_percent": round(100.0 * told.processor_seconds / seconds, 1),
+                    "lag_milliseconds": spread(told.lags),
+                }
+                for name, told in (("workers", workers), ("streams", streams), ("views", watched), ("pages", pages))
+            },
             "memory_peak_megabytes": round(meter.peak_megabytes, 1),
             "memory_slope_megabytes_per_hour": round(slope, 1),
             "memory_growth_percent": round(100.0 * slope * seconds / 2 / 3600.0 / mean_memory, 2),
             "server_cpu_milliseconds_per_batch": round(1000.0 * cpu / max(1, workers.acknowledged), 2),
+            "server_event_loop_percent": round(100.0 * loop / seconds, 1),
             "server_core_percent": round(100.0 * cpu / seconds, 1),
             "clients_idle_percent": round(100.0 * idle / len(others) / seconds, 1),
             "frames_sent": workers.frames,
@@ -118,6 +138,23 @@ def load(
             "errors": sum(errors.values()),
             "errors_by_text": errors,
         }
+
+
+def spread(seconds: list[float]) -> dict[str, float]:
+    """Milliseconds: the median, the 95th and 99th percentiles and the most; how many there are."""
+    return {
+        "count": len(seconds),
+        **{f"p{share}": _percentile(seconds, share) for share in (50, 95, 99)},
+        "most": _percentile(seconds, 100),
+    }
+
+
+def _by_tenth(pages: PagesTold, seconds: float) -> list[float]:
+    """The 95th percentiles of the pages that were opened in each tenth of the time: what comes now and then shows."""
+    tenths: list[list[float]] = [[] for _ in range(10)]
+    for opened, took in zip(pages.opened, pages.seconds, strict=True):
+        tenths[min(9, max(0, int(10.0 * opened / seconds)))].append(took)
+    return [_percentile(tenth, 95) for tenth in tenths]
 
 
 def _percentile(seconds: list[float], share: int) -> float:
@@ -131,6 +168,7 @@ def main() -> None:
     options.add_argument("--runs", type=int, default=100)
     options.add_argument("--series", type=int, default=43, help="in each report")
     options.add_argument("--batches", type=float, default=2.0, help="reports a second of each run")
+    options.add_argument("--history", type=int, default=0, help="points of each series that were reported before")
     options.add_argument("--browsers", type=int, default=200)
     options.add_argument("--views", type=int, default=20)
     options.add_argument("--minutes", type=float, default=10.0)
@@ -142,6 +180,7 @@ def main() -> None:
         runs=arguments.runs,
         series=arguments.series,
         batches=arguments.batches,
+        history=arguments.history,
         browsers=arguments.browsers,
         views=arguments.views,
         seconds=60.0 * arguments.minutes,

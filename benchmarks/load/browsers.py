@@ -9,23 +9,27 @@ import asyncio
 import random
 import sys
 import time
-from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
-import httpx
+from benchmarks.load.http import Browser, LostError
+from benchmarks.load.lag import watch_lag
+from benchmarks.load.plan import PagesTold, Plan, StreamsTold, await_beginning, read_plan, tell
 
-from benchmarks.load.plan import PagesTold, Plan, StreamsTold, read_plan, tell
-
-_TIMEOUT = httpx.Timeout(30.0)
+_STATUS = "/api/status"
 
 
 @dataclass(frozen=True)
 class Page:
-    """What a page asks for when it opens, and the stream of the changes of what it shows."""
+    """What a page asks for when it opens, of the thing with this id, and the stream of the changes of what it shows."""
 
-    requests: tuple[str, ...]
+    routes: tuple[str, ...]
     stream: str
+    id: str = ""
+
+
+_RUN = tuple(f"/api/runs/{{id}}{part}" for part in ("", "/metrics", "/checkpoints", "/events"))
 
 
 def pages(plan: Plan, number: int) -> Iterator[Page]:
@@ -33,20 +37,9 @@ def pages(plan: Plan, number: int) -> Iterator[Page]:
     dice = random.Random(number)
     while True:
         run_id, experiment_id = dice.choice(plan.run_ids), dice.choice(plan.experiment_ids)
-        run = Page(
-            (
-                f"/api/runs/{run_id}",
-                f"/api/runs/{run_id}/metrics",
-                f"/api/runs/{run_id}/checkpoints",
-                f"/api/runs/{run_id}/events",
-                "/api/status",
-            ),
-            f"/api/events?follow=shown&run={run_id}",
-        )
-        experiment = Page(
-            (f"/api/experiments/{experiment_id}", "/api/status"), f"/api/events?follow=shown&experiment={experiment_id}"
-        )
-        everything = Page(("/api/experiments", "/api/status"), "/api/events?follow=shown&reports=true")
+        run = Page((*_RUN, _STATUS), "/api/events?follow=shown&run={id}", run_id)
+        experiment = Page(("/api/experiments/{id}", _STATUS), "/api/events?follow=shown&experiment={id}", experiment_id)
+        everything = Page(("/api/experiments", _STATUS), "/api/events?follow=shown&reports=true")
         yield dice.choice((run, run, experiment, everything))
 
 
@@ -55,53 +48,57 @@ def first_wait(plan: Plan, number: int) -> float:
     return plan.page_seconds * number / plan.browsers
 
 
-async def _open_pages(plan: Plan, number: int, client: httpx.AsyncClient, told: PagesTold, errors: Counter[str]) -> None:
+async def _open_pages(plan: Plan, number: int, told: PagesTold) -> None:
     await asyncio.sleep(first_wait(plan, number))
-    for page in pages(plan, number):
-        if plan.over:
-            return
-        opened = time.perf_counter()
-        answers = await asyncio.gather(*(client.get(path) for path in page.requests), return_exceptions=True)
-        took = time.perf_counter() - opened
-        told.seconds.append(took)
-        for answer in answers:
-            if isinstance(answer, BaseException):
-                errors[type(answer).__name__] += 1
-            elif answer.status_code != 200:
-                errors[f"status {answer.status_code}"] += 1
-        await asyncio.sleep(max(0.0, min(plan.page_seconds - took, plan.end - time.time())))
+    with closing(Browser(plan.server_url, plan.token)) as browser:
+        for page in pages(plan, number):
+            if plan.over:
+                break
+            opened = time.perf_counter()
+            await asyncio.gather(*(_ask(browser, page, route, told) for route in page.routes))
+            took = time.perf_counter() - opened
+            told.seconds.append(took)
+            told.opened.append(plan.seconds - (plan.end - time.time()) - took)
+            await asyncio.sleep(max(0.0, min(plan.page_seconds - took, plan.end - time.time())))
+        told.asked_again += browser.asked_again
+
+
+async def _ask(browser: Browser, page: Page, route: str, told: PagesTold) -> None:
+    asked = time.perf_counter()
+    try:
+        status = await browser.get(route.replace("{id}", page.id))
+    except (LostError, OSError, TimeoutError) as error:
+        told.errors[type(error).__name__] += 1
+    else:
+        if status != 200:
+            told.errors[f"status {status}"] += 1
+    told.routes[route].append(time.perf_counter() - asked)
 
 
 async def open_pages(plan: Plan) -> PagesTold:
     """All browsers' pages until the end of the plan."""
-    told, errors = PagesTold(), Counter[str]()
-    limits = httpx.Limits(max_connections=None, keepalive_expiry=2 * plan.page_seconds)
-    async with (
-        httpx.AsyncClient(
-            base_url=plan.server_url, headers=_headers(plan), timeout=_TIMEOUT, limits=limits, trust_env=False
-        ) as client,
-        asyncio.TaskGroup() as group,
-    ):
+    told = PagesTold()
+    async with asyncio.TaskGroup() as group:
+        group.create_task(watch_lag(plan, told.lags))
         for number in range(plan.browsers):
-            group.create_task(_open_pages(plan, number, client, told, errors))
-    return told.model_copy(update={"errors": dict(errors)})
+            group.create_task(_open_pages(plan, number, told))
+    return told
 
 
-async def _read_stream(plan: Plan, number: int, client: httpx.AsyncClient, told: StreamsTold) -> None:
+async def _read_stream(plan: Plan, number: int, told: StreamsTold) -> None:
     """The stream of each page, for as long as the page is open."""
     await asyncio.sleep(first_wait(plan, number))
+    browser = Browser(plan.server_url, plan.token)
+
+    def count(received: int) -> None:
+        told.bytes += received
+
     for page in pages(plan, number):
         until = min(time.time() + plan.page_seconds, plan.end)
-        while time.time() < until:
-            try:
-                async with asyncio.timeout(until - time.time()), client.stream("GET", page.stream) as response:
-                    response.raise_for_status()
-                    async for block in response.aiter_raw():
-                        told.bytes += len(block)
-            except TimeoutError:
-                break
-            except httpx.HTTPError:
-                pass
+        while (left := until - time.time()) > 0.0:
+            with suppress(OSError):
+                if await browser.follow(page.stream.replace("{id}", page.id), count, left):
+                    break
             told.ended += 1
             await asyncio.sleep(1.0)
         if plan.over:
@@ -111,21 +108,13 @@ async def _read_stream(plan: Plan, number: int, client: httpx.AsyncClient, told:
 async def read_streams(plan: Plan) -> StreamsTold:
     """All browsers' streams until the end of the plan; one that ends is opened again."""
     told = StreamsTold()
-    limits = httpx.Limits(max_connections=None)
-    async with (
-        httpx.AsyncClient(
-            base_url=plan.server_url, headers=_headers(plan), timeout=_TIMEOUT, limits=limits, trust_env=False
-        ) as client,
-        asyncio.TaskGroup() as group,
-    ):
+    async with asyncio.TaskGroup() as group:
+        group.create_task(watch_lag(plan, told.lags))
         for number in range(plan.browsers):
-            group.create_task(_read_stream(plan, number, client, told))
+            group.create_task(_read_stream(plan, number, told))
     return told
 
 
-def _headers(plan: Plan) -> dict[str, str]:
-    return {"Authorization": f"Bearer {plan.token}"}
-
-
 if __name__ == "__main__":
-    tell(asyncio.run(open_pages(read_plan()) if sys.argv[1] == "pages" else read_streams(read_plan())))
+    beginning = await_beginning(read_plan())
+    tell(asyncio.run(open_pages(beginning)) if sys.argv[1] == "pages" else asyncio.run(read_streams(beginning)))

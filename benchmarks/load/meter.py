@@ -17,6 +17,7 @@ class Meter:
         self._process = psutil.Process(pid)
         self._samples: list[tuple[float, float]] = []
         self._cpu_before = self._cpu()
+        self._loop_before = self._loop()
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._sample, name="meter", daemon=True)
         self._thread.start()
@@ -26,6 +27,11 @@ class Meter:
         self._closed.set()
         self._thread.join()
         return self._cpu() - self._cpu_before
+
+    @property
+    def event_loop(self) -> float:
+        """Processor seconds that the process's first thread, which runs the event loop, has taken since the beginning."""
+        return self._loop() - self._loop_before
 
     @property
     def peak_megabytes(self) -> float:
@@ -50,3 +56,10 @@ class Meter:
     def _cpu(self) -> float:
         times = self._process.cpu_times()
         return float(times.user + times.system)
+
+    def _loop(self) -> float:
+        return sum(
+            float(thread.user_time + thread.system_time)
+            for thread in self._process.threads()
+            if thread.id == self._process.pid
+        )

@@ -2,8 +2,9 @@
 
 import sys
 import time
+from collections import Counter, defaultdict
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class Plan(BaseModel):
@@ -16,6 +17,7 @@ class Plan(BaseModel):
         experiment_ids: theirs.
         series: in each report.
         batches: reports a second of each run.
+        history: points of each series that a run has reported before it begins.
         browsers: open pages.
         page_seconds: between two pages that a browser opens.
         views: watched runs.
@@ -33,6 +35,7 @@ class Plan(BaseModel):
     experiment_ids: tuple[str, ...]
     series: int
     batches: float
+    history: int = 0
     browsers: int
     page_seconds: float
     views: int
@@ -52,46 +55,72 @@ class Plan(BaseModel):
 
 
 class WorkersTold(BaseModel):
-    """Of the synthetic workers: items made and acknowledged, leases lost, frames sent, errors by their text."""
+    """Of the synthetic workers: items made and acknowledged, leases lost, frames sent, errors by their text, and lags."""
 
     items: int = 0
     acknowledged: int = 0
     leases_lost: int = 0
     frames: int = 0
     errors: dict[str, int] = {}
+    lags: list[float] = []
+    processor_seconds: float = 0.0
 
 
 class PagesTold(BaseModel):
-    """Of the pages: seconds until each page had all its answers, and errors by their text."""
+    """Of the pages.
+
+    Attributes:
+        seconds: until each page had all its answers.
+        opened: when each was opened, in seconds from the beginning.
+        routes: seconds until each answer was there, by route.
+        errors: by their text.
+        asked_again: requests on kept connections that the server had closed, which were asked for on another one.
+        lags: seconds by which this part was late itself.
+        processor_seconds: that it took.
+    """
 
     seconds: list[float] = []
-    errors: dict[str, int] = {}
+    opened: list[float] = []
+    routes: defaultdict[str, list[float]] = Field(default_factory=lambda: defaultdict[str, list[float]](list))
+    errors: Counter[str] = Counter()
+    asked_again: int = 0
+    lags: list[float] = []
+    processor_seconds: float = 0.0
 
 
 class StreamsTold(BaseModel):
-    """Of the event streams: bytes read, streams that ended early."""
+    """Of the event streams: bytes read, streams that ended early, and lags."""
 
     bytes: int = 0
     ended: int = 0
+    lags: list[float] = []
+    processor_seconds: float = 0.0
 
 
 class ViewsTold(BaseModel):
-    """Of the live views: messages and bytes, seconds watched by all of them together, views that ended early."""
+    """Of the live views: messages and bytes, seconds watched by all of them together, views that ended early, and lags."""
 
     messages: int = 0
     bytes: int = 0
     seconds: float = 0.0
     ended: int = 0
+    lags: list[float] = []
+    processor_seconds: float = 0.0
 
 
 def read_plan() -> Plan:
-    """The plan on standard input; returns when everybody is ready."""
-    plan = Plan.model_validate_json(sys.stdin.readline())
+    """The plan on standard input."""
+    return Plan.model_validate_json(sys.stdin.readline())
+
+
+def await_beginning(plan: Plan) -> Plan:
+    """Say that this part is ready; returns when everybody is, with the end."""
     sys.stdout.write("ready\n")
     sys.stdout.flush()
     return plan.model_copy(update={"end": float(sys.stdin.readline())})
 
 
-def tell(told: BaseModel) -> None:
+def tell(told: WorkersTold | PagesTold | StreamsTold | ViewsTold) -> None:
     """What is told goes to standard output."""
+    told.processor_seconds = time.process_time()
     sys.stdout.write(told.model_dump_json())

@@ -7,7 +7,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
 
-from benchmarks.load.plan import Plan, ViewsTold, read_plan, tell
+from benchmarks.load.lag import watch_lag
+from benchmarks.load.plan import Plan, ViewsTold, await_beginning, read_plan, tell
 from server.live.page import VISER_PROTOCOL
 
 
@@ -44,10 +45,11 @@ async def watch(plan: Plan) -> ViewsTold:
     """The first runs, one view each, until the end of the plan; one that ends is opened again."""
     told = ViewsTold()
     async with asyncio.TaskGroup() as group:
+        group.create_task(watch_lag(plan, told.lags))
         for run_id in plan.run_ids[: plan.views]:
             group.create_task(_watch(plan, run_id, told))
     return told
 
 
 if __name__ == "__main__":
-    tell(asyncio.run(watch(read_plan())))
+    tell(asyncio.run(watch(await_beginning(read_plan()))))

@@ -16,7 +16,8 @@ from tempfile import TemporaryDirectory
 import httpx
 import numpy as np
 
-from benchmarks.load.plan import Plan, WorkersTold, read_plan, tell
+from benchmarks.load.lag import watch_thread_lag
+from benchmarks.load.plan import Plan, WorkersTold, await_beginning, read_plan, tell
 from sim.config import LidarConfig
 from workers.errors import ServerError
 from workers.frames import Frame
@@ -101,6 +102,16 @@ class SyntheticRun:
         self.items += 1
         self._link.notify()
 
+    @property
+    def settled(self) -> bool:
+        """Whether the server has all that was reported."""
+        return self._spool is None or self._spool.acked == self._spool.last_seq
+
+    def begin(self) -> None:
+        """Count from now on."""
+        assert self._spool is not None
+        self._first_seq, self.items = self._spool.acked, 0
+
     def show(self, moment: float) -> None:
         """One frame, while somebody watches."""
         watch = self._watch  # orders change it meanwhile
@@ -145,9 +156,22 @@ def _frames(plan: Plan, runs: list[SyntheticRun]) -> None:
         time.sleep(max(0.0, due - time.monotonic()))
 
 
+def _report_history(plan: Plan, runs: list[SyntheticRun]) -> None:
+    """What runs that have gone on for a while have reported."""
+    for run in runs:
+        for _ in range(plan.history):
+            run.report()
+    for run in runs:
+        while not run.settled and not run.lost:
+            time.sleep(0.1)
+    for run in runs:
+        run.begin()
+
+
 def work(plan: Plan) -> WorkersTold:
-    """Claim every run and report until the end of the plan; a run that is lost is taken up again."""
+    """Claim every run and report from the beginning to the end of the plan; a run that is lost is taken up again."""
     errors: Counter[str] = Counter()
+    lags: list[float] = []
     leases_lost = 0
     with (
         TemporaryDirectory() as directory,
@@ -157,9 +181,12 @@ def work(plan: Plan) -> WorkersTold:
         runs = [SyntheticRun(plan, client, run_id, number, Path(directory)) for number, run_id in enumerate(plan.run_ids)]
         for run in runs:
             run.claim(attempt=0)
+        _report_history(plan, runs)
+        plan = await_beginning(plan)
         threads = [
             threading.Thread(target=_heartbeats, args=(plan, client, runs, errors)),
             threading.Thread(target=_frames, args=(plan, runs)),
+            threading.Thread(target=watch_thread_lag, args=(plan, lags)),
         ]
         for thread in threads:
             thread.start()
@@ -188,6 +215,7 @@ def work(plan: Plan) -> WorkersTold:
         leases_lost=leases_lost,
         frames=sum(run.frames for run in runs),
         errors=errors,
+        lags=lags,
     )
 
 

@@ -6,15 +6,17 @@ this one waits. Within this process writers queue up in front of it: SQLite's ow
 poll, chance decides who waits until the time-out.
 """
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 from typing import TYPE_CHECKING, Any
 
+from pydantic_core import from_json
 from sqlalchemy import Connection, create_engine, event, make_url, text
 from sqlalchemy.engine import Engine
-from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import DataError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
@@ -22,7 +24,7 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from server.database.fair_lock import FairLock
 from server.database.tables import Base
 from server.database.writes import Writes
-from server.errors import DatabaseAwayError, DatabaseBusyError, ServiceError
+from server.errors import DatabaseAwayError, DatabaseBusyError, InvalidRequestError, ServiceError
 from server.outage import RETRY_AFTER, Outage
 
 if TYPE_CHECKING:
@@ -79,6 +81,7 @@ class Database:
 
         Raises:
             DatabaseAwayError: the database can't be reached.
+            InvalidRequestError: it is asked with a text that holds a NUL.
         """
         with self._answering(), Session(self._read_engine, expire_on_commit=False, autoflush=False) as session:
             yield session
@@ -90,6 +93,7 @@ class Database:
         Raises:
             DatabaseAwayError: the database can't be reached; nothing was written, but for a commit whose answer was lost.
             DatabaseBusyError: other writers took too long.
+            InvalidRequestError: as `read`.
         """
         turn = self._turn.held(_TURN_SECONDS) if self._turn else nullcontext()
         with (
@@ -126,6 +130,12 @@ class Database:
             raise DatabaseBusyError(
                 "All connections to the database are in use: try again in a moment.", retry_after=RETRY_AFTER
             ) from error
+        except DataError as error:
+            if self.engine.dialect.name == "postgresql" and "NUL" in str(error.orig):
+                raise InvalidRequestError(
+                    "A text of this request holds a NUL character, which the database can't keep."
+                ) from error
+            raise
         except (OperationalError, InterfaceError) as error:
             if not self._answered or self.engine.dialect.name == "sqlite":
                 raise
@@ -160,19 +170,33 @@ def _lower(text: str | None) -> str | None:
     return None if text is None else text.lower()
 
 
+def read_json(text: str | bytes) -> Any:
+    """What a column of JSON holds: pages read thousands of numbers from there, which this reads four times as quickly."""
+    try:
+        return from_json(text)
+    except ValueError:
+        # Half a surrogate pair, which JSON may hold and Python's own reads.
+        return json.loads(text)
+
+
 def _create_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
         patience = {name: value for name, value in _PATIENCE.items() if name not in parsed.query}
         engine = create_engine(
-            url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, pool_pre_ping=True, connect_args=patience
+            url,
+            pool_size=_POOL_SIZE,
+            max_overflow=_POOL_OVERFLOW,
+            pool_pre_ping=True,
+            connect_args=patience,
+            json_deserializer=read_json,
         )
         # Ahead of SQLAlchemy's own first look, which does not understand what such a database answers.
         event.listen(engine, "connect", _check_encoding, insert=True)
         return engine
     if parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
-    engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW)
+    engine = create_engine(url, pool_size=_POOL_SIZE, max_overflow=_POOL_OVERFLOW, json_deserializer=read_json)
 
     @event.listens_for(engine, "connect")
     def _configure(connection: SqliteConnection, _record: ConnectionPoolEntry) -> None:

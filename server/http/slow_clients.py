@@ -14,12 +14,15 @@ from server.errors import ErrorBody
 _BYTES_PER_SECOND = 1024
 # An answer that nobody reads is kept for so many times the time that a request may take: a tab may be asleep.
 _UNREAD = 3
+# Until the event loop has looked at its sockets once more.
+_ONE_TURN_SECONDS = 0.001
 
 
 def timed_protocol(seconds: float) -> type[asyncio.Protocol]:
     """A protocol for uvicorn that closes a connection whose headers are not complete within `seconds`.
 
-    uvicorn itself waits for ever, except between two requests.
+    uvicorn itself waits for ever, except between two requests. There it would hang up on whoever asks while the loop is
+    busy: the time is up before the loop has looked at its sockets again.
     """
 
     class TimedProtocol(HttpToolsProtocol):
@@ -47,6 +50,9 @@ def timed_protocol(seconds: float) -> type[asyncio.Protocol]:
         def connection_lost(self, exc: Exception | None) -> None:
             self._disarm()
             super().connection_lost(exc)
+
+        def timeout_keep_alive_handler(self) -> None:
+            self.timeout_keep_alive_task = self.loop.call_later(_ONE_TURN_SECONDS, super().timeout_keep_alive_handler)
 
         def _arm(self) -> None:
             if self._timer is None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple, cast
 
 import numpy as np
-from sqlalchemy import Table, bindparam, delete, func, insert, select
+from sqlalchemy import Table, bindparam, delete, func, insert, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
 from server.database import tables
@@ -349,16 +349,23 @@ class MetricRepository:
         last_chunks = self._last_chunks(run_id, fresh)
         grown = {chunk.name: points for chunk, points in self._axes.decoded(last_chunks.values())}
         known = {summary.name: summary for summary in self._summaries.of([run_id], fresh)}
+        whole: dict[str, Points] = {}
+        replaced: list[tables.MetricChunk] = []
         for name, points in fresh.items():
-            last, began = last_chunks.get(name), int(points.steps[0])
+            last = last_chunks.get(name)
+            whole[name] = points
             # A chunk that isn't full is grown, so that rare series (evaluations) don't end in chunks of one point each.
             if last is not None and (last.count < _CHUNK_POINTS or last.last_step >= points.steps[0]):
-                points = Points.joined([grown[name], points])
-                self._session.delete(last)
-                self._session.flush()
+                whole[name] = Points.joined([grown[name], points])
+                replaced.append(last)
+        self._delete_chunks(run_id, replaced)
+        for name, points in whole.items():
             self._add_chunks(run_id, name, points)
+        self._session.flush()
+        for name, points in whole.items():
+            last = last_chunks.get(name)
             if name in known or len(points) > _LONG or (last is not None and last.count >= _CHUNK_POINTS):
-                self._summarize(run_id, name, known.get(name), began)
+                self._summarize(run_id, name, known.get(name), int(fresh[name].steps[0]))
         self._session.flush()
         self._axes.drop_unused(run_id)
 
@@ -400,6 +407,19 @@ class MetricRepository:
         """The last chunk of each of these series that has one."""
         found = self._session.scalars(_LAST_CHUNKS, {"run": run_id, "names": list(names)})
         return {chunk.name: chunk for chunk in found}
+
+    def _delete_chunks(self, run_id: str, chunks: Sequence[tables.MetricChunk]) -> None:
+        """In one statement, whose rows the session forgets: others with the same keys may follow."""
+        if not chunks:
+            return
+        chunk = tables.MetricChunk
+        keys = [(each.name, each.first_step) for each in chunks]
+        for each in chunks:
+            self._session.expunge(each)
+        self._session.execute(
+            delete(chunk).where(chunk.run_id == run_id, tuple_(chunk.name, chunk.first_step).in_(keys)),
+            execution_options={"synchronize_session": False},
+        )
 
     def _add_chunks(self, run_id: str, name: str, points: Points) -> None:
         for part in _chunked(points):

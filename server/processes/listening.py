@@ -6,6 +6,8 @@ import socket
 from server.errors import ServiceError
 from server.settings import Settings
 
+_ACCEPTED_AT_ONCE = 16
+
 
 class PortTakenError(ServiceError):
     """Somebody else listens on the port."""
@@ -42,6 +44,15 @@ def listen(settings: Settings) -> socket.socket:
             raise PortTakenError(settings.host, settings.port) from error
         raise UnusableAddressError(settings.host, settings.port, error.strerror or str(error)) from error
     return listener
+
+
+def accepting(listener: socket.socket) -> list[socket.socket]:
+    """The listener several times over: an event loop of uvloop's takes one connection of each in a turn.
+
+    In a turn that takes a hundredth of a second, one would be too few where a hundred come in a second: they would wait, and
+    nobody would see them waiting.
+    """
+    return [listener, *(listener.dup() for _ in range(_ACCEPTED_AT_ONCE - 1))]
 
 
 def local_url(settings: Settings) -> str:

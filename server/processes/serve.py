@@ -8,7 +8,7 @@ from collections.abc import Callable
 import uvicorn
 
 from server.http.slow_clients import timed_protocol
-from server.processes.listening import listen, login_url
+from server.processes.listening import accepting, listen, login_url
 from server.processes.settling import settle_in_background
 from server.settings import Settings
 from workers.logs import configure
@@ -16,6 +16,9 @@ from workers.runtime.supervised import end_with_supervisor
 
 # Streams end by themselves when the bus closes; this is for a client that takes its time to read the last bytes.
 _GRACE_SECONDS = 3
+# Longer than a page waits between two looks, and than proxies keep a connection (nginx and cloud balancers 60 s): who closes
+# first while the other one asks loses a request.
+_KEPT_SECONDS = 75
 
 
 class _Server(uvicorn.Server):
@@ -71,6 +74,7 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
             # Frames are small and many: compressing each would cost more than it saves.
             ws="websockets-sansio",
             ws_per_message_deflate=False,
+            timeout_keep_alive=_KEPT_SECONDS,
             timeout_graceful_shutdown=_GRACE_SECONDS,
         )
 
@@ -83,4 +87,4 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
         # uvicorn raises the signal that ended it once more when it has shut down; nothing is left to be interrupted.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         with contextlib.suppress(KeyboardInterrupt):
-            server.run(sockets=[listener])
+            server.run(sockets=accepting(listener))

@@ -9,18 +9,22 @@ from server.database import tables
 from server.metrics.repository import MetricRepository, ReportedRow
 from workers.protocol import EventItem, MetricItem
 
-# Compaction is looked at once in so many items: counting rows costs a query.
+# Whether rows should be compacted is looked at once in so many items: counting them costs a query.
 _COMPACT_EVERY = 64
 
 
 class ReportedItems:
-    """Collects items, and writes them within the caller's transaction."""
+    """Collects items, and writes them within the caller's transaction.
+
+    Attributes:
+        grown: runs of which enough rows may wait by then to be compacted.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._metrics = MetricRepository(session)
         self._rows: dict[str, list[ReportedRow]] = defaultdict(list)
-        self._due: set[str] = set()
+        self.grown: set[str] = set()
 
     def add(self, run: tables.Run, items: Sequence[MetricItem | EventItem]) -> None:
         """Take up the next items of a run, none of which is stored, and move the run on; they are written later."""
@@ -40,15 +44,11 @@ class ReportedItems:
         before, run.last_seq = run.last_seq, items[-1].seq
         run.step = max([run.step, *(row.step for row in rows)])
         if before // _COMPACT_EVERY != run.last_seq // _COMPACT_EVERY:
-            self._due.add(run.id)
+            self.grown.add(run.id)
 
     def write(self) -> None:
-        """Write what was taken up; rows of which enough wait are compacted."""
+        """Write what was taken up."""
         if not self._rows:
             return
         self._metrics.append(self._rows)
-        for run_id in self._due:
-            if self._metrics.needs_compaction(run_id):
-                self._metrics.compact(run_id)
         self._rows.clear()
-        self._due.clear()

@@ -196,6 +196,7 @@ class WorkerService:
                     kind: ChangeKind = "metrics" if isinstance(item, MetricItem) else "run"
                     changes[Change(experiment_id=run.experiment_id, run_id=run.id, kind=kind)] = None
             items.write()
+        self._services.grown.add(items.grown)
         self._services.instruments.losses.inc(lost)
         for change in changes:
             self._services.bus.publish(change)

@@ -1,14 +1,17 @@
 """Transactions: readers can't write, writers wait for one another, and a failed block leaves nothing."""
 
+import json
 import threading
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import pytest
 from sqlalchemy.exc import DBAPIError
 
 from server.database import tables
-from server.database.engine import Database
+from server.database.engine import Database, read_json
 from server.database.migrate import upgrade
+from server.errors import InvalidRequestError
 
 
 @pytest.fixture
@@ -91,3 +94,17 @@ def test_an_experiment_takes_everything_along_when_it_goes(database: Database) -
     with database.read() as session:
         for table in (tables.Run, tables.RunEvent, tables.MetricRow, tables.Checkpoint):
             assert session.query(table).count() == 0
+
+
+def test_a_text_that_the_database_cannot_keep_is_the_askers_fault(database: Database) -> None:
+    refused = pytest.raises(InvalidRequestError) if database.engine.dialect.name == "postgresql" else nullcontext()
+    with refused, database.read() as session:
+        assert session.get(tables.Experiment, "a\0b") is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['{"a": [1, 2.5, null, 1e-300, 12345678901234567890], "b": NaN}', '"\\ud800"', '{"a": 0.1, "a": 0.30000000000000004}'],
+)
+def test_columns_of_json_are_read_as_python_reads_them(text: str) -> None:
+    assert repr(read_json(text)) == repr(json.loads(text))
