@@ -28,6 +28,8 @@ ServiceError (a sim.errors.MaplessError)   500
 └── NoWorkerError                   503  no worker is there to do it
 """
 
+from typing import ClassVar
+
 from pydantic import BaseModel
 
 from sim.errors import MaplessError
@@ -44,15 +46,17 @@ class ServiceError(MaplessError):
 
     Args:
         message: what is wrong, and what to do next.
-        retry_after: seconds after which trying again makes sense; None where it is not known.
+        retry_after: seconds after which trying again makes sense; None where nothing better is known than `come_again`.
     """
 
     status = 500
+    come_again: ClassVar[float | None] = None
+    """Seconds after which trying again usually makes sense; None where it makes none. Every 503 has some."""
 
     def __init__(self, message: str, *, retry_after: float | None = None) -> None:
         super().__init__(message)
         self.message = message
-        self.retry_after = retry_after
+        self.retry_after = self.come_again if retry_after is None else retry_after
 
 
 class InvalidRequestError(ServiceError):
@@ -165,6 +169,7 @@ class PartAwayError(ServiceError):
     """Something that the server needs from outside can't be reached now; later it may be."""
 
     status = 503
+    come_again = 1.0
 
 
 class DatabaseAwayError(PartAwayError):
@@ -175,12 +180,14 @@ class DatabaseBusyError(ServiceError):
     """Other writers hold the database for too long; later they may not."""
 
     status = 503
+    come_again = 1.0
 
 
 class BusyError(ServiceError):
     """As much of this kind of work waits as may; later there is room."""
 
     status = 503
+    come_again = 1.0
 
 
 class JobFailedError(ServiceError):
@@ -201,9 +208,11 @@ class JobTimeoutError(ServiceError):
     """What was asked for took too long; later it may not."""
 
     status = 503
+    come_again = 1.0
 
 
 class NoWorkerError(ServiceError):
     """No worker is there to do what was asked for."""
 
     status = 503
+    come_again = 1.0

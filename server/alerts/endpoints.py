@@ -16,7 +16,7 @@ from server.alerts.schemas import (
 )
 from server.alerts.service import AlertService
 from server.http.paging import WindowDep
-from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import OWN_ALERTS
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -61,7 +61,7 @@ def list_alert_rules(service: AlertServiceDep, principal: PrincipalDep, window: 
     return service.rules(principal, window)
 
 
-@router.post("/rules", status_code=201, responses=FORBIDDEN | NOT_FOUND | CONFLICT, dependencies=[OWN_ALERTS])
+@router.post("/rules", status_code=201, responses=NOT_FOUND | CONFLICT, dependencies=[OWN_ALERTS])
 def make_alert_rule(rule: AlertRuleCreate, service: AlertServiceDep, principal: PrincipalDep) -> NewAlertRule:
     """Be told of something from now on."""
     return service.add(principal, rule)

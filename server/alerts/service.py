@@ -86,7 +86,7 @@ class AlertService:
             repository = AlertRepository(session)
             if repository.count(principal.user_id) >= MAX_RULES:
                 raise ConflictError(f"You have {MAX_RULES} rules already: delete some first.")
-            name = ProjectRepository(session).get(rule.project_id).name if rule.project_id else None
+            name = ProjectRepository(session).get(rule.project_id).name if rule.project_id is not None else None
             repository.add(rule)
             # Addresses of webhooks are secrets themselves.
             AuditRepository(session).add(
@@ -103,7 +103,7 @@ class AlertService:
         with self._services.database.write() as session:
             rule = AlertRepository(session).rule(principal.user_id, rule_id)
             rule.enabled = wanted.enabled
-            name = ProjectRepository(session).get(rule.project_id).name if rule.project_id else None
+            name = ProjectRepository(session).get(rule.project_id).name if rule.project_id is not None else None
         return _rule(rule, name)
 
     def delete(self, principal: Principal, rule_id: str) -> None:

@@ -16,7 +16,7 @@ from server.arenas.schemas import (
 from server.arenas.service import ArenaService
 from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.paging import PartDep
-from server.http.problems import BUSY, CONFLICT, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import ADMINISTRATE, LAUNCH, SIGNED_IN
 from server.services import ServicesDep
 from sim.config import ArenaConfig, ArenaName
@@ -70,7 +70,7 @@ def upload_arena(upload: ArenaUpload, service: ArenaServiceDep) -> ArenaView:
     return service.upload(upload)
 
 
-@router.post("/reviews", responses=BUSY, max_body_size=MAX_REVIEW_BYTES, dependencies=[LAUNCH])
+@router.post("/reviews", max_body_size=MAX_REVIEW_BYTES, dependencies=[LAUNCH])
 async def review_arena(request: ArenaReviewRequest, services: ServicesDep) -> ArenaReview:
     """Look an arena over while it is drawn: whether it can be kept, and what a robot would not get to."""
     return await services.lanes.reviews.run(ArenaService.review, request)

@@ -9,7 +9,7 @@ from server.bags.schemas import MAX_BAG_BYTES, Bag, BagPage
 from server.database.tables import DEFAULT_PROJECT
 from server.errors import RefusedFieldError
 from server.http.paging import WindowDep
-from server.http.problems import BAG_UNUSABLE, CONFLICT, INVALID, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.schemas import Line
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
@@ -52,7 +52,7 @@ PolicyDep = Annotated[PlayedPolicy, Depends(_policy)]
 @router.post(
     "",
     status_code=201,
-    responses=INVALID | NOT_FOUND | CONFLICT,
+    responses=NOT_FOUND | CONFLICT,
     max_body_size=MAX_BAG_BYTES + 1,
     openapi_extra=_BODY,
     dependencies=[LAUNCH],
@@ -81,13 +81,13 @@ def get_recording(recording_id: str, services: ServicesDep) -> Bag:
     return service.one(services, recording_id)
 
 
-@router.get("/{recording_id}/reading", responses=NOT_FOUND | BAG_UNUSABLE, dependencies=[view("recording_id")])
+@router.get("/{recording_id}/reading", responses=NOT_FOUND, dependencies=[view("recording_id")])
 async def read_recording(recording_id: str, topics: TopicsDep, services: ServicesDep) -> BagReading:
     """The scene, and noise, dropout, rate, delay and accelerations with their intervals: a second or two, then at once."""
     return await service.reading_of(services, recording_id, topics)
 
 
-@router.get("/{recording_id}/beside", responses=NOT_FOUND | BAG_UNUSABLE, dependencies=[view("recording_id")])
+@router.get("/{recording_id}/beside", responses=NOT_FOUND, dependencies=[view("recording_id")])
 async def hold_beside(
     recording_id: str, topics: TopicsDep, policy: PolicyDep, services: ServicesDep, principal: PrincipalDep
 ) -> BagBeside:

@@ -13,6 +13,7 @@ from server.http.paging import Window
 from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.waiting import result_of
+from server.projects.repository import ProjectRepository
 from server.replays.simulator import simulator
 from server.security.principal import Principal
 from server.services import Services
@@ -61,6 +62,7 @@ def keep(services: Services, name: str, project_id: str, content: bytes, princip
         content=content,
     )
     with services.database.write() as session:
+        ProjectRepository(session).get(project_id)
         repository = BagRepository(session)
         if repository.count() >= MAX_BAGS:
             raise ConflictError(f"There are {MAX_BAGS} recordings already: delete some first.")

@@ -8,7 +8,7 @@ from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles, ReportedMetrics
 from server.comparison.service import ComparisonService
 from server.http.conditional import NOT_MODIFIED, KeptDep
-from server.http.problems import INVALID, NOT_FOUND
+from server.http.problems import NOT_FOUND
 from server.security.permissions import view
 from server.services import ServicesDep
 
@@ -34,7 +34,7 @@ LogarithmicX = Annotated[
 GridSteps = Annotated[int, Query(ge=2, le=10_000, description="Places of the grid at most.")]
 
 
-@router.get("", responses=INVALID | NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
+@router.get("", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
 def compare(
     experiment_ids: ExperimentIds,
     services: ServicesDep,

@@ -15,7 +15,7 @@ from server.evaluations.schemas import (
 )
 from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.paging import WindowDep
-from server.http.problems import BUSY, CONFLICT, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
@@ -23,7 +23,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/evaluations", tags=["evaluations"])
 
 
-@router.post("", status_code=202, responses=NOT_FOUND | BUSY, dependencies=[LAUNCH])
+@router.post("", status_code=202, responses=NOT_FOUND, dependencies=[LAUNCH])
 def ask_for_evaluations(request: EvaluationRequest, services: ServicesDep, principal: PrincipalDep) -> list[AskedEvaluation]:
     """Measure policies on suites, each on every one; workers do it, and the answers say where they stand."""
     return service.ask(services, request, principal)

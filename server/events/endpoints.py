@@ -9,14 +9,19 @@ from starlette.types import Receive, Scope, Send
 
 from server.events.bus import Subscription
 from server.events.changes import Shown
-from server.http.problems import TOO_MANY_STREAMS, Responses
+from server.http.problems import Responses
 from server.security.permissions import SIGNED_IN
 from server.security.principal import Principal, PrincipalDep
 from server.services import Services, ServicesDep
 
 router = APIRouter(tags=["events"])
 
-_STREAM: Responses = {200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}}
+_EVENT = {
+    "type": "object",
+    "properties": {"id": {"type": "string"}, "event": {"type": "string"}, "data": {"type": "string"}},
+    "required": ["data"],
+}
+_STREAM: Responses = {200: {"content": {"text/event-stream": {"schema": {"type": "string"}, "itemSchema": _EVENT}}}}
 # A page shows this many experiments or runs at most.
 _MAX_SHOWN = 100
 
@@ -50,7 +55,7 @@ class _EventStream(StreamingResponse):
         subscription.close()
 
 
-@router.get("/api/events", response_class=StreamingResponse, responses=TOO_MANY_STREAMS | _STREAM, dependencies=[SIGNED_IN])
+@router.get("/api/events", response_class=StreamingResponse, responses=_STREAM, dependencies=[SIGNED_IN])
 async def stream_changes(
     services: ServicesDep,
     principal: PrincipalDep,

@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse
 from server.checkpoints.service import CheckpointService
 from server.exports.service import bundle_of
 from server.http.conditional import NOT_MODIFIED, KeptDep
-from server.http.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from server.http.problems import FAILED, NOT_FOUND, Responses
 from server.security.permissions import view
 from server.services import ServicesDep
 from workers.job_protocol import CheckpointPolicy
@@ -23,7 +23,7 @@ _ZIP: Responses = {200: {"content": {"application/zip": {"schema": {"type": "str
 @router.get(
     "/api/checkpoints/{checkpoint_id}/bundle",
     response_class=FileResponse,
-    responses=NOT_FOUND | NOT_MODIFIED | EXPORT_FAILED | _ZIP,
+    responses=NOT_FOUND | NOT_MODIFIED | FAILED | _ZIP,
     dependencies=[view("checkpoint_id")],
 )
 async def download_bundle(checkpoint_id: str, services: ServicesDep, kept: KeptDep) -> FileResponse:

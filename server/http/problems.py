@@ -12,6 +12,7 @@ from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketState
 
 from server.errors import ErrorBody, RefusedFieldError, ServiceError
+from server.http.refusals import refusal
 
 logger = logging.getLogger(__name__)
 
@@ -22,36 +23,11 @@ TRY_AGAIN_LATER = 1013
 MAX_REASON = 120
 """Bytes that a closing socket may say; ours are of one byte a character."""
 
-UNAUTHORIZED: Responses = {401: {"model": ErrorBody, "description": "No valid login"}}
-AWAY: Responses = {
-    503: {
-        "model": ErrorBody,
-        "description": "The database or the store can't be reached now, or is busy: Retry-After says when to come again",
-    }
-}
-FORBIDDEN: Responses = {403: {"model": ErrorBody, "description": "Takes more rights"}}
-INVALID: Responses = {400: {"model": ErrorBody, "description": "Makes no sense as a whole"}}
-NOT_FOUND: Responses = {404: {"model": ErrorBody, "description": "No such thing"}}
-CONFLICT: Responses = {409: {"model": ErrorBody, "description": "Not in this state"}}
-EXPORT_FAILED: Responses = {
-    500: {"model": ErrorBody, "description": "Not exported: the reason is in the detail"},
-    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
-}
-REPLAY_FAILED: Responses = {
-    500: {"model": ErrorBody, "description": "Not driven again: the reason is in the detail"},
-    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
-}
-BAG_UNUSABLE: Responses = {
-    422: {"model": ErrorBody, "description": "Can't be read, or lacks what is asked of it: the reason is in the detail"},
-    503: {"model": ErrorBody, "description": "Took too long, or too many wait already: Retry-After says when to come again"},
-}
+NOT_FOUND: Responses = {404: refusal(404)}
+CONFLICT: Responses = {409: refusal(409)}
+FAILED: Responses = {500: refusal(500)}
+"""Of what a worker is asked for: a job that fails would fail again."""
 NOT_INSTALLED: Responses = {501: {"model": ErrorBody, "description": "Needs a part that is not installed"}}
-BUSY: Responses = {
-    503: {"model": ErrorBody, "description": "Too many wait already: Retry-After says when to come again"},
-}
-TOO_MANY_STREAMS: Responses = {503: {"model": ErrorBody, "description": "Too many streams are open"}}
-PROVIDER_FAILED: Responses = {503: {"model": ErrorBody, "description": "The provider of identities can't be used now"}}
-TOO_MANY: Responses = {429: {"model": ErrorBody, "description": "Too many wrong tokens"}}
 
 
 def retry_after(error: ServiceError) -> dict[str, str]:

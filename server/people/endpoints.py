@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from server.errors import NotFoundError, UnauthorizedError
 from server.http.paging import PartDep, WindowDep
-from server.http.problems import CONFLICT, FORBIDDEN, INVALID, NOT_FOUND, TOO_MANY, UNAUTHORIZED
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.people.accounts import AccountService
 from server.people.invitations import InvitationService
 from server.people.oidc.refusals import Refusal, in_words
@@ -84,7 +84,7 @@ def get_sign_in_options(
     )
 
 
-@router.post("/api/sign-in", status_code=_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY, dependencies=[OPEN])
+@router.post("/api/sign-in", status_code=_NO_CONTENT, dependencies=[OPEN])
 async def sign_in(
     credentials: SignIn,
     request: Request,
@@ -147,7 +147,7 @@ def list_tokens(service: AccountsDep, principal: PrincipalDep, part: PartDep) ->
 @router.post(
     "/api/account/tokens",
     status_code=status.HTTP_201_CREATED,
-    responses=INVALID | NOT_FOUND | CONFLICT,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[OWN_ACCOUNT],
 )
 def make_token(request: ApiTokenCreate, service: AccountsDep, principal: PrincipalDep) -> NewApiToken:
@@ -216,7 +216,7 @@ def list_invitations(service: InvitationsDep, principal: PrincipalDep, part: Par
 @router.post(
     "/api/invitations",
     status_code=status.HTTP_201_CREATED,
-    responses=FORBIDDEN | NOT_FOUND | CONFLICT,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[INVITE],
 )
 def invite(request: InvitationCreate, service: InvitationsDep, principal: PrincipalDep) -> NewInvitation:
@@ -230,7 +230,7 @@ def withdraw_invitation(invitation_id: str, service: InvitationsDep, principal: 
     service.withdraw(principal, invitation_id)
 
 
-@router.post("/api/invitations/look", responses=NOT_FOUND | TOO_MANY, dependencies=[OPEN])
+@router.post("/api/invitations/look", responses=NOT_FOUND, dependencies=[OPEN])
 async def look_at_invitation(
     code: InvitationCode, request: Request, service: InvitationsDep, services: ServicesDep
 ) -> InvitationView:
@@ -245,7 +245,7 @@ async def look_at_invitation(
 @router.post(
     "/api/invitations/accept",
     status_code=_NO_CONTENT,
-    responses=INVALID | NOT_FOUND | CONFLICT | TOO_MANY,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[OPEN],
 )
 async def accept_invitation(

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body
 
-from server.http.problems import BUSY, NOT_FOUND
+from server.http.problems import NOT_FOUND
 from server.live.settings import LiveSettings
 from server.playground import service
 from server.playground.schemas import AnyChange, KeptArena, KeptArenaName, Playground, PlaygroundRequest, PlaygroundSettings
@@ -15,7 +15,7 @@ from server.services import ServicesDep
 router = APIRouter(prefix="/api/playgrounds", tags=["playgrounds"])
 
 
-@router.post("", status_code=201, responses=NOT_FOUND | BUSY, dependencies=[SIGNED_IN])
+@router.post("", status_code=201, responses=NOT_FOUND, dependencies=[SIGNED_IN])
 def open_playground(request: PlaygroundRequest, services: ServicesDep, principal: PrincipalDep) -> Playground:
     """Let a policy drive somewhere; it does while somebody watches."""
     return service.open_playground(services, request, principal).view()

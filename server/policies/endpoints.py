@@ -6,7 +6,7 @@ from fastapi.responses import FileResponse
 from server.exports.service import bundle_of
 from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.paging import PartDep
-from server.http.problems import EXPORT_FAILED, NOT_FOUND, Responses
+from server.http.problems import FAILED, NOT_FOUND, Responses
 from server.policies import service
 from server.policies.schemas import PolicyEpisodes, ShippedPolicy
 from server.security.permissions import SIGNED_IN
@@ -53,9 +53,7 @@ def download_policy(name: str, kept: KeptDep) -> FileResponse:
     return FileResponse(policy.archive, media_type="application/zip", filename=file_name, headers=headers)
 
 
-@router.get(
-    "/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | EXPORT_FAILED | _ZIP, dependencies=[SIGNED_IN]
-)
+@router.get("/{name}/bundle", response_class=FileResponse, responses=NOT_FOUND | FAILED | _ZIP, dependencies=[SIGNED_IN])
 async def download_policy_bundle(name: str, services: ServicesDep) -> FileResponse:
     """All that it takes to drive a robot with it; compared with torch."""
     policy = service.find(name)

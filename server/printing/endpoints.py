@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, PlainTextResponse
 
 from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Horizontal, LogarithmicX, Margin
-from server.http.problems import INVALID, NOT_FOUND
+from server.http.problems import NOT_FOUND
 from server.printing.report import Look
 from server.printing.service import SUFFIXES, PrintingService, TextFormat, Wanted
 from server.printing.tables import TableName
@@ -36,7 +36,7 @@ LogarithmicY = Annotated[
 @router.get(
     "/table",
     response_class=PlainTextResponse,
-    responses=INVALID | NOT_FOUND,
+    responses=NOT_FOUND,
     dependencies=[view("experiment")],
 )
 def compare_table(
@@ -58,7 +58,7 @@ def compare_table(
     return PlainTextResponse(text, media_type=f"{_MEDIA[text_format]}; charset=utf-8", headers=headers)
 
 
-@router.get("/report", response_class=HTMLResponse, responses=INVALID | NOT_FOUND, dependencies=[view("experiment")])
+@router.get("/report", response_class=HTMLResponse, responses=NOT_FOUND, dependencies=[view("experiment")])
 def compare_report(
     request: Request,
     experiment_ids: ExperimentIds,

@@ -5,7 +5,7 @@ import sys
 from fastapi import APIRouter, Request
 from fastapi.responses import StreamingResponse
 
-from server.http.problems import BUSY, INVALID, NOT_FOUND, Responses
+from server.http.problems import NOT_FOUND, Responses
 from server.project_archives.arriving import ProjectArrival
 from server.project_archives.leaving import leaving
 from server.project_archives.schemas import ProjectImport
@@ -32,7 +32,7 @@ async def export_project(project_id: str, services: ServicesDep) -> StreamingRes
 # Each checkpoint in it has the file store's cap.
 @router.post(
     "/import",
-    responses=INVALID | NOT_FOUND | BUSY,
+    responses=NOT_FOUND,
     max_body_size=sys.maxsize,
     openapi_extra=_BODY,
     dependencies=[edit("project_id")],

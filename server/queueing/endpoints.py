@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, status
 
 from server.http.paging import PartDep, WindowDep
-from server.http.problems import CONFLICT, FORBIDDEN, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.queueing.schemas import Priority, QueuePage, QueuePlace, Workers
 from server.queueing.service import QueueService
 from server.security.permissions import ADMINISTRATE, SIGNED_IN, edit
@@ -32,7 +32,7 @@ def list_queue(service: QueueServiceDep, window: WindowDep, principal: Principal
 @router.put(
     "/api/runs/{run_id}/priority",
     status_code=status.HTTP_204_NO_CONTENT,
-    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[edit("run_id")],
 )
 def set_priority(run_id: str, body: Priority, service: QueueServiceDep, principal: PrincipalDep) -> None:
@@ -43,7 +43,7 @@ def set_priority(run_id: str, body: Priority, service: QueueServiceDep, principa
 @router.put(
     "/api/runs/{run_id}/place",
     status_code=status.HTTP_204_NO_CONTENT,
-    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[edit("run_id")],
 )
 def put_beside(run_id: str, body: QueuePlace, service: QueueServiceDep, principal: PrincipalDep) -> None:
@@ -54,7 +54,7 @@ def put_beside(run_id: str, body: QueuePlace, service: QueueServiceDep, principa
 @router.post(
     "/api/runs/{run_id}/front",
     status_code=status.HTTP_204_NO_CONTENT,
-    responses=NOT_FOUND | CONFLICT | FORBIDDEN,
+    responses=NOT_FOUND | CONFLICT,
     dependencies=[edit("run_id")],
 )
 def move_to_front(run_id: str, service: QueueServiceDep, principal: PrincipalDep) -> None:

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from server.errors import ServiceError
 from server.http.paging import PartDep
-from server.http.problems import CONFLICT, NOT_FOUND, REPLAY_FAILED, retry_after
+from server.http.problems import CONFLICT, FAILED, NOT_FOUND, retry_after
 from server.live.page import HEADERS
 from server.replays import lapse, repository, service
 from server.replays.films import episode_film, film_of, film_progress
@@ -73,7 +73,7 @@ ReplayedDep = Annotated[Replayed, Depends(_replayed)]
 
 @router.get(
     "/api/checkpoints/{checkpoint_id}/replays/{episode}",
-    responses=NOT_FOUND | REPLAY_FAILED,
+    responses=NOT_FOUND | FAILED,
     dependencies=[view("checkpoint_id")],
 )
 async def replay_checkpoint(checkpoint_id: str, episode: int, services: ServicesDep) -> Replay:
@@ -81,9 +81,7 @@ async def replay_checkpoint(checkpoint_id: str, episode: int, services: Services
     return await Replayed([Reference("checkpoint", checkpoint_id)], services).one(episode)
 
 
-@router.get(
-    "/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[SIGNED_IN]
-)
+@router.get("/api/policies/{name}/suites/{suite}/replays/{episode}", responses=NOT_FOUND | FAILED, dependencies=[SIGNED_IN])
 async def replay_policy(name: str, suite: str, episode: int, services: ServicesDep) -> Replay:
     """Drive an episode of a shipped policy again: a few seconds for the first one, then at once."""
     return await Replayed([Reference("policy", name, suite)], services).one(episode)
@@ -91,7 +89,7 @@ async def replay_policy(name: str, suite: str, episode: int, services: ServicesD
 
 @router.get(
     "/api/evaluations/{evaluation_id}/replays/{episode}",
-    responses=NOT_FOUND | REPLAY_FAILED,
+    responses=NOT_FOUND | FAILED,
     dependencies=[view("evaluation_id")],
 )
 async def replay_evaluation(evaluation_id: str, episode: int, services: ServicesDep) -> Replay:
@@ -118,16 +116,14 @@ async def list_beside(replayed: ReplayedDep, services: ServicesDep, principal: P
     return await run_in_threadpool(read)
 
 
-@router.get(
-    "/api/replays/{subjects}/{episode}", responses=NOT_FOUND | CONFLICT | REPLAY_FAILED, dependencies=[VIEW_REPLAYED]
-)
+@router.get("/api/replays/{subjects}/{episode}", responses=NOT_FOUND | CONFLICT | FAILED, dependencies=[VIEW_REPLAYED])
 async def replay(replayed: ReplayedDep, episode: int) -> EpisodeReplay:
     """Drive one scenario again by one policy or several, which were measured on the same suite."""
     return service.together(await replayed.parts(episode), episode)
 
 
 @router.get(
-    "/api/replays/{subjects}/{episode}/series", responses=NOT_FOUND | CONFLICT | REPLAY_FAILED, dependencies=[VIEW_REPLAYED]
+    "/api/replays/{subjects}/{episode}/series", responses=NOT_FOUND | CONFLICT | FAILED, dependencies=[VIEW_REPLAYED]
 )
 async def replay_series(replayed: ReplayedDep, episode: int, services: ServicesDep) -> EpisodeSeries:
     """What the charts beside it show: range ahead, commands, speeds, return to come and reward terms over time."""
@@ -138,7 +134,7 @@ async def replay_series(replayed: ReplayedDep, episode: int, services: ServicesD
 @router.get(
     "/api/replays/{subjects}/{episode}/mcap",
     response_class=FileResponse,
-    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"application/octet-stream": {}}}},
+    responses=NOT_FOUND | CONFLICT | FAILED | {200: {"content": {"application/octet-stream": {}}}},
     dependencies=[VIEW_REPLAYED],
 )
 async def replay_messages(replayed: ReplayedDep, episode: int, services: ServicesDep) -> FileResponse:
@@ -149,7 +145,7 @@ async def replay_messages(replayed: ReplayedDep, episode: int, services: Service
 @router.get(
     "/api/replays/{subjects}/{episode}/mp4",
     response_class=FileResponse,
-    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"video/mp4": {}}}},
+    responses=NOT_FOUND | CONFLICT | FAILED | {200: {"content": {"video/mp4": {}}}},
     dependencies=[VIEW_REPLAYED],
 )
 async def replay_video(replayed: ReplayedDep, episode: int, services: ServicesDep, theme: Theme = "light") -> FileResponse:
@@ -160,7 +156,7 @@ async def replay_video(replayed: ReplayedDep, episode: int, services: ServicesDe
 @router.get(
     "/api/replays/{subjects}/{episode}/gif",
     response_class=FileResponse,
-    responses=NOT_FOUND | CONFLICT | REPLAY_FAILED | {200: {"content": {"image/gif": {}}}},
+    responses=NOT_FOUND | CONFLICT | FAILED | {200: {"content": {"image/gif": {}}}},
     dependencies=[VIEW_REPLAYED],
 )
 async def replay_gif(replayed: ReplayedDep, episode: int, services: ServicesDep, theme: Theme = "light") -> FileResponse:
@@ -194,7 +190,7 @@ async def _of_a_run(run_id: str, services: ServicesDep) -> Replayed:
 LapseDep = Annotated[Replayed, Depends(_of_a_run)]
 
 
-@router.get("/api/runs/{run_id}/lapse", responses=NOT_FOUND | REPLAY_FAILED, dependencies=[view("run_id")])
+@router.get("/api/runs/{run_id}/lapse", responses=NOT_FOUND | FAILED, dependencies=[view("run_id")])
 async def time_lapse(run_id: str, replayed: LapseDep, services: ServicesDep) -> Lapse:
     """A run's learning: the same scenarios, driven again by its checkpoints; some seconds for each that was not seen yet."""
     subjects = await replayed.subjects()

@@ -5,7 +5,6 @@ import hmac
 from fastapi import APIRouter, Request, Response, status
 
 from server.errors import UnauthorizedError
-from server.http.problems import TOO_MANY, UNAUTHORIZED
 from server.security.cookies import set_login_cookie
 from server.security.permissions import OPEN
 from server.security.schemas import Login
@@ -14,7 +13,7 @@ from server.services import ServicesDep
 router = APIRouter(tags=["login"])
 
 
-@router.post("/api/login", status_code=status.HTTP_204_NO_CONTENT, responses=UNAUTHORIZED | TOO_MANY, dependencies=[OPEN])
+@router.post("/api/login", status_code=status.HTTP_204_NO_CONTENT, dependencies=[OPEN])
 async def login(credentials: Login, request: Request, response: Response, services: ServicesDep) -> None:
     """Exchange the token that the server printed at start for a cookie."""
     await services.login_limiter.turn(request)

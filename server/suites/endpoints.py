@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from server.http.paging import PartDep
-from server.http.problems import BUSY, CONFLICT, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND
 from server.security.permissions import ADMINISTRATE, LAUNCH, SIGNED_IN
 from server.services import ServicesDep
 from server.suites import service
@@ -24,7 +24,7 @@ def make_own_suite(suite: OwnSuiteName, services: ServicesDep) -> OwnSuite:
     return service.make(services, suite.name)
 
 
-@router.post("/{suite_id}/scenarios", responses=NOT_FOUND | CONFLICT | BUSY, dependencies=[LAUNCH])
+@router.post("/{suite_id}/scenarios", responses=NOT_FOUND | CONFLICT, dependencies=[LAUNCH])
 async def add_own_scenario(suite_id: str, scenario: NewScenario, services: ServicesDep) -> OwnSuite:
     """Add an arena of the gallery, with its start and target, to a suite."""
     return await services.lanes.reviews.run(service.add_scenario, services, suite_id, scenario.sha256)

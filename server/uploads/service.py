@@ -5,20 +5,19 @@ import hashlib
 import io
 import json
 import zipfile
-import zlib
-
-from pydantic import ValidationError
 
 from server.audit.repository import AuditRepository
 from server.database import tables
 from server.errors import ConflictError, RefusedFieldError, TooLargeError
 from server.http.paging import Window
 from server.ids import new_id
+from server.projects.repository import ProjectRepository
 from server.security.principal import Principal
 from server.services import Services
 from server.uploads.repository import UploadRepository
 from server.uploads.schemas import MAX_FILE_BYTES, PolicyUpload, UploadedPolicy, UploadedPolicyPage
 from sim.config import TaskConfig
+from workers.packed import UNPACKING_ERRORS
 
 MAX_UPLOADS = 500
 """Policies from elsewhere that are kept."""
@@ -61,6 +60,7 @@ def upload(services: Services, wanted: PolicyUpload, principal: Principal) -> Up
         graph=graph,
     )
     with services.database.write() as session:
+        ProjectRepository(session).get(wanted.project_id)
         repository = UploadRepository(session)
         if repository.count() >= MAX_UPLOADS:
             raise ConflictError(f"There are {MAX_UPLOADS} uploaded policies already: delete some first.")
@@ -107,16 +107,7 @@ def _from_bundle(content: bytes) -> tuple[bytes, TaskConfig]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             graph, manifest = (_member(archive, name) for name in (_GRAPH, _MANIFEST))
         return graph, TaskConfig.model_validate(json.loads(manifest)["training"]["task"])
-    except (
-        KeyError,
-        TypeError,
-        ValueError,
-        ValidationError,
-        zipfile.BadZipFile,
-        zlib.error,
-        RuntimeError,
-        EOFError,
-    ) as error:
+    except (KeyError, TypeError, *UNPACKING_ERRORS) as error:
         raise RefusedFieldError(
             _CONTENT,
             f"This is no robot bundle of this version: {_GRAPH} and {_MANIFEST} belong in one.",

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi.testclient import TestClient
+import httpx
 from sqlalchemy import func, select
 
 from server.checkpoints.repository import CheckpointRepository
@@ -30,7 +30,7 @@ BASE_URL = "http://127.0.0.1:8400"
 class Reports:
     """Puts into the service what workers would have reported."""
 
-    client: TestClient
+    client: httpx.Client
     services: Services
 
     def experiment(self, name: str = "Corridor", seeds: Sequence[int] = (0,), **training: object) -> dict[str, Any]:

@@ -573,3 +573,10 @@ def test_old_alerts_are_forgotten(client: TestClient, services: Services, watche
     with services.database.write() as session:
         AlertRepository(session).forget(time.time() + 1.0)
     assert alerts(client) == []
+
+
+def test_a_rule_for_a_project_without_a_name_is_refused(client: TestClient) -> None:
+    refused = client.post(
+        "/api/alerts/rules", json={"event": "success", "channel": "browser", "threshold": 0.9, "project_id": ""}
+    )
+    assert refused.status_code == 404

@@ -256,3 +256,12 @@ def test_an_arena_is_looked_over_while_it_is_drawn(client: TestClient) -> None:
     assert client.post("/api/arenas/reviews", json={"arena": full}).json()["remarks"][0]["refused"]
     assert upload(client, json.dumps(full), "drawn.json").status_code == 422
     assert client.post("/api/arenas/reviews", json={"arena": arena | {"width": -1.0}}).status_code == 422
+
+
+def test_an_obstacle_whose_half_is_nothing_is_refused_with_its_place(client: TestClient) -> None:
+    box = {"x": 0.0, "y": 0.0, "length": 5e-324, "width": 1.0}
+    refused = client.post(
+        "/api/arenas/reviews", json={"arena": {"name": "Lab", "width": 8.0, "height": 6.0, "boxes": [box]}}
+    )
+    assert refused.status_code == 422
+    assert refused.json()["detail"][0]["loc"] == ["body", "arena", "boxes", 0, "length"]

@@ -95,3 +95,8 @@ def test_each_sees_the_recordings_of_their_projects(client: TestClient, services
     assert refused.status_code in (403, 404)
     assert client.delete(f"{URL}/{mine['id']}", headers=lab.browser(viewer)).status_code == 403
     assert client.delete(f"{URL}/{mine['id']}", headers=lab.browser(editor)).status_code == 204
+
+
+def test_a_project_that_is_not_there_is_named(client: TestClient) -> None:
+    refused = client.post(URL, params={"name": "drive.mcap", "project_id": "nowhere"}, content=b"a recording")
+    assert (refused.status_code, "no project nowhere" in refused.json()["detail"]) == (404, True)

@@ -5,7 +5,10 @@ import io
 import zipfile
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from server.services import Services
 from tests.server.people import Lab
@@ -88,3 +91,31 @@ def test_each_sees_the_uploads_of_their_projects(client: TestClient, services: S
         assert client.get(f"/api/evaluations/{asked['id']}", headers=headers).status_code == found
     assert client.delete(f"/api/uploads/{mine['id']}", headers=lab.browser(viewer)).status_code == 403
     assert client.delete(f"/api/uploads/{mine['id']}", headers=lab.browser(editor)).status_code == 204
+
+
+def test_a_project_that_is_not_there_is_named(client: TestClient) -> None:
+    body = {"name": "From elsewhere", "content": base64.b64encode(graph()).decode(), "task": {}, "project_id": "nowhere"}
+    refused = client.post("/api/uploads", json=body)
+    assert (refused.status_code, "no project nowhere" in refused.json()["detail"]) == (404, True)
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_bundle_with_other_bytes_in_it_is_taken_or_refused(client: TestClient, packing: int, data: st.DataObject) -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", packing) as archive:
+        archive.writestr("robot/policy.onnx", b"a graph " * 20)
+        archive.writestr("robot/manifest.json", '{"training": {"task": {}}}')
+    whole = file.getvalue()
+    damaged = bytearray(whole)
+    for _ in range(data.draw(st.integers(0, 3))):
+        start = data.draw(st.integers(4, len(whole) - 1))
+        new = data.draw(st.binary(min_size=1, max_size=8))
+        damaged[start : start + len(new)] = new
+    content = bytes(damaged[: data.draw(st.integers(len(whole) - 40, len(whole)))])
+    body = {"name": "From elsewhere", "content": base64.b64encode(content).decode()}
+    answer = client.post("/api/uploads", json=body)
+    assert answer.status_code in {201, 413, 422}, answer.text
+    if answer.status_code == 201:
+        assert client.delete(f"/api/uploads/{answer.json()['id']}").status_code == 204

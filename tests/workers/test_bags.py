@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
 from sim.config import TaskConfig
@@ -169,6 +171,52 @@ def test_an_archive_that_unpacks_to_more_than_may_be_is_refused(tmp_path: Path) 
         for _ in range(257):
             file.write(bytes(2**20))
     assert "larger than 256 MiB once unpacked" in refused(large.getvalue(), tmp_path)
+
+
+def packed(packing: int) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", packing) as archive:
+        archive.writestr("bag/x.db3", b"SQLite format 3\0" * 20)
+    return file.getvalue()
+
+
+def taped() -> bytes:
+    file = io.BytesIO()
+    with tarfile.open(fileobj=file, mode="w:gz") as tape:
+        info = tarfile.TarInfo("bag/x.db3")
+        info.size = 320
+        tape.addfile(info, io.BytesIO(b"SQLite format 3\0" * 20))
+    return file.getvalue()
+
+
+ARCHIVES = {
+    "deflate": packed(zipfile.ZIP_DEFLATED),
+    "bzip2": packed(zipfile.ZIP_BZIP2),
+    "LZMA": packed(zipfile.ZIP_LZMA),
+    "tape": taped(),
+}
+
+
+@pytest.mark.parametrize("kind", ARCHIVES)
+def test_a_folder_that_was_damaged_in_the_middle_is_refused(tmp_path: Path, kind: str) -> None:
+    damaged = bytearray(ARCHIVES[kind])
+    # Behind the names and sizes; of a tape, behind the first bytes of its compression.
+    damaged[50:54] = b"\xff\x00\xff\x00"
+    assert "can't be unpacked" in refused(bytes(damaged), tmp_path)
+
+
+@pytest.mark.parametrize("kind", ARCHIVES)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_folder_with_any_damage_is_refused(tmp_path: Path, kind: str, data: st.DataObject) -> None:
+    whole = ARCHIVES[kind]
+    damaged = bytearray(whole)
+    for _ in range(data.draw(st.integers(0, 3))):
+        start = data.draw(st.integers(4, len(whole) - 1))
+        new = data.draw(st.binary(min_size=1, max_size=8))
+        damaged[start : start + len(new)] = new
+    # Even the whole one is no recording.
+    refused(bytes(damaged[: data.draw(st.integers(len(whole) - 40, len(whole)))]), tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(6))

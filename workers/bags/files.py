@@ -21,6 +21,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from workers.errors import BagError
+from workers.packed import UNPACKING_ERRORS, is_damage
 
 MAX_UNPACKED_BYTES = 256 * 2**20
 """Of a recording, once it is unpacked."""
@@ -115,7 +116,9 @@ def _unpacked(path: Path, begin: bytes, scratch: Path) -> list[Path]:
                 )
         else:
             raise BagError(f"this is no recording of ROS 2: choose {_FORMATS}")
-    except (zipfile.BadZipFile, tarfile.TarError, zlib.error, EOFError, RuntimeError, NotImplementedError) as error:
+    except UNPACKING_ERRORS as error:
+        if not is_damage(error):
+            raise
         raise BagError(_DAMAGED.format("the archive can't be unpacked")) from error
     if not found:
         raise BagError("no .mcap or .db3 file is in the archive: pack up the whole folder of the recording")

@@ -8,7 +8,7 @@ from fastapi.responses import RedirectResponse
 from pydantic import StringConstraints
 
 from server.errors import NotFoundError, TooManyAttemptsError, UnauthorizedError
-from server.http.problems import NOT_FOUND, PROVIDER_FAILED, UNAUTHORIZED
+from server.http.problems import NOT_FOUND
 from server.people.oidc.admission import AdmissionService
 from server.people.oidc.journey import MAX_SECONDS, begin, seal, unseal
 from server.people.oidc.provider import Provider
@@ -27,7 +27,7 @@ CALLBACK = "/api/sign-in/provider/callback"
 Told = Annotated[str, Query(), StringConstraints(max_length=4_000)]
 
 
-@router.post("/api/sign-in/provider", responses=NOT_FOUND | UNAUTHORIZED | PROVIDER_FAILED, dependencies=[OPEN])
+@router.post("/api/sign-in/provider", responses=NOT_FOUND, dependencies=[OPEN])
 async def go_to_provider(
     wanted: ProviderSignIn, request: Request, response: Response, services: ServicesDep, principal: PrincipalDep
 ) -> ProviderAddress:
@@ -92,7 +92,7 @@ async def come_from_provider(
     return response
 
 
-@router.get("/api/sign-in/provider/end", responses=NOT_FOUND | UNAUTHORIZED | PROVIDER_FAILED, dependencies=[SIGNED_IN])
+@router.get("/api/sign-in/provider/end", responses=NOT_FOUND, dependencies=[SIGNED_IN])
 async def leave_provider(request: Request, services: ServicesDep) -> ProviderAddress:
     """Where the browser ends its session with the provider, for who signs out here; its page asks, and leads back."""
     provider = _provider(services)

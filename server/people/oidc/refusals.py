@@ -40,6 +40,7 @@ class ProviderUnusableError(ServiceError):
     """The provider of identities can't be asked now."""
 
     status = 503
+    come_again = 10.0
 
 
 def in_words(reason: Refusal, provider: str) -> str:
