@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
@@ -49,6 +49,18 @@ class Wake:
 
 
 @asynccontextmanager
+async def beside(work: Coroutine[None, None, None]) -> AsyncIterator[None]:
+    """Do this work for as long as the block lasts; at its end it is cancelled and waited for."""
+    task = asyncio.create_task(work)
+    try:
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+@asynccontextmanager
 async def kept_up(
     some: Callable[[], int], *, at_once: int, pause: float, failed: str, wake: Wake | None = None
 ) -> AsyncIterator[None]:
@@ -62,13 +74,8 @@ async def kept_up(
             says once for everybody, and the next look is soon.
         wake: ends the pause before its time.
     """
-    task = asyncio.create_task(_regularly(some, at_once, pause, failed, wake or Wake()))
-    try:
+    async with beside(_regularly(some, at_once, pause, failed, wake or Wake())):
         yield
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 async def _regularly(some: Callable[[], int], at_once: int, pause: float, failed: str, wake: Wake) -> None:

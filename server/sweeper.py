@@ -1,7 +1,6 @@
 """What keeps runs from being forgotten: leases that run out, and messages that got lost."""
 
 import asyncio
-import contextlib
 import logging
 import time
 from collections import defaultdict
@@ -10,6 +9,7 @@ from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
 
+from server.background import beside
 from server.doorbell import CeleryDoorbell, prepare_broker
 from server.errors import PartAwayError
 from server.experiments.stored import training_of
@@ -119,13 +119,10 @@ async def dispatch(services: Services) -> AsyncIterator[None]:
     services.doorbell = doorbell
     ingest = Ingest(WorkerService(services).receive)
     services.links = OpenLinks(asyncio.get_running_loop(), ingest)
-    task = asyncio.create_task(_sweep_regularly(services))
     try:
-        yield
+        async with beside(_sweep_regularly(services)):
+            yield
     finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
         await ingest.close()
         await run_in_threadpool(doorbell.close)
 

@@ -5,12 +5,12 @@ core. Within the transactions that store reports, workers and pages would wait f
 """
 
 import asyncio
-import contextlib
 import logging
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from server.background import beside
 from server.errors import DatabaseBusyError, PartAwayError
 from server.metrics.repository import MetricRepository
 from server.outage import RETRY_AFTER
@@ -43,13 +43,8 @@ def compact(services: Services, run_id: str) -> None:
 @asynccontextmanager
 async def keep_compacted(services: Services) -> AsyncIterator[None]:
     """Compact what has grown for as long as the block lasts; what is due when it ends is due again by its next reports."""
-    task = asyncio.create_task(_compact_all(services))
-    try:
+    async with beside(_compact_all(services)):
         yield
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 async def _compact_all(services: Services) -> None:

@@ -1,13 +1,13 @@
 """Writes down the settings of experiments that another version stored, a few at a time, beside everything else."""
 
 import asyncio
-import contextlib
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
 
+from server.background import beside
 from server.outage import patiently
 from server.services import Services
 from server.workbench.keys import KeyRepository
@@ -34,13 +34,8 @@ def index_some(services: Services) -> int:
 @asynccontextmanager
 async def keep_indexed(services: Services) -> AsyncIterator[None]:
     """Write down at start what is due; what is launched later writes itself down."""
-    task = asyncio.create_task(_index_all(services))
-    try:
+    async with beside(_index_all(services)):
         yield
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 async def _index_all(services: Services) -> None:

@@ -17,6 +17,12 @@ def _own_tile(i, robots, p):
     return robots.records[i].replica * p.replica_stride + robots.records[i].map
 
 
+@kernel(inline="always")
+def _slot(i, j, slots, p):
+    """Which of robot i's discs robot j is, of the same group: the last of all slots, in the robots' order."""
+    return slots - p.together + j - (i - i % p.together) + (1 if j < i else 0)
+
+
 @kernel()
 def see_one_another(state, robots, geometry, parameters):
     """Put every robot where it has come to, and how, among the discs that the others of its group meet.
@@ -31,14 +37,11 @@ def see_one_another(state, robots, geometry, parameters):
     discs = geometry.discs
     for i in range(robots.records.shape[0]):
         tile = _own_tile(i, robots, p)
-        slot = discs.shape[1] - p.together
         first = i - i % p.together
-        for j in range(first, first + p.together):
+        for j in range(first, min(first + p.together, robots.records.shape[0])):
             if j == i:
                 continue
-            slot += 1
-            if j >= robots.records.shape[0]:
-                continue
+            slot = _slot(i, j, discs.shape[1], p)
             if robots.records[j].parked:
                 discs[tile, slot, 0] = robots.poses[j, 0]
                 discs[tile, slot, 1] = robots.poses[j, 1]
@@ -68,14 +71,11 @@ def see_others_placed(i, which, last, robots, geometry, p):
     """
     discs = geometry.discs
     tile = _own_tile(i, robots, p)
-    slot = discs.shape[1] - p.together
     first = i - i % p.together
-    for j in range(first, first + p.together):
+    for j in range(first, min(first + p.together, robots.records.shape[0])):
         if j == i:
             continue
-        slot += 1
-        if j >= robots.records.shape[0]:
-            continue
+        slot = _slot(i, j, discs.shape[1], p)
         discs[tile, slot, 0] = robots.poses[j, 0]
         discs[tile, slot, 1] = robots.poses[j, 1]
         discs[tile, slot, 2] = GONE if robots.records[j].parked or (which[j] and j > last) else p.body
