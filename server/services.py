@@ -1,6 +1,6 @@
 """What every request and background task shares; `app.state.services` holds the one of an application."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -20,9 +20,9 @@ from server.lanes import Lanes
 from server.live.drivers import PolicyDrivers
 from server.live.hub import LiveHub
 from server.live.views import open_view
-from server.metrics.buckets import Buckets
 from server.metrics.cache import AnswerCache
 from server.metrics.grown import GrownRuns
+from server.metrics.kept import KeptSeries
 from server.monitoring.instruments import Instruments
 from server.people.gate import Gate
 from server.people.oidc.provider import Provider
@@ -57,8 +57,7 @@ class Services:
     board: Board = field(default_factory=Board)
     instruments: Instruments = field(default_factory=Instruments)
     curves: AnswerCache = field(default_factory=AnswerCache)
-    # All series of the runs whose pages are being opened: some megabytes each where a run is long.
-    series: Recent[Mapping[str, Buckets]] = field(default_factory=lambda: Recent(4))
+    series: KeptSeries = field(default_factory=KeptSeries)
     # Of which enough rows may wait to be compacted.
     grown: GrownRuns = field(default_factory=GrownRuns)
     compared: Recent[Compared] = field(default_factory=lambda: Recent(KEPT))

@@ -20,6 +20,7 @@ _MODULES: dict[str, Part] = {
     "fsspec": "server",
     "msgspec": "server",
     "optuna": "server",
+    "orjson": "server",
     "prometheus_client": "server",
     "psycopg": "server",
     "pydantic_settings": "server",

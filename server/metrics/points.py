@@ -56,6 +56,8 @@ class Points:
         """All points of the parts; where several hold one step, the last part counts."""
         if not parts:
             return cls(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.float32))
+        if len(parts) == 1:
+            return cls(parts[0].steps, parts[0].times, parts[0].values)
         return cls._ordered(
             np.concatenate([part.steps for part in parts]),
             np.concatenate([part.times for part in parts]),
@@ -70,6 +72,15 @@ class Points:
             last = np.append(np.diff(steps) > 0, True)
             steps, times, values = steps[last], times[last], values[last]
         return cls(steps, times, values)
+
+    def followed(self, fresh: "Points") -> "Points":
+        """The points, and from the first of `fresh` on these alone."""
+        kept = self if not len(fresh) else self[: int(np.searchsorted(self.steps, fresh.steps[0]))]
+        return Points(
+            np.concatenate([kept.steps, fresh.steps]),
+            np.concatenate([kept.times, fresh.times]),
+            np.concatenate([kept.values, fresh.values]),
+        )
 
     def encode(self) -> bytes:
         """The points as bytes: step differences, times and values one after another, little-endian, compressed."""

@@ -17,9 +17,10 @@ from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.cutting import cut_chunks
 from server.metrics.latest import set_latest
+from server.metrics.lines import Line, sharing_places
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized, summary_of
-from server.metrics.thinning import Thinned, ThinningRepository, joined, thinned_row
+from server.metrics.thinning import Thinned, ThinningRepository, thinned_row
 
 # Rows that wait for compaction: few enough to be read in milliseconds, many enough that chunks are worth their overhead.
 COMPACT_AFTER = 500
@@ -262,34 +263,32 @@ class MetricRepository:
 
         Of a long series its summary is read, and what came after it, unless more is asked for than the summary shows.
         """
-        whole = self._whole(run_ids, names, by_summaries=limit <= SUMMARY_WIDTH)
-        return {run_id: cut_curves(series, limit) for run_id, series in whole.items()}
+        lines = self._lines(run_ids, names, by_summaries=limit <= SUMMARY_WIDTH)
+        return {
+            run_id: cut_curves({name: line.buckets for name, line in series.items()}, limit)
+            for run_id, series in lines.items()
+        }
 
-    def curves_by_summaries(self, run_id: str) -> dict[str, Buckets]:
+    def lines(self, run_id: str) -> dict[str, Line]:
         """All of a run's series as fine as they are known without their points: good for any `SUMMARY_WIDTH` or less."""
-        return self._whole([run_id], None, by_summaries=True)[run_id]
+        return sharing_places(self._lines([run_id], None, by_summaries=True)[run_id])
 
-    def _whole(
+    def _lines(
         self, run_ids: Collection[str], names: Collection[str] | None, *, by_summaries: bool
-    ) -> dict[str, dict[str, Buckets]]:
+    ) -> dict[str, dict[str, Line]]:
         summaries = self._summaries.of(run_ids, names) if by_summaries else []
-        known = {(summary.run_id, summary.name): summary for summary in summaries}
-        thinned = self._thinning.of(run_ids, names)
-        read = self._read(run_ids, names, beyond_summaries=bool(known))
-        summarised: dict[str, list[str]] = defaultdict(list)
-        for run_id, name in known:
-            summarised[run_id].append(name)
-        curves: dict[str, dict[str, Buckets]] = {}
-        for run_id, series in read.items():
-            curves[run_id] = {}
-            for name in sorted({*series, *summarised[run_id]}):
-                points, summary = series.get(name), known.get((run_id, name))
-                if summary is None:
-                    buckets = joined(thinned.get((run_id, name)), Points.joined([]) if points is None else points)
-                else:
-                    buckets = summarized(summary, points)
-                curves[run_id][name] = buckets
-        return curves
+        before: dict[str, dict[str, Buckets]] = defaultdict(dict)
+        for (run_id, name), buckets in self._thinning.of(run_ids, names).items():
+            before[run_id][name] = buckets
+        for summary in summaries:
+            before[summary.run_id][summary.name] = summarized(summary)
+        none = Points.joined([])
+        return {
+            run_id: {
+                name: Line(before[run_id].get(name), series.get(name, none)) for name in sorted({*series, *before[run_id]})
+            }
+            for run_id, series in self._read(run_ids, names, beyond_summaries=bool(summaries)).items()
+        }
 
     def since(self, run_id: str, names: Collection[str] | None, step: int) -> dict[str, Points] | None:
         """The points of a run from `step` on, by series; None where they are too many to be read one by one."""
@@ -382,7 +381,7 @@ class MetricRepository:
         self._session.flush()
         found = self._session.scalars(chunks.order_by(tables.MetricChunk.first_step))
         points = Points.joined([points for _, points in self._axes.decoded(found)])
-        buckets = joined(before, points)
+        buckets = Line(before, points).buckets
         if is_long or len(buckets) > _LONG:
             self._summaries.write(run_id, name, buckets)
 
@@ -461,7 +460,7 @@ class PackedSeries:
                     axes[axis] = tables.MetricAxis(run_id=run_id, id=axis, data=part.encode_axis())
                 rows.append(_chunk(run_id, name, part, axis))
             if len(points) > _LONG:
-                rows.append(summary_of(run_id, name, joined(thinned.get(name), points)))
+                rows.append(summary_of(run_id, name, Line(thinned.get(name), points).buckets))
         newest = {name: last for name, points in series.items() if (last := _last_finite(points)) is not None}
         return cls([*axes.values(), *rows], newest)
 

@@ -9,7 +9,6 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.metrics.buckets import Buckets
-from server.metrics.points import Points
 
 _SUMMARIES = cast("Table", tables.MetricSummary.__table__)
 _OF_RUN = _SUMMARIES.c.run_id == bindparam("run")
@@ -71,11 +70,9 @@ def summary_of(run_id: str, name: str, buckets: Buckets) -> tables.MetricSummary
     )
 
 
-def summarized(summary: tables.MetricSummary, points: Points | None = None) -> Buckets:
-    """What a summary knows, its newest point and those of `points` that come after it last."""
-    parts = [Buckets.decode(summary.data, summary.buckets)]
-    if summary.last_step != parts[0].steps[-1]:
-        parts.append(Buckets.single_point(summary.last_step, summary.newest))
-    if points is not None and len(points) and points.steps[-1] > summary.last_step:
-        parts.append(Buckets.of(points[int(np.searchsorted(points.steps, summary.last_step, side="right")) :]))
-    return parts[0] if len(parts) == 1 else Buckets.joined(parts)
+def summarized(summary: tables.MetricSummary) -> Buckets:
+    """What a summary knows, its newest point last."""
+    buckets = Buckets.decode(summary.data, summary.buckets)
+    if summary.last_step == buckets.steps[-1]:
+        return buckets
+    return Buckets.joined([buckets, Buckets.single_point(summary.last_step, summary.newest)])

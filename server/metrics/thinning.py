@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.metrics.buckets import Buckets
+from server.metrics.lines import Line
 from server.metrics.points import Points
 
 EVALUATIONS = "eval/"
@@ -49,17 +50,9 @@ def thinned(name: str, points: Points, before: Buckets | None, limit: int, stops
         stops: steps to which the run may be taken back: no bucket reaches across one, and the last point up to each stands
             alone, as the newest of all does.
     """
-    buckets = joined(before, points).cut(limit, np.asarray(stops, np.int64))
+    buckets = Line(before, points).buckets.cut(limit, np.asarray(stops, np.int64))
     times = points.times[np.searchsorted(points.steps, buckets.steps)]
     return Thinned(name, buckets, Points(buckets.steps, times, buckets.mean.astype(np.float32)))
-
-
-def joined(before: Buckets | None, points: Points) -> Buckets:
-    """All of a series, of which the points up to the last of `before` are known by those buckets."""
-    if before is None or not len(before):
-        return Buckets.of(points)
-    after = int(np.searchsorted(points.steps, before.steps[-1], side="right"))
-    return Buckets.joined([before, Buckets.of(points[after:])])
 
 
 def thinned_row(run_id: str, name: str, buckets: Buckets) -> tables.ThinnedSeries:
