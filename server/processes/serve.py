@@ -9,7 +9,7 @@ import uvicorn
 
 from server.http.slow_clients import timed_protocol
 from server.processes.listening import accepting, listen, login_url
-from server.processes.settling import settle_in_background
+from server.processes.settling import settle_in_background, share_memory
 from server.settings import Settings
 from workers.logs import configure
 from workers.runtime.supervised import end_with_supervisor
@@ -51,6 +51,7 @@ def serve(settings: Settings, on_ready: Callable[[str], None]) -> None:
         PortTakenError, UnusableAddressError: see `listen`.
         OSError: the data directory can't be written.
     """
+    share_memory()
     end_with_supervisor()
     configure(settings.log_format)
     listener = listen(settings)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import re
 import signal
 import socket
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 import httpx
+import pytest
 from typer.testing import CliRunner
 
 from server.cli import app
@@ -164,3 +166,25 @@ def test_a_server_that_answers_imports_what_intervals_take_and_hides_what_lasts_
     code = f"import gc, sys; from server.processes.settling import settle; settle(); {look}"
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert result.stdout.split() == ["True", "True"]
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has arenas")
+def test_threads_of_a_server_share_two_arenas() -> None:
+    code = """
+import ctypes, threading
+from server.processes.settling import share_memory
+share_memory()
+together = threading.Barrier(20)
+def allocate():
+    together.wait()
+    kept = [bytes(2_000) for _ in range(1_000)]
+    together.wait()
+threads = [threading.Thread(target=allocate) for _ in range(20)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+libc = ctypes.CDLL(None)
+libc.malloc_info(0, ctypes.c_void_p.in_dll(libc, "stdout"))
+libc.fflush(None)
+"""
+    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert 1 <= told.count("<heap nr=") <= 2
