@@ -18,6 +18,10 @@ class GrownRuns:
         self._lock = threading.Lock()
         self._runs: dict[str, None] = {}
 
+    def __len__(self) -> int:
+        with self._lock:
+            return len(self._runs)
+
     def add(self, run_ids: Iterable[str]) -> None:
         """These too, once what they have reported is committed."""
         added = dict.fromkeys(run_ids)

@@ -8,7 +8,7 @@ from sqlalchemy import event, func, select, update
 
 from benchmarks.service import wait_for
 from server.database import tables
-from server.metrics.compaction import keep_compacted
+from server.metrics.compaction import keep_compacted, rest
 from server.metrics.repository import COMPACT_AFTER, MetricRepository
 from server.services import Services
 from server.worker_api.ingest import Report
@@ -105,3 +105,8 @@ def test_a_run_that_cannot_be_compacted_keeps_no_other_one_waiting(
         asyncio.run(scenario())
     assert waiting(services) == {broken: ITEMS}
     assert f"the points of run {broken} could not be compacted" in caplog.text
+
+
+def test_few_that_wait_leave_pages_the_core_and_many_are_worked_off() -> None:
+    assert 1.0 / (1.0 + rest(100)) < 0.08
+    assert 1.0 / (1.0 + rest(1_000)) == 0.25
