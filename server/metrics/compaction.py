@@ -19,8 +19,8 @@ from server.services import Services
 
 logger = logging.getLogger(__name__)
 
-# So many times as long as a compaction took nothing is compacted: a thirteenth of a core, which pages and views do not feel where
-# the core is nearly full; a quarter once so many runs wait that rows would pile up.
+# So many times as long as a compaction took nothing is compacted: it takes a thirteenth of a core, for which there is room even
+# beside a hundred runs and their pages; a quarter once so many runs wait that rows would pile up.
 _REST, _REST_OF_MANY, _MANY = 12.0, 3.0, 200
 # Until the next look, where nobody rings.
 _LOOK_SECONDS = 600.0
