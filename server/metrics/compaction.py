@@ -19,7 +19,7 @@ from server.services import Services
 
 logger = logging.getLogger(__name__)
 
-# So many times as long as a compaction took nothing is compacted: it takes a thirteenth of a core, for which there is room even
+# So many times as long as a compaction took nothing is compacted: it takes a thirteenth of a core, for which there is room
 # beside a hundred runs and their pages; a quarter once so many runs wait that rows would pile up.
 _REST, _REST_OF_MANY, _MANY = 12.0, 3.0, 200
 # Until the next look, where nobody rings.
