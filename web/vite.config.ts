@@ -29,6 +29,8 @@ export default defineConfig({
             { name: 'react', test: /node_modules\/(react|react-dom|scheduler)\// },
             { name: 'charts', test: /node_modules\/uplot\// },
             { name: 'frame', tags: ['$initial'] },
+            // On a slow line a file costs a turn, and more than six wait for one another.
+            { name: 'shared', minShareCount: 6 },
           ],
         },
       },

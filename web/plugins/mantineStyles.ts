@@ -1,18 +1,40 @@
 /**
  * Of Mantine's styles only those of the components in use, each with the code that needs it. They are in a layer, so that
- * the pages' own rules win wherever they stand.
+ * the pages' own rules win wherever they stand. The theme's variables (`virtual:theme.css`) are worked out here, not by every
+ * browser before its first picture.
  */
 import { existsSync } from 'node:fs'
 import { join } from 'node:path'
+import {
+  convertCssVariables,
+  DEFAULT_THEME,
+  deepMerge,
+  defaultCssVariablesResolver,
+  mergeMantineTheme,
+} from '@mantine/core'
 import type { Plugin } from 'vite'
+import { cssVariables, theme } from '../src/theme'
 
 const CLASSES = /@mantine\/(core|notifications)\/esm\/.*\/(\w+)\.module\.mjs$/
 const LAYERED = join(import.meta.dirname, '../node_modules/@mantine/core/styles')
+
+const THEME = 'virtual:theme.css'
+const RESOLVED = `\0${THEME}`
+
+/** As `MantineCssVariables` writes them into each page. */
+function themeCss(): string {
+  const whole = mergeMantineTheme(DEFAULT_THEME, theme)
+  const variables = deepMerge(defaultCssVariablesResolver(whole), cssVariables(whole))
+  const schemes = { dark: { '--mantine-color-scheme': 'dark' }, light: { '--mantine-color-scheme': 'light' } }
+  return convertCssVariables(deepMerge(variables, { variables: {}, ...schemes }))
+}
 
 export function mantineStyles(): Plugin {
   return {
     name: 'mantine-styles',
     enforce: 'pre',
+    resolveId: (id) => (id === THEME ? RESOLVED : null),
+    load: (id) => (id === RESOLVED ? themeCss() : null),
     transform: (code, id) => {
       const component = CLASSES.exec(id)?.[2]
       const sheet = `${component}.layer.css`

@@ -2,6 +2,7 @@
 import '@mantine/core/styles/baseline.layer.css'
 import '@mantine/core/styles/default-css-variables.layer.css'
 import '@mantine/core/styles/global.layer.css'
+import 'virtual:theme.css'
 import './global.css'
 import { QueryClientProvider } from '@tanstack/react-query'
 import { StrictMode, startTransition, useLayoutEffect } from 'react'

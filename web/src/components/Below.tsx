@@ -1,10 +1,12 @@
 /** A part of a page that begins below what is seen: made when one comes near, or when there is time. */
-import { type ReactNode, useRef } from 'react'
+import { type ReactNode, type Ref, useRef } from 'react'
 import { useNear } from '../lib/near'
 
 interface BelowProps {
   /** Pixels that are kept free for it. */
   height: number
+  /** What keeps them: an item within a list. */
+  as?: 'div' | 'li'
   /** Made at once: the address asks for something in it. */
   now?: boolean
   /** Made only when one comes near. */
@@ -12,8 +14,8 @@ interface BelowProps {
   children: ReactNode
 }
 
-export function Below({ height, now = false, waits = false, children }: BelowProps) {
-  const place = useRef<HTMLDivElement>(null)
+export function Below({ height, as: Place = 'div', now = false, waits = false, children }: BelowProps) {
+  const place = useRef<HTMLElement>(null)
   const near = useNear(place, waits)
-  return near || now ? children : <div ref={place} style={{ height }} />
+  return near || now ? children : <Place ref={place as Ref<never>} style={{ height, listStyle: 'none' }} />
 }

@@ -12,6 +12,7 @@ import {
 } from '@mantine/core'
 import { type QueryClient, useQuery, useQueryClient } from '@tanstack/react-query'
 import { type ReactNode, type RefObject, useEffect, useRef, useState } from 'react'
+import { useLocation } from 'react-router'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
@@ -72,9 +73,7 @@ function OwnLiveView({ runId, state, kept, covered }: Omit<RunLiveViewProps, 'ch
             'Connecting …'
           )
         ) : driven ? (
-          <Button leftSection={<IconPlayerPlay size={16} />} onClick={() => setAsked(true)}>
-            Watch the best policy
-          </Button>
+          <WatchButton onClick={() => setAsked(true)}>Watch the best policy</WatchButton>
         ) : (
           overlayOf(state, kept, status?.workers.length)
         )
@@ -108,13 +107,36 @@ function CheckpointLiveView({
   )
 }
 
+/** What a link to a policy's page leaves for it (React Router's `state`): that its view is to begin by itself. */
+export interface ToWatch {
+  watch: true
+}
+
+function WatchButton({ onClick, children }: { onClick: () => void; children: string }) {
+  return (
+    <Button leftSection={<IconPlayerPlay size={16} />} onClick={onClick}>
+      {children}
+    </Button>
+  )
+}
+
 export function PolicyLiveView({ name, covered }: { name: string; covered: boolean }) {
-  const watching = useWatching() && !covered
+  // Who comes by a *Watch* has asked; to everybody else pictures in 3D are offered: they are work for any machine.
+  const [asked, setAsked] = useState((useLocation().state as ToWatch | null)?.watch ?? false)
+  const watching = useWatching() && !covered && asked
   const { live, change } = usePolicyLive(name, watching)
   return (
     <LiveView
       page={watching ? `/live/policy-${name}/` : null}
-      overlay={live ? null : 'Connecting …'}
+      overlay={
+        asked ? (
+          live ? null : (
+            'Connecting …'
+          )
+        ) : (
+          <WatchButton onClick={() => setAsked(true)}>Watch it drive</WatchButton>
+        )
+      }
       live={live}
       change={change}
       driven

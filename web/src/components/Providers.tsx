@@ -2,7 +2,7 @@
 import { MantineProvider } from '@mantine/core'
 import { notificationsStore } from '@mantine/notifications'
 import { lazy, type ReactNode, Suspense, useEffect, useSyncExternalStore } from 'react'
-import { cssVariables, theme } from '../theme'
+import { theme } from '../theme'
 
 const corner = () => import('./Notifications')
 const Notifications = lazy(async () => ({ default: (await corner()).Notifications }))
@@ -18,7 +18,8 @@ export function Providers({ children, still = false }: { children: ReactNode; st
   return (
     <MantineProvider
       theme={theme}
-      cssVariablesResolver={cssVariables}
+      // They stand in the style sheet (plugins/mantineStyles).
+      withCssVariables={false}
       defaultColorScheme="auto"
       env={still ? 'test' : 'default'}
     >

@@ -8,6 +8,7 @@ import { messageOf } from '../api/errors'
 import type { ArenaSummary } from '../api/types'
 import { ArenaCard } from '../components/ArenaCard'
 import { ArenaFormats, ArenaUpload } from '../components/ArenaUpload'
+import { Below } from '../components/Below'
 import { IconPencil, IconSearch } from '../components/icons'
 import { Notice, Page, Panel, QueryError } from '../components/ui'
 import { useTitle } from '../lib/hooks'
@@ -26,6 +27,8 @@ const SECTIONS = [
 
 /** Imported arenas that are drawn at first: each is a request of its own. */
 const FIRST = 24
+/** Pixels, about. */
+const CARD_HEIGHT = 330
 
 export function ArenasPage() {
   useTitle('Arenas')
@@ -52,7 +55,7 @@ export function ArenasPage() {
       ) : !data ? (
         <div className={classes.grid} aria-busy="true">
           {SECTIONS.map(({ kind }) => (
-            <Skeleton key={kind} height={330} />
+            <Skeleton key={kind} height={CARD_HEIGHT} />
           ))}
         </div>
       ) : (
@@ -109,7 +112,9 @@ function Section({ title, text, arenas, newest, onDelete }: SectionProps) {
       </Group>
       <ul className={classes.grid}>
         {found.slice(0, shown).map((arena) => (
-          <ArenaCard key={arena.key} arena={arena} isNew={arena.key === newest} onDelete={onDelete} />
+          <Below key={arena.key} as="li" height={CARD_HEIGHT} now={arena.key === newest}>
+            <ArenaCard arena={arena} isNew={arena.key === newest} onDelete={onDelete} />
+          </Below>
         ))}
       </ul>
       {found.length > shown && (

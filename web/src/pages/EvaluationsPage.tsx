@@ -3,6 +3,7 @@ import { Button, Group, Skeleton, Stack } from '@mantine/core'
 import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
+import { Below } from '../components/Below'
 import { AskForm } from '../components/evaluations/AskForm'
 import { EvaluationTable, isOpen } from '../components/evaluations/EvaluationTable'
 import { OwnSuites } from '../components/evaluations/OwnSuites'
@@ -45,27 +46,29 @@ export function EvaluationsPage() {
           {/* Another address is another question. */}
           <AskForm key={search.toString()} />
         </Panel>
-        <OwnSuites />
-        <Panel title="Measured" flush>
-          {error && !data ? (
-            <QueryError error={error} what="list of evaluations" retry={refetch} />
-          ) : !data ? (
-            <Skeleton height={160} m="md" w="auto" />
-          ) : data.items.length === 0 ? (
-            <Message title="Nothing was evaluated yet">
-              Choose policies above, and what they are to be measured on.
-            </Message>
-          ) : (
-            <EvaluationTable evaluations={data.items} />
-          )}
-          <Pager
-            page={page}
-            size={SIZE}
-            total={data?.total ?? 0}
-            label="Pages of evaluations"
-            onChange={setPage}
-          />
-        </Panel>
+        <Below height={400}>
+          <OwnSuites />
+          <Panel title="Measured" flush>
+            {error && !data ? (
+              <QueryError error={error} what="list of evaluations" retry={refetch} />
+            ) : !data ? (
+              <Skeleton height={160} m="md" w="auto" />
+            ) : data.items.length === 0 ? (
+              <Message title="Nothing was evaluated yet">
+                Choose policies above, and what they are to be measured on.
+              </Message>
+            ) : (
+              <EvaluationTable evaluations={data.items} />
+            )}
+            <Pager
+              page={page}
+              size={SIZE}
+              total={data?.total ?? 0}
+              label="Pages of evaluations"
+              onChange={setPage}
+            />
+          </Panel>
+        </Below>
       </Stack>
     </Page>
   )

@@ -4,8 +4,10 @@ import { Link } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
 import { ArenaPicture } from '../components/ArenaPicture'
+import { Below } from '../components/Below'
 import { FieldMatrix } from '../components/FieldMatrix'
 import { IconPlayerPlay } from '../components/icons'
+import type { ToWatch } from '../components/LiveView'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { PolicyActions } from '../components/PolicyActions'
 import { Page, Panel, QueryError } from '../components/ui'
@@ -14,6 +16,10 @@ import { inShort, summaryOf } from '../lib/experiments'
 import { percent } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import classes from './PoliciesPage.module.css'
+
+/** Pixels, about. */
+const CARD_HEIGHT = 240
+const WATCH: ToWatch = { watch: true }
 
 export function PoliciesPage() {
   useTitle('Policies')
@@ -36,12 +42,18 @@ export function PoliciesPage() {
       ) : (
         <ul className={classes.list} aria-busy={!data}>
           {data
-            ? data.map((policy) => <PolicyCard key={policy.name} policy={policy} />)
-            : [0, 1].map((key) => <Skeleton key={key} height={240} />)}
+            ? data.map((policy) => (
+                <Below key={policy.name} as="li" height={CARD_HEIGHT}>
+                  <PolicyCard policy={policy} />
+                </Below>
+              ))
+            : [0, 1, 2, 3].map((key) => <Skeleton key={key} height={CARD_HEIGHT} />)}
         </ul>
       )}
       <div className={classes.matrix}>
-        <FieldMatrix />
+        <Below height={500}>
+          <FieldMatrix />
+        </Below>
       </div>
     </Page>
   )
@@ -72,6 +84,7 @@ function PolicyCard({ policy }: { policy: ShippedPolicy }) {
         <Button
           component={Link}
           to={page}
+          state={WATCH}
           size="xs"
           leftSection={<IconPlayerPlay size={14} />}
           aria-label={`Watch ${policy.title}`}

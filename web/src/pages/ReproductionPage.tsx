@@ -7,6 +7,7 @@ import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Reproduction } from '../api/types'
+import { Below } from '../components/Below'
 import { DeleteDialog } from '../components/DeleteDialog'
 import { IconPlayerPlay, IconPlayerStop, IconRocket, IconTrash } from '../components/icons'
 import { useLaunchProject } from '../components/people/useLaunchProject'
@@ -73,9 +74,17 @@ export function ReproductionPage() {
           ) : (
             <Invitation reproduction={data} />
           )}
-          <PaperTables reproduction={data} />
-          {data.campaign && <PaperFigures reproduction={data} />}
-          <Claims claims={data.claims} />
+          <Below height={1_200}>
+            <PaperTables reproduction={data} />
+          </Below>
+          {data.campaign && (
+            <Below height={700}>
+              <PaperFigures reproduction={data} />
+            </Below>
+          )}
+          <Below height={1_200}>
+            <Claims claims={data.claims} />
+          </Below>
         </Stack>
       ) : (
         <Stack gap="md" aria-busy="true" aria-label="Loading the reproduction">

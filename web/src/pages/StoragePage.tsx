@@ -27,13 +27,16 @@ export function StoragePage() {
     <Page
       title="Storage"
       below={
-        data && (
-          <Text size="sm" c="dimmed">
-            Checkpoints take {fileSize(data.checkpoint_bytes)}
-            {data.going_bytes > 0 && `, of which ${fileSize(data.going_bytes)} go by rules`};{' '}
-            {fileSize(data.free_bytes)} are left on the server's disk.
-          </Text>
-        )
+        // Its place is kept: two lines on a phone.
+        <Text size="sm" c="dimmed" mih={{ base: '2lh', sm: '1lh' }}>
+          {data && (
+            <>
+              Checkpoints take {fileSize(data.checkpoint_bytes)}
+              {data.going_bytes > 0 && `, of which ${fileSize(data.going_bytes)} go by rules`};{' '}
+              {fileSize(data.free_bytes)} are left on the server's disk.
+            </>
+          )}
+        </Text>
       }
     >
       {data && data.free_bytes < data.min_free_bytes && (

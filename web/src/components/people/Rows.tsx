@@ -34,7 +34,7 @@ export function Rows({ what, head, query, empty, minWidth = 520, children }: Row
             ))}
           </Table.Tr>
         </Table.Thead>
-        <Table.Tbody>{children ?? <LoadingRows rows={3} columns={head.length} />}</Table.Tbody>
+        <Table.Tbody>{children ?? <LoadingRows rows={1} columns={head.length} />}</Table.Tbody>
       </Table>
     </Table.ScrollContainer>
   )
