@@ -21,6 +21,7 @@ def addresses(lab: Lab) -> dict[str, tuple[str, str]]:
         "studies": ("/studies", "h1"),
         "evaluations": ("/evaluations", "h1"),
         "leaderboards": ("/leaderboards", "[data-testid=entry]"),
+        "recordings": ("/recordings", "h1"),
         "policies": ("/policies", "[data-testid=policy]"),
         "policy": ("/policies/complex", "[data-testid=episode]"),
         "arenas": ("/arenas", "[data-testid=arena]"),
