@@ -1,5 +1,6 @@
 """What is compared, read once for all that a page asks of it: experiments, their runs and their last evaluations."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,11 +25,11 @@ class Compared:
 
     Attributes:
         experiments: with their runs, in the order asked for.
-        state: what an answer about them depends on.
+        state: a digest of what an answer about them depends on.
     """
 
     experiments: Sequence[tables.Experiment]
-    state: tuple[object, ...]
+    state: str
     _database: Database
     _final: Mapping[str, tables.Evaluation]
 
@@ -60,4 +61,6 @@ def read_compared(database: Database, experiment_ids: Sequence[str]) -> Compared
         experiments = ExperimentRepository(session).get_many(experiment_ids)
         run_ids = [run.id for experiment in experiments for run in experiment.runs]
         final = CheckpointRepository(session).final_evaluations(run_ids)
-        return Compared(experiments, state_of(session, experiments), database, final)
+        # As a digest: it is asked for once a request, and is made of hundreds of values.
+        state = hashlib.sha256(repr(state_of(session, experiments)).encode()).hexdigest()
+        return Compared(experiments, state, database, final)

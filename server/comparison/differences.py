@@ -18,15 +18,12 @@ def differences(configurations: Sequence[Mapping[str, Any]]) -> list[Difference]
     flat = [dict(_flatten(configuration, own)) for configuration, own in zip(configurations, things, strict=True)]
     # A dictionary keeps the order in which a person meets the settings in the form.
     paths = {path: None for settings in flat for path in settings}
-    rows = [
-        Difference(
-            path=path,
-            values=[settings.get(path) for settings in flat],
-            left_out=[_is_of_another(path, own, things) for own in things],
-        )
-        for path in paths
-    ]
-    return [row for row in rows if any(value != row.values[0] for value in row.values)]
+    rows = []
+    for path in paths:
+        values = [settings.get(path) for settings in flat]
+        if any(value != values[0] for value in values):
+            rows.append(Difference(path=path, values=values, left_out=[_is_of_another(path, own, things) for own in things]))
+    return rows
 
 
 def _is_of_another(path: str, own: set[str], things: Sequence[set[str]]) -> bool:

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles, ReportedMetrics
@@ -57,7 +57,7 @@ def compare_profiles(experiment_ids: ExperimentIds, services: ServicesDep, kept:
     return service.profiles(ids)
 
 
-@router.get("/curves", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
+@router.get("/curves", response_model=Curves, responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])
 def compare_curves(
     experiment_ids: ExperimentIds,
     services: ServicesDep,
@@ -79,15 +79,21 @@ def compare_curves(
             description="`follow` of the answer that is known, to the same question: only what is beyond is wanted.",
         ),
     ] = None,
-) -> Curves:
+) -> Response:
     """One metric of every run on one grid, and each experiment's mean and interval.
 
     Who follows runs that report asks with `follow` of the answer before: what is known beyond `since` of the next one gives
     way to what comes. Where a run has begun, or was cut back, it is whole.
     """
     ids, service = list(dict.fromkeys(experiment_ids)), ComparisonService(services)
-    kept.unless(service.state(ids), name, points, lines, across, logarithmic, since)
-    return service.curves(ids, name, points, lines, across, logarithmic=logarithmic, since=since)
+    question = (service.state(ids), name, points, lines, across, logarithmic, since)
+    headers = kept.unless(*question)
+
+    def read() -> bytes:
+        curves = service.curves(ids, name, points, lines, across, logarithmic=logarithmic, since=since)
+        return curves.model_dump_json().encode()
+
+    return Response(services.curves.get(question, read), media_type="application/json", headers=headers)
 
 
 @router.get("/metrics", responses=NOT_FOUND | NOT_MODIFIED, dependencies=[view("experiment")])

@@ -35,14 +35,9 @@ class SeedEpisodes:
     @classmethod
     def of(cls, episodes: Sequence[EpisodeResult], arrival_distance: float) -> "SeedEpisodes":
         """Of episodes as they are stored."""
-        arrived = np.array([episode.outcome == "arrival" for episode in episodes])
-        efficiency = np.array([episode.path_efficiency(arrival_distance) for episode in episodes])
-        return cls(
-            arrived=arrived.astype(np.float64),
-            steps=np.where(arrived, np.array([float(episode.steps) for episode in episodes]), np.nan),
-            reward=np.array([episode.reward for episode in episodes]),
-            score=np.where(arrived, efficiency, 0.0),
-        )
+        told = [(one.outcome == "arrival", one.steps, one.reward, one.path_efficiency(arrival_distance)) for one in episodes]
+        arrived, steps, reward, efficiency = np.array(told, np.float64).T
+        return cls(arrived, np.where(arrived, steps, np.nan), reward, np.where(arrived, efficiency, 0.0))
 
 
 @dataclass(frozen=True)

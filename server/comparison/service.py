@@ -1,38 +1,31 @@
 """Experiments side by side: final figures, differences, and curves on a common grid."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from server.comparison.compared import MADE_OF, Compared, read_compared
+from server.comparison.curves import beyond, curve_of, experiment_curves, finer
 from server.comparison.differences import differences
 from server.comparison.figures import FinalFigures
 from server.comparison.following import Followed, digest_of, settled_of
-from server.comparison.grid import COUNTED_BY, Across, Curve, Grid, all_under_way, common_grid, resample
+from server.comparison.grid import COUNTED_BY, Across, common_grid
 from server.comparison.schemas import (
     Comparison,
     Curves,
-    ExperimentCurves,
     Profile,
     Profiles,
     ReportedMetric,
     ReportedMetrics,
-    SeedCurve,
 )
 from server.comparison.verdicts import improvements, verdicts
 from server.database import tables
 from server.errors import InvalidRequestError
-from server.estimates import is_rate
-from server.metrics.buckets import SUMMARY_WIDTH, Buckets
-from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
-from server.metrics.thinning import EVALUATIONS
 from server.services import Services
 from workers.statistics.improvement import performance_profile
-from workers.statistics.seeds import means_band, rates_band
 
 MOST_IN_PAIRS = 12
 """Experiments whose every pair is judged: 66 pairs."""
@@ -56,7 +49,7 @@ class ComparisonService:
             (tuple(experiment_ids), written), lambda: read_compared(self._services.database, experiment_ids)
         )
 
-    def state(self, experiment_ids: Sequence[str]) -> tuple[object, ...]:
+    def state(self, experiment_ids: Sequence[str]) -> str:
         """What a comparison of these experiments depends on, beside what is asked of it.
 
         Raises:
@@ -151,7 +144,7 @@ class ComparisonService:
             repository = MetricRepository(session)
             if known is not None:
                 tails, began = repository.tails(run_ids, name, known.settled)
-                news = _beyond(tails, known, points)
+                news = beyond(tails, known, points)
                 if news is not None:
                     series, grid = news
                     digest = digest_of(experiments, series, began, episodes, asked)
@@ -162,15 +155,14 @@ class ComparisonService:
                             across=across,
                             spacing=grid.spacing,
                             steps=grid.x.astype(np.int64).tolist(),
-                            experiments=[_curves(one, series, grid.x, name, episodes, shown, ()) for one in experiments],
+                            experiments=experiment_curves(experiments, series, grid.x, name, episodes, shown, ()),
                             since=known.settled,
                             follow=None if settled is None else Followed(digest, *settled).token,
                         )
-            # Finer than the grid: what is looked at is the grid's.
             wanted = [name] if counter is None else [name, counter]
-            read = repository.curves(run_ids, wanted, max(points, SUMMARY_WIDTH))
+            read = finer(repository, run_ids, wanted, points)
             chunks_began = repository.began(run_ids, name) if followable else {}
-        series = {run_id: _curve(read[run_id], name, counter) for run_id in run_ids}
+        series = {run_id: curve_of(read[run_id], name, counter) for run_id in run_ids}
         grid = common_grid(list(series.values()), points, whole=across == "steps", logarithmic=logarithmic)
         unplaced = {run_id for run_id in run_ids if name in read[run_id] and not series[run_id].x.size}
         settled = settled_of(experiments, series, grid, None) if followable else None
@@ -182,21 +174,9 @@ class ComparisonService:
             spacing=grid.spacing,
             steps=grid.x.astype(np.int64).tolist() if counter is None else [],
             x=None if counter is None else [float(f"{x:.7g}") for x in grid.x],
-            experiments=[_curves(experiment, series, grid.x, name, episodes, shown, unplaced) for experiment in experiments],
+            experiments=experiment_curves(experiments, series, grid.x, name, episodes, shown, unplaced),
             follow=None if settled is None else Followed(digest, *settled).token,
         )
-
-
-def _beyond(tails: Mapping[str, Points], known: Followed, points: int) -> tuple[dict[str, Curve], Grid] | None:
-    """The curves and the grid beyond what is known; None where that is too much to go on from it."""
-    whole = {run_id: Curve.over_steps(Buckets.of(each)) for run_id, each in tails.items()}
-    grid = known.beyond(list(whole.values()), points)
-    if grid is None or grid.spacing == "points":
-        return None if grid is None else (whole, grid)
-    # As fine as what is known: its places lay on curves of so many buckets.
-    width = 2 + -(-grid.x.size * max(points, SUMMARY_WIDTH) // points)
-    cut = {run_id: Curve.over_steps(Buckets.of(each).cut(width + 2, each.steps[:1])) for run_id, each in tails.items()}
-    return cut, grid
 
 
 def _held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) -> list[tuple[str, str]]:
@@ -222,50 +202,6 @@ def _profile(figures: FinalFigures) -> Profile:
         mean=json_numbers(mean),
         low=json_numbers(low),
         high=json_numbers(high),
-    )
-
-
-def _curve(read: Mapping[str, Buckets], name: str, counter: str | None) -> Curve:
-    """A run's curve of the metric; without points where the metric, or what counts its x, was never reported."""
-    nothing = Buckets.of(Points.joined([]))
-    points = read.get(name, nothing)
-    return Curve.over_steps(points) if counter is None else Curve.over(points, read.get(counter, nothing))
-
-
-def _curves(
-    experiment: tables.Experiment,
-    series: Mapping[str, Curve],
-    grid: NDArray[np.float64],
-    name: str,
-    episodes: Mapping[str, int],
-    shown: int | None,
-    unplaced: Collection[str],
-) -> ExperimentCurves:
-    values = np.array([resample(series[run.id], grid) for run in experiment.runs]).reshape(len(experiment.runs), grid.size)
-    driven = np.array([[float(episodes.get(run.id, 0))] for run in experiment.runs])
-    counted = name.startswith(EVALUATIONS) and driven[np.isfinite(values).any(axis=1)].all()
-    if not is_rate(name):
-        mean, low, high = means_band(values)
-    else:
-        mean, low, high = rates_band(values, driven if counted else None)
-    told = all_under_way([series[run.id] for run in experiment.runs], values)
-    mean, low, high = (np.where(told, each, np.nan) for each in (mean, low, high))
-    return ExperimentCurves(
-        id=experiment.id,
-        name=experiment.name,
-        seeds=[
-            SeedCurve(
-                seed=run.seed,
-                values=json_numbers(row),
-                thinned=run.thinned_at is not None and not name.startswith(EVALUATIONS),
-            )
-            for run, row in zip(experiment.runs[:shown], values[:shown], strict=True)
-        ],
-        mean=json_numbers(mean),
-        low=json_numbers(low),
-        high=json_numbers(high),
-        count=np.isfinite(values).sum(axis=0).tolist(),
-        unplaced=sum(run.id in unplaced for run in experiment.runs),
     )
 
 

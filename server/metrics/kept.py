@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from server.metrics.buckets import Buckets
 from server.metrics.lines import Line, grown
 from server.metrics.repository import MetricRepository
+from server.recent import Turns
 from server.runs.repository import PointsState
 
 _MAX_BYTES = 64 * 2**20
@@ -45,21 +46,23 @@ class KeptSeries:
 
     def __init__(self, max_bytes: int = _MAX_BYTES) -> None:
         self._max_bytes = max_bytes
+        self._turns = Turns()
         self._lock = threading.Lock()
         self._runs: OrderedDict[str, _Kept] = OrderedDict()
         self._bytes = 0
 
     def of(self, run: PointsState, repository: MetricRepository) -> dict[str, Buckets]:
-        """A run's series, by name; what has come since the last look is read, outside the lock.
+        """A run's series, by name; what has come since the last look is read, once for all who ask at once.
 
         Args:
             run: what its points depend on, as the repository's transaction sees it.
             repository: reads what is not known.
         """
-        with self._lock:
-            known = self._runs.get(run.run_id)
-        if known is None or known.state != run:
-            known = self._keep(run, self._read(run, known, repository))
+        with self._turns.of(run.run_id):
+            with self._lock:
+                known = self._runs.get(run.run_id)
+            if known is None or known.state != run:
+                known = self._keep(run, self._read(run, known, repository))
         return {name: line.buckets for name, line in known.lines.items()}
 
     def _read(self, run: PointsState, known: _Kept | None, repository: MetricRepository) -> dict[str, Line]:

@@ -269,8 +269,18 @@ class MetricRepository:
             for run_id, series in lines.items()
         }
 
+    def curves_by_summaries(
+        self, run_ids: Collection[str], names: Collection[str] | None = None
+    ) -> dict[str, dict[str, Buckets]]:
+        """The series, all or those named, as fine as they are known without the points of long ones, by run and name.
+
+        Good for any `SUMMARY_WIDTH` or less.
+        """
+        lines = self._lines(run_ids, names, by_summaries=True)
+        return {run_id: {name: line.buckets for name, line in series.items()} for run_id, series in lines.items()}
+
     def lines(self, run_id: str) -> dict[str, Line]:
-        """All of a run's series as fine as they are known without their points: good for any `SUMMARY_WIDTH` or less."""
+        """All of a run's series as `curves_by_summaries` has them, to be kept."""
         return sharing_places(self._lines([run_id], None, by_summaries=True)[run_id])
 
     def _lines(

@@ -111,14 +111,19 @@ def _numbers(name: str, buckets: Buckets) -> dict[str, object]:
 
 
 def json_numbers(values: NDArray[np.float64]) -> list[float | None]:
-    """The values with the seven digits that float32 has; null for nan."""
+    """The values, (n,), with the seven digits that float32 has; null for nan."""
+    return json_rows(values[None])[0]
+
+
+def json_rows(values: NDArray[np.float64]) -> list[list[float | None]]:
+    """`json_numbers` of each row of (rows, n): of many at once in a third of the time."""
     finite = np.isfinite(values)
     known = np.where(finite, values, 0.0)
     # Decimals that leave seven digits; of other sizes, which are rare, each number is written out.
     places = 6 - np.floor(np.log10(np.abs(np.where(known == 0.0, 1.0, known)))).astype(np.int64)
     usual = (places >= 0) & (places < _POWERS.size)
     scale = _POWERS[np.where(usual, places, 0)]
-    numbers: list[float | None] = (np.round(known * scale) / scale).tolist()
-    for index in np.flatnonzero(~(finite & usual)):
-        numbers[index] = float(f"{values[index]:.7g}") if finite[index] else None
-    return numbers
+    rows: list[list[float | None]] = (np.round(known * scale) / scale).tolist()
+    for row, index in np.argwhere(~(finite & usual)).tolist():
+        rows[row][index] = float(f"{values[row, index]:.7g}") if finite[row, index] else None
+    return rows
