@@ -77,6 +77,7 @@ class Tabs:
         self._cdp = browser.new_browser_cdp_session()
         context = browser.new_context()
         page = context.new_page()
+        page.set_default_navigation_timeout(1000 * patience)
         page.goto(f"{server.origin}/?token={server.token}")
         self._login = context.storage_state()
         context.close()
@@ -92,6 +93,7 @@ class Tabs:
         # The robots in 3D have a benchmark of their own (watching_overhead).
         context.route("**/live/**", lambda route: route.abort())
         page = context.new_page()
+        page.set_default_navigation_timeout(1000 * self._patience)
         page.add_init_script(_WATCH.replace("READY", ready))
         return page
 

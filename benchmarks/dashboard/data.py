@@ -91,6 +91,7 @@ class Lab:
         few: a long run with 50 checkpoints.
         many: a long run with many.
         stopped: long runs that can be resumed.
+        stopped_short: short ones, of the last two of `experiments`.
         live: queued runs.
         points: in the curves of all.
         bytes: that the database's file has grown by them.
@@ -103,6 +104,7 @@ class Lab:
     few: str = ""
     many: str = ""
     stopped: list[str] = field(default_factory=list)
+    stopped_short: list[str] = field(default_factory=list)
     live: list[str] = field(default_factory=list)
     points: int = 0
     bytes: int = 0
@@ -139,7 +141,8 @@ class _Maker:
             name = f"{_NAMES[index % len(_NAMES)]} {index}"
             experiment = self._experiment(name, TrainingConfig(), "completed")
             self._lab.experiments.append(experiment.id)
-            self._lab.short = experiment.runs[0].id
+            self._lab.short = self._lab.short or experiment.runs[0].id
+            self._lab.stopped_short = [*self._lab.stopped_short[-_SEEDS:], *(run.id for run in experiment.runs)]
         long = [self._experiment(f"Long {index}", TrainingConfig(), "completed") for index in range(sizes.long_experiments)]
         self._lab.long_experiments = [experiment.id for experiment in long]
         steps = max(sizes.points, sizes.long_points) * _STEPS_A_POINT
@@ -154,11 +157,12 @@ class _Maker:
         self._lab.stopped = [run.id for run in runs[2:]]
         self._checkpoints(self._lab.many, sizes.checkpoints, sizes.long_points)
         self._checkpoints(self._lab.few, min(50, sizes.checkpoints), sizes.long_points)
-        for run_id in self._lab.stopped:
-            # They go on from before their end: what lies beyond is dropped.
-            self._checkpoints(run_id, 1, int(0.95 * sizes.long_points))
+        # They go on from before their end: what lies beyond is dropped.
+        for run_ids, points in ((self._lab.stopped, sizes.long_points), (self._lab.stopped_short, sizes.points)):
+            for run_id in run_ids:
+                self._checkpoints(run_id, 1, int(0.95 * points))
         with self._database.write() as session:
-            for run_id in self._lab.stopped:
+            for run_id in (*self._lab.stopped, *self._lab.stopped_short):
                 session.get_one(tables.Run, run_id).state = "stopped"
 
     def _experiment(
@@ -186,7 +190,7 @@ class _Maker:
                     self._write(session, run_id, sizes.long_points if run_id in long else sizes.points)
         self._lab.bytes = self._file_bytes() - before
         for run_id in runs:
-            if run_id not in long:
+            if run_id not in long and run_id not in self._lab.stopped_short:
                 self._checkpoints(run_id, 1, sizes.points)
 
     def _write(self, session: Session, run_id: str, count: int) -> None:

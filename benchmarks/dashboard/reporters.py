@@ -4,55 +4,18 @@ import asyncio
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
+from benchmarks.dashboard.claims import claim
 from benchmarks.dashboard.data import SERIES
 from benchmarks.dashboard.server import WORKER_TOKEN, Server
-from workers.protocol import Batch, Claim, MetricItem
+from workers.protocol import Batch, MetricItem
 
 EVERY_SECONDS = 0.5
 _STEPS_A_REPORT = 512
-_CLAIMS_AT_ONCE = 10
-
-
-def claim(server: Server, run_id: str) -> Claim:
-    """Take up a queued run as a worker would."""
-    with server.client() as people:
-        attempt = people.get(f"/api/runs/{run_id}").raise_for_status().json()["attempt"]
-    return _claim(server, run_id, attempt)[0]
-
-
-def time_claims(server: Server, run_ids: Sequence[str]) -> tuple[list[float], list[float]]:
-    """Resume the runs, and take them up: the first half one by one, the others all at once.
-
-    Returns:
-        Milliseconds that each of the claims took, one by one and at once.
-    """
-    run_ids = run_ids[: 2 * _CLAIMS_AT_ONCE]
-    attempts = {}
-    with server.client() as people:
-        for run_id in run_ids:
-            attempts[run_id] = people.post(f"/api/runs/{run_id}/resume").raise_for_status().json()["attempt"]
-    half = len(run_ids) // 2
-    alone = [_claim(server, run_id, attempts[run_id])[1] for run_id in run_ids[:half]]
-    with ThreadPoolExecutor(_CLAIMS_AT_ONCE) as pool:
-        together = list(pool.map(lambda run_id: _claim(server, run_id, attempts[run_id])[1], run_ids[half:]))
-    return alone, together
-
-
-def _claim(server: Server, run_id: str, attempt: int) -> tuple[Claim, float]:
-    with server.client(WORKER_TOKEN) as worker:
-        worker.post("/api/worker/heartbeat", json={"worker": f"bench-{run_id}", "queue": "cpu"}).raise_for_status()
-        began = time.perf_counter()
-        answer = worker.post(
-            f"/api/worker/runs/{run_id}/claim", json={"worker": f"bench-{run_id}", "published_attempt": attempt}
-        )
-        took = 1000.0 * (time.perf_counter() - began)
-        return Claim.model_validate_json(answer.raise_for_status().content), took
 
 
 class Reporters:
