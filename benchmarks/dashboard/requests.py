@@ -28,6 +28,7 @@ from benchmarks.dashboard.server import serving
 from benchmarks.report import finish, parser
 from server.app import create_app
 from server.metrics.cache import AnswerCache
+from server.metrics.kept import KeptSeries
 from server.recent import Recent
 from server.services import Services
 from server.settings import Settings
@@ -80,7 +81,7 @@ async def _measure(folder: Path, asked: Mapping[str, Sequence[str]], rounds: int
             await _ask(app, addresses)
             first, again = [], []
             for _ in range(rounds):
-                services.compared, services.series, services.curves = Recent(8), Recent(4), AnswerCache()
+                services.compared, services.series, services.curves = Recent(8), KeptSeries(), AnswerCache()
                 before = statements.count
                 first.append(await _ask(app, addresses))
                 told = statements.count - before

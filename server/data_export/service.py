@@ -78,7 +78,7 @@ class DataExportService:
         Raises:
             NotFoundError: one of the experiments is missing.
         """
-        return ComparisonService(self._services).state(experiment_ids)
+        return (ComparisonService(self._services).state(experiment_ids),)
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
         """The data of one run.

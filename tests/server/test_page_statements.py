@@ -52,7 +52,7 @@ def trained(reports: Reports) -> list[dict[str, Any]]:
 
 def count(client: TestClient, services: Services, address: str) -> int:
     """Statements of an answer of which nothing is remembered."""
-    services.compared, services.series, services.curves = Recent(1), Recent(1), AnswerCache()
+    services.compared, services.series, services.curves = Recent(1), KeptSeries(), AnswerCache()
     with statements(services.database, of_requests=True) as asked:
         response = client.get(address)
     assert response.status_code == 200, response.text
