@@ -6,6 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.metrics.cache import AnswerCache
+from server.metrics.kept import KeptSeries
 from server.recent import Recent
 from server.services import Services
 from tests.server.harness import Reports
