@@ -64,7 +64,7 @@ class DataExportService:
             run = RunRepository(session).get(run_id)
             return state_of_runs(session, [run.experiment], [run])
 
-    def state_of_experiment(self, experiment_id: str) -> tuple[object, ...]:
+    def state_of_experiment(self, experiment_id: str) -> str:
         """What an experiment's document depends on.
 
         Raises:
@@ -72,13 +72,13 @@ class DataExportService:
         """
         return self.state_of_comparison([experiment_id])
 
-    def state_of_comparison(self, experiment_ids: Sequence[str]) -> tuple[object, ...]:
+    def state_of_comparison(self, experiment_ids: Sequence[str]) -> str:
         """What a comparison depends on, beside what is asked of it.
 
         Raises:
             NotFoundError: one of the experiments is missing.
         """
-        return (ComparisonService(self._services).state(experiment_ids),)
+        return ComparisonService(self._services).state(experiment_ids)
 
     def run(self, run_id: str, data_format: DataFormat) -> OutgoingFile:
         """The data of one run.
