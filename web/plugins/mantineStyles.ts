@@ -21,12 +21,22 @@ const LAYERED = join(import.meta.dirname, '../node_modules/@mantine/core/styles'
 const THEME = 'virtual:theme.css'
 const RESOLVED = `\0${THEME}`
 
+type Variables = Record<string, string>
+
+/** What Mantine's own sheet does not say already: repeated for one scheme, a default would win over our own for both. */
+const without = (defaults: Variables, all: Variables): Variables =>
+  Object.fromEntries(Object.entries(all).filter(([name, value]) => defaults[name] !== value))
+
 /** As `MantineCssVariables` writes them into each page. */
 function themeCss(): string {
   const whole = mergeMantineTheme(DEFAULT_THEME, theme)
-  const variables = deepMerge(defaultCssVariablesResolver(whole), cssVariables(whole))
-  const schemes = { dark: { '--mantine-color-scheme': 'dark' }, light: { '--mantine-color-scheme': 'light' } }
-  return convertCssVariables(deepMerge(variables, { variables: {}, ...schemes }))
+  const defaults = defaultCssVariablesResolver(DEFAULT_THEME)
+  const { variables, light, dark } = deepMerge(defaultCssVariablesResolver(whole), cssVariables(whole))
+  return convertCssVariables({
+    variables: without(defaults.variables, variables),
+    light: without(defaults.light, light),
+    dark: without(defaults.dark, dark),
+  })
 }
 
 export function mantineStyles(): Plugin {

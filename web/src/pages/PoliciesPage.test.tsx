@@ -87,9 +87,12 @@ test('a list that does not come says so', async () => {
   expect(await screen.findByText('The disk is full.')).toBeInTheDocument()
 })
 
-test('a policy drives at once, beside how it was made', async () => {
+test('a policy drives when one asks for it, beside how it was made', async () => {
   const server = startServer({ ...routes, 'PUT /api/policies/crowd/live': live })
   const { user } = open('/policies/crowd')
+  const watch = await screen.findByRole('button', { name: 'Watch it drive' })
+  expect(screen.queryByTitle('The robots in 3D')).not.toBeInTheDocument()
+  await user.click(watch)
   expect(await screen.findByTitle('The robots in 3D')).toHaveAttribute('src', '/live/policy-crowd/')
   expect(screen.getByText('python -m workers.shipped.build crowd')).toBeInTheDocument()
   expect(screen.getByText(/Step 250\s000 of 300\s000, the best on simple-200/)).toBeInTheDocument()
