@@ -223,7 +223,7 @@ test('one draws on a copy of any arena, and can take that back', async () => {
   start({ 'GET /api/arenas/fixed': { title: 'Complex', geometry } })
   const { router, user } = await draw(drawOn({ name: 'complex', movers }))
   await waitFor(() => expect(drawn()).toMatchObject({ name: 'Complex, changed', width: 12 }))
-  expect(router.state.location.search).toBe('')
+  await waitFor(() => expect(router.state.location.search).toBe(''))
   await user.click(screen.getByRole('button', { name: 'Undo' }))
   expect(screen.getByRole('textbox', { name: 'Width, m' })).toHaveValue('10')
 })
