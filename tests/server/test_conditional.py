@@ -190,7 +190,7 @@ MADE_BY = {
     "/api/runs/{run}/checkpoints/steps": "server.checkpoints.repository.CheckpointRepository.steps",
     "/api/runs/{run}/export?format=json": "server.data_export.service.document",
     "/api/compare?experiment={experiment}": "server.comparison.service.verdicts",
-    "/api/compare/curves?experiment={experiment}": "server.comparison.service.common_grid",
+    "/api/compare/curves?experiment={experiment}": "server.metrics.cache.AnswerCache.get",
     "/api/compare/export?experiment={experiment}": "server.comparison.service.common_grid",
     "/api/leaderboards": "server.leaderboards.service.boards",
     "/api/leaderboards/{suite_hash}": "server.leaderboards.service.ranked",
