@@ -56,14 +56,15 @@ def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) ->
     type_places(page, x=-0.3, y=0.05, Radius=0.4)
     expect(page.get_by_test_id("outcome")).not_to_contain_text(f"{straight:g} s", timeout=SOON)
 
-    ways = []
+    # It may have arrived before it was paused. The service is asked, not the page: where that draws slowly, too little would
+    # be seen of the way.
+    ways, before = [], context.request.get(address).json()
     page.get_by_role("button", name="Go on").click()
-    # The service is asked, not the page: where that draws slowly, too little would be seen of the way.
-    while (now := context.request.get(address).json())["arrivals"] == 0:
+    while (now := context.request.get(address).json())["arrivals"] == before["arrivals"]:
         ways.append((now["robot"]["x"], now["robot"]["y"]))
         page.wait_for_timeout(20)
-    expect(page.get_by_test_id("tally")).to_contain_text("1 arrived", timeout=SOON)
-    expect(page.get_by_test_id("tally")).to_contain_text("0 collided")
+    expect(page.get_by_test_id("tally")).to_contain_text(re.compile(r"[1-9]\d* arrived"), timeout=SOON)
+    assert now["collisions"] == before["collisions"]
     # The disc's edge is 0.35 m from the straight line on one side, 0.45 m on the other; the robot is 0.1 m wide.
     assert max(abs(y) for x, y in ways if abs(x + 0.3) < 0.4) > 0.4
 
