@@ -20,7 +20,7 @@ from pathlib import Path
 
 from benchmarks.dashboard.browser import Cost, Tabs, seen, tabs
 from benchmarks.dashboard.claims import claim_targets, measure_claims
-from benchmarks.dashboard.data import Lab, Sizes, make
+from benchmarks.dashboard.data import Lab, Sizes, ask_sizes, make
 from benchmarks.dashboard.pages import PAGES, Visit, visits, warming
 from benchmarks.dashboard.reporters import reporting
 from benchmarks.dashboard.server import Server, serving
@@ -140,11 +140,7 @@ def _targets(pages: Sequence[str]) -> dict[str, float]:
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     options = parser(__doc__)
-    sizes = Sizes()
-    options.add_argument("--experiments", type=int, default=sizes.experiments, help="finished ones of five short runs")
-    options.add_argument("--points", type=int, default=sizes.points, help="of each of the 20 series of a short run")
-    options.add_argument("--long-experiments", type=int, default=sizes.long_experiments, help="that are compared")
-    options.add_argument("--long-points", type=int, default=sizes.long_points, help="of each series of their runs")
+    sizes = ask_sizes(options)
     options.add_argument("--checkpoints", type=int, default=sizes.checkpoints, help="of the run that has many")
     options.add_argument("--live", type=int, default=sizes.live, help="runs that report")
     options.add_argument("--tabs", type=int, default=20, help="that look on meanwhile")

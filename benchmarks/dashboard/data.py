@@ -1,5 +1,6 @@
 """Makes a lab's database: experiments, runs, curves and checkpoints, written by the server's own repositories."""
 
+import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -78,6 +79,16 @@ class Sizes:
     long_points: int = 100_000
     checkpoints: int = 2_000
     live: int = 50
+
+
+def ask_sizes(options: argparse.ArgumentParser) -> Sizes:
+    """Add the options that say how many experiments there are and how long; the sizes where nobody says."""
+    sizes = Sizes()
+    options.add_argument("--experiments", type=int, default=sizes.experiments, help="finished ones of five short runs")
+    options.add_argument("--points", type=int, default=sizes.points, help="of each of the 20 series of a short run")
+    options.add_argument("--long-experiments", type=int, default=sizes.long_experiments, help="that are compared")
+    options.add_argument("--long-points", type=int, default=sizes.long_points, help="of each series of their runs")
+    return sizes
 
 
 @dataclass

@@ -22,7 +22,7 @@ from sqlalchemy import event
 from starlette.types import Message, Scope
 
 from benchmarks.dashboard.browser import tabs
-from benchmarks.dashboard.data import Lab, Sizes, make
+from benchmarks.dashboard.data import Lab, Sizes, ask_sizes, make
 from benchmarks.dashboard.pages import PAGES, visits
 from benchmarks.dashboard.server import serving
 from benchmarks.report import finish, parser
@@ -152,11 +152,7 @@ async def _get(app: FastAPI, address: str) -> None:
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     options = parser(__doc__)
-    sizes = Sizes()
-    options.add_argument("--experiments", type=int, default=sizes.experiments, help="finished ones of five short runs")
-    options.add_argument("--points", type=int, default=sizes.points, help="of each of the 20 series of a short run")
-    options.add_argument("--long-experiments", type=int, default=sizes.long_experiments, help="that are compared")
-    options.add_argument("--long-points", type=int, default=sizes.long_points, help="of each series of their runs")
+    ask_sizes(options)
     options.add_argument("--rounds", type=int, default=5, help="medians of so many count")
     options.add_argument("--pages", nargs="+", choices=PAGES, default=list(PAGES), help="that are measured")
     return options.parse_args(arguments)
