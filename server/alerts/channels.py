@@ -6,6 +6,7 @@ import ssl
 import time
 from email.message import EmailMessage
 from email.utils import formatdate
+from functools import cached_property
 
 import httpx
 
@@ -50,10 +51,6 @@ class Webhooks:
     def __init__(self, settings: Settings, lane: Lane) -> None:
         self._private = settings.alerts_private_addresses
         self._lane = lane
-        # No proxy: it would look the name up once more. No connection is kept: it is one host's, and looked up by address.
-        self._client = httpx.AsyncClient(
-            trust_env=False, timeout=SECONDS, follow_redirects=False, limits=httpx.Limits(max_keepalive_connections=0)
-        )
 
     async def post(self, letter: Letter, url: str, form: AlertFormat, secret: str) -> None:
         """Deliver a letter.
@@ -86,7 +83,18 @@ class Webhooks:
 
     async def close(self) -> None:
         """Let go of the connections."""
-        await self._client.aclose()
+        if "_client" in vars(self):
+            await self._client.aclose()
+
+    @cached_property
+    def _client(self) -> httpx.AsyncClient:
+        """Made when first needed: reading what it trusts is a fifth of the server's start, and few servers send anything.
+
+        No proxy: it would look the name up once more. No connection is kept: it is one host's, and looked up by address.
+        """
+        return httpx.AsyncClient(
+            trust_env=False, timeout=SECONDS, follow_redirects=False, limits=httpx.Limits(max_keepalive_connections=0)
+        )
 
     async def _post(self, url: str, content: bytes, headers: dict[str, str]) -> tuple[int, float]:
         parts = check_url(url)
