@@ -3,7 +3,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
-STACK_TESTS := tests/benchmarks tests/browser tests/services
+# Parts of the tests that run beside all the rest, each with services, ports and databases of its own.
+PARTS := browser services server
+TESTS_browser := tests/browser
+TESTS_services := tests/benchmarks tests/services
+TESTS_server := tests/server
 .PHONY: help run test check format lock pages types sbom
 
 help:
@@ -65,13 +69,16 @@ test: .venv/.dev pages .venv/.kernels
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
 else
-	@# In two halves side by side, one with whole services and a browser. AGAIN=5: up to so many that fail are tried once more, alone.
-	@log=$$(mktemp) && trap 'rm -f $$log' EXIT; \
-	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/stack $(STACK_TESTS) >$$log 2>&1 & stack=$$!; \
-	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/rest $(STACK_TESTS:%=--ignore=%); rest=$$?; \
-	wait $$stack; stack=$$?; cat $$log; worst=$$((rest > stack ? rest : stack)); \
+	@# In four parts side by side, of which some wait while others reckon. AGAIN=5: up to so many that fail are tried once more, alone.
+	@logs=$$(mktemp -d) && trap 'rm -rf $$logs' EXIT; started=; \
+	$(foreach part,$(PARTS),$(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(part) $(TESTS_$(part)) >$$logs/$(part) 2>&1 & \
+	started="$$started $(part)=$$!";) \
+	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/rest $(foreach part,$(PARTS),$(TESTS_$(part):%=--ignore=%)); worst=$$?; \
+	for part in $$started; do \
+	  wait $${part#*=}; ended=$$?; cat $$logs/$${part%=*}; [ $$ended -le $$worst ] || worst=$$ended; \
+	done; \
 	if [ $$worst -ne 1 ] || [ -z "$(AGAIN)" ]; then exit $$worst; fi; \
-	$(BIN)/python .ci/again.py $(AGAIN) .pytest_cache/stack .pytest_cache/rest
+	$(BIN)/python .ci/again.py $(AGAIN) $(PARTS:%=.pytest_cache/%) .pytest_cache/rest
 endif
 
 check: .venv/.dev pages
