@@ -5,6 +5,7 @@ import shutil
 import socket
 import uuid
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ import psycopg
 import pytest
 from hypothesis import settings
 
+from server.database.engine import Database
+from server.database.migrate import upgrade
 from sim.actions import action_layout
 from sim.config import TaskConfig
 from sim.observations import observation_layout
@@ -47,26 +50,96 @@ def require_program(name: str) -> None:
         pytest.skip(f"{name} is not installed")
 
 
-@pytest.fixture
-def postgres_url() -> Iterator[str]:
-    """SQLAlchemy URL of an empty PostgreSQL database that is gone after the test."""
+def _postgres() -> "psycopg.Connection[tuple[object, ...]]":
     require_service("PostgreSQL", *POSTGRES)
     host, port = POSTGRES
+    return psycopg.connect(host=host, port=port, user="postgres", dbname="postgres", autocommit=True)
+
+
+def _postgres_url(name: str) -> str:
+    host, port = POSTGRES
+    return f"postgresql+psycopg://postgres@{host}:{port}/{name}"
+
+
+def _create(template: str | None = None) -> str:
     name = f"mapless_test_{uuid.uuid4().hex[:12]}"
-    with psycopg.connect(host=host, port=port, user="postgres", dbname="postgres", autocommit=True) as connection:
-        connection.execute(f'CREATE DATABASE "{name}"'.encode())
-        try:
-            yield f"postgresql+psycopg://postgres@{host}:{port}/{name}"
-        finally:
-            connection.execute(f'DROP DATABASE "{name}" WITH (FORCE)'.encode())
+    with _postgres() as connection:
+        connection.execute(f'CREATE DATABASE "{name}" TEMPLATE "{template or "template1"}"'.encode())
+    return name
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
-def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """SQLAlchemy URL of an empty database: what asks for it runs on both kinds."""
+def _drop(name: str) -> None:
+    with _postgres() as connection:
+        connection.execute(f'DROP DATABASE "{name}" WITH (FORCE)'.encode())
+
+
+@pytest.fixture(scope="session")
+def let_go() -> Iterator[Callable[[str], None]]:
+    """Drops databases of PostgreSQL while the next tests run: its disk takes a second for each."""
+    dropped: list[Future[None]] = []
+    with ThreadPoolExecutor(1) as thread:
+        yield lambda name: dropped.append(thread.submit(_drop, name))
+    for each in dropped:
+        each.result()
+
+
+def _migrated(url: str) -> None:
+    database = Database(url)
+    upgrade(database)
+    database.dispose()
+
+
+@pytest.fixture(scope="session")
+def new_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A SQLite database with this version's tables and nothing in them, to be copied: migrations take a while."""
+    path = tmp_path_factory.mktemp("database") / "mapless.db"
+    _migrated(f"sqlite:///{path}")
+    return path
+
+
+@pytest.fixture(scope="session")
+def new_postgres(let_go: Callable[[str], None]) -> Iterator[str]:
+    """Name of such a database of PostgreSQL."""
+    name = _create()
+    _migrated(_postgres_url(name))
+    yield name
+    let_go(name)
+
+
+@pytest.fixture
+def empty_postgres_url(let_go: Callable[[str], None]) -> Iterator[str]:
+    """SQLAlchemy URL of a PostgreSQL database without tables that is gone after the test."""
+    name = _create()
+    yield _postgres_url(name)
+    let_go(name)
+
+
+@pytest.fixture
+def postgres_url(new_postgres: str, let_go: Callable[[str], None]) -> Iterator[str]:
+    """SQLAlchemy URL of a PostgreSQL database with this version's tables that is gone after the test."""
+    name = _create(new_postgres)
+    yield _postgres_url(name)
+    let_go(name)
+
+
+BOTH_KINDS = ["sqlite", pytest.param("postgresql", marks=pytest.mark.services)]
+
+
+@pytest.fixture(params=BOTH_KINDS)
+def database_url(request: pytest.FixtureRequest, tmp_path: Path, new_database: Path) -> str:
+    """SQLAlchemy URL of a database with this version's tables: what asks for it runs on both kinds."""
+    if request.param == "sqlite":
+        return f"sqlite:///{shutil.copy(new_database, tmp_path / 'test.db')}"
+    url: str = request.getfixturevalue("postgres_url")
+    return url
+
+
+@pytest.fixture(params=BOTH_KINDS)
+def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """SQLAlchemy URL of a database without tables, of both kinds."""
     if request.param == "sqlite":
         return f"sqlite:///{tmp_path / 'test.db'}"
-    url: str = request.getfixturevalue("postgres_url")
+    url: str = request.getfixturevalue("empty_postgres_url")
     return url
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,7 +19,6 @@ from benchmarks.chaos.recovery import Recovery
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.database.engine import Database
-from server.database.migrate import upgrade
 from server.files import StoredFile
 from server.metrics.repository import MetricRepository, ReportedRow
 from workers.checkpoints import read_checkpoint, write_checkpoint
@@ -44,10 +44,9 @@ ATTEMPTS = [
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Iterator[Database]:
+def database(tmp_path: Path, new_database: Path) -> Iterator[Database]:
     """What the service would have stored of `ATTEMPTS`."""
-    database = Database(f"sqlite:///{tmp_path / 'mapless.db'}")
-    upgrade(database)
+    database = Database(f"sqlite:///{shutil.copy(new_database, tmp_path)}")
     with database.write() as session:
         session.add(tables.Experiment(id="e", name="e", training={}))
         for run_id in (RUN, REFERENCE):

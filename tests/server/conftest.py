@@ -11,37 +11,35 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from server.app import create_app
-from server.database.engine import Database
-from server.database.migrate import upgrade
+from server.doorbell import prepare_broker
 from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
 from tests.server.job_worker import working
 
 
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings.model_validate(
-        {"data_dir": tmp_path / "data", "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": tmp_path / "dist"}
-    )
-
-
 @pytest.fixture(scope="session")
-def new_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A SQLite database with this version's tables and nothing in them."""
-    path = tmp_path_factory.mktemp("database") / "mapless.db"
-    database = Database(f"sqlite:///{path}")
-    upgrade(database)
-    database.dispose()
+def new_broker(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The embedded broker's file with its tables, to be copied."""
+    path = tmp_path_factory.mktemp("broker") / "broker.db"
+    prepare_broker(f"sqla+sqlite:///{path}", "")
     return path
 
 
 @pytest.fixture
-def app(settings: Settings, new_database: Path) -> FastAPI:
-    """Its migrations were run once, for all tests."""
-    if settings.database_url is None:
-        settings.data_dir.mkdir()
-        shutil.copy(new_database, settings.data_dir)
+def settings(tmp_path: Path, new_database: Path, new_broker: Path) -> Settings:
+    """Of a service that has been started once: its tables were made for all tests together."""
+    directory = tmp_path / "data"
+    directory.mkdir()
+    for file in (new_database, new_broker):
+        shutil.copy(file, directory)
+    return Settings.model_validate(
+        {"data_dir": directory, "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": tmp_path / "dist"}
+    )
+
+
+@pytest.fixture
+def app(settings: Settings) -> FastAPI:
     return create_app(settings)
 
 

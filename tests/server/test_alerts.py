@@ -25,7 +25,7 @@ from server.database import tables
 from server.metrics.repository import MetricRepository, ReportedRow
 from server.services import Services
 from server.settings import Settings
-from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+from tests.server.harness import BASE_URL, TOKEN, Reports
 from tests.server.people import Lab, launch
 from tests.server.receivers import HttpReceiver, SmtpReceiver, listening
 
@@ -34,13 +34,10 @@ DOCUMENTED = Path(__file__).parents[2] / "docs" / "alerts.md"
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def settings(settings: Settings) -> Settings:
     return Settings.model_validate(
-        {
-            "data_dir": tmp_path / "data",
-            "token": TOKEN,
-            "worker_token": WORKER_TOKEN,
-            "web_dist": tmp_path / "dist",
+        settings.model_dump(exclude_unset=True)
+        | {
             "alerts_private_addresses": True,
             "public_url": "https://lab.example/",
             "smtp_host": "127.0.0.1",

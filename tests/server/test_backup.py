@@ -3,6 +3,7 @@
 import asyncio
 import hashlib
 import json
+import shutil
 import time
 import zipfile
 from collections.abc import Callable
@@ -35,8 +36,8 @@ LATER = GRACE_SECONDS + 1
 
 
 @pytest.fixture
-def source(tmp_path: Path) -> Settings:
-    return installation(tmp_path / "source", f"sqlite:///{tmp_path / 'source.db'}")
+def source(tmp_path: Path, new_database: Path) -> Settings:
+    return installation(tmp_path / "source", f"sqlite:///{shutil.copy(new_database, tmp_path / 'source.db')}")
 
 
 @pytest.fixture

@@ -10,14 +10,12 @@ from sqlalchemy.exc import DBAPIError
 
 from server.database import tables
 from server.database.engine import Database, read_json
-from server.database.migrate import upgrade
 from server.errors import InvalidRequestError
 
 
 @pytest.fixture
 def database(database_url: str) -> Iterator[Database]:
     database = Database(database_url)
-    upgrade(database)
     yield database
     database.dispose()
 

@@ -65,9 +65,9 @@ def come_up(port: int, after: float) -> None:
 
 
 def test_a_database_server_that_is_not_up_yet_is_waited_for_and_said_so(
-    settings: Settings, postgres_url: str, free_port: int, caplog: pytest.LogCaptureFixture
+    settings: Settings, empty_postgres_url: str, free_port: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    url = make_url(postgres_url).set(port=free_port).render_as_string()
+    url = make_url(empty_postgres_url).set(port=free_port).render_as_string()
     server = threading.Thread(target=come_up, args=(free_port, 1.0))
     server.start()
     services = create_services(settings.model_copy(update={"database_url": url, "database_wait_seconds": 60.0}))

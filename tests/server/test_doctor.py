@@ -34,9 +34,9 @@ def free_port() -> int:
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def settings(settings: Settings) -> Settings:
     """Of an installation that was started before, whose server does not run now."""
-    settings = Settings.model_validate({"data_dir": tmp_path / "data", "port": free_port()})
+    settings = Settings.model_validate({"data_dir": settings.data_dir, "port": free_port()})
     create_services(settings).database.dispose()
     return settings
 

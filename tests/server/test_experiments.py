@@ -1,6 +1,8 @@
 """Launching, listing, stopping, resuming, renaming and deleting experiments."""
 
 import json
+import shutil
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,7 +14,6 @@ from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.database.engine import Database
-from server.database.migrate import upgrade
 from server.database.tables import RunState
 from server.events.bus import EventBus
 from server.events.changes import Change
@@ -211,10 +212,8 @@ run_states = st.sampled_from(["queued", "running", "stopping", "stopped", "compl
 
 
 @pytest.fixture(scope="module")
-def module_database(tmp_path_factory: pytest.TempPathFactory) -> Database:
-    database = Database(f"sqlite:///{tmp_path_factory.mktemp('states') / 'test.db'}")
-    upgrade(database)
-    return database
+def module_database(tmp_path_factory: pytest.TempPathFactory, new_database: Path) -> Database:
+    return Database(f"sqlite:///{shutil.copy(new_database, tmp_path_factory.mktemp('states'))}")
 
 
 @given(states=st.lists(run_states, min_size=1, max_size=5))

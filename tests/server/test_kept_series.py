@@ -1,5 +1,6 @@
 """Series that are looked at again grow by what was reported since, and are what a first look shows."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ from hypothesis import strategies as st
 
 from server.database import tables
 from server.database.engine import Database
-from server.database.migrate import upgrade
 from server.metrics.buckets import MAX_BUCKETS, Buckets
 from server.metrics.kept import KeptSeries
 from server.metrics.repository import MetricRepository, ReportedRow
@@ -19,11 +19,11 @@ EVERY_FIELD = ("steps", "sizes", "finite", "low", "mean", "high")
 
 
 @pytest.fixture(scope="module")
-def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def template(tmp_path_factory: pytest.TempPathFactory, new_database: Path) -> Path:
     """A database with one run in it."""
     path = tmp_path_factory.mktemp("kept") / "one.db"
+    shutil.copy(new_database, path)
     database = Database(f"sqlite:///{path}")
-    upgrade(database)
     with database.write() as session:
         session.add(tables.Experiment(id="e", name="e", training={}, runs=[tables.Run(id="r", seed=0, attempt=1)]))
     database.dispose()

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -16,7 +15,7 @@ from sqlalchemy import delete, event, func, select
 
 from server.database import tables
 from server.database.engine import Database
-from server.database.migrate import migration_config, upgrade
+from server.database.migrate import migration_config
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
 from server.metrics.points import Axis, Points
 from server.metrics.repository import MetricRepository, PackedSeries, ReportedRow
@@ -24,12 +23,10 @@ from server.metrics.service import json_numbers
 from server.services import Services
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.services)])
-def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
+@pytest.fixture
+def database(database_url: str) -> Iterator[Database]:
     """Each database that the service runs on, with one run in it."""
-    is_sqlite = request.param == "sqlite"
-    database = Database(f"sqlite:///{tmp_path / 'test.db'}" if is_sqlite else request.getfixturevalue("postgres_url"))
-    upgrade(database)
+    database = Database(database_url)
     with database.write() as session:
         session.add(tables.Experiment(id="e", name="e", training={}, runs=[tables.Run(id="r", seed=0)]))
     yield database

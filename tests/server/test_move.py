@@ -54,7 +54,7 @@ def pair(
     file = open_database(sqlite_url)
     if request.param == "to another file":
         return file, open_database(f"sqlite:///{tmp_path / 'other.db'}")
-    server = open_database(request.getfixturevalue("postgres_url"))
+    server = open_database(request.getfixturevalue("empty_postgres_url"))
     return (file, server) if request.param == "to PostgreSQL" else (server, file)
 
 
@@ -132,9 +132,9 @@ def test_a_database_of_an_older_version_arrives_as_one_of_this(pair: tuple[Datab
 
 @pytest.mark.services
 def test_a_text_that_the_other_database_refuses_is_named_and_nothing_is_left(
-    sqlite_url: str, postgres_url: str, open_database: Callable[[str], Database]
+    sqlite_url: str, empty_postgres_url: str, open_database: Callable[[str], Database]
 ) -> None:
-    source, target = open_database(sqlite_url), open_database(postgres_url)
+    source, target = open_database(sqlite_url), open_database(empty_postgres_url)
     upgrade(source)
     fill(source)
     with source.write() as session:

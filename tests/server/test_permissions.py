@@ -1,6 +1,7 @@
 """Every route and socket, asked by everybody: the table says what each takes, and a new one without an entry fails."""
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
@@ -386,10 +387,11 @@ def test_a_route_that_names_no_permission_does_not_start() -> None:
 
 @pytest.fixture(scope="module")
 def everybody(
-    tmp_path_factory: pytest.TempPathFactory,
+    tmp_path_factory: pytest.TempPathFactory, new_database: Path
 ) -> Iterator[tuple[TestClient, dict[str, dict[str, str]], dict[str, str]]]:
     """A service, the headers of everybody, and what the parameters of paths stand for."""
     folder: Path = tmp_path_factory.mktemp("lab")
+    shutil.copy(new_database, folder)
     settings = Settings.model_validate(
         {"data_dir": folder, "token": TOKEN, "worker_token": WORKER_TOKEN, "web_dist": folder / "dist"}
     )

@@ -5,6 +5,7 @@ import base64
 import hashlib
 import io
 import json
+import shutil
 import tarfile
 import time
 import zlib
@@ -62,13 +63,15 @@ class Server:
 
 
 @pytest.fixture
-def servers(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Server, Server]]:
+def servers(request: pytest.FixtureRequest, tmp_path: Path, new_database: Path) -> Iterator[tuple[Server, Server]]:
     """Two that know nothing of one another; on SQLite, unless a test says which of them is on PostgreSQL."""
     on_postgres = getattr(request, "param", None)
     with ExitStack() as stack:
 
         def server(name: str) -> Server:
             folder = tmp_path / name
+            folder.mkdir()
+            shutil.copy(new_database, folder)
             settings = Settings.model_validate(
                 {
                     "data_dir": folder,

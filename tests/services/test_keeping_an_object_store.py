@@ -235,7 +235,7 @@ def test_what_is_damaged_or_gone_is_not_moved_and_what_is_damaged_there_is_moved
 
 
 def test_a_lab_moves_with_all_it_has_and_trains_on(
-    ceph: ObjectStore, bucket: Callable[[], str], postgres_url: str, tmp_path: Path
+    ceph: ObjectStore, bucket: Callable[[], str], empty_postgres_url: str, tmp_path: Path
 ) -> None:
     """A training is backed up while it runs, restored elsewhere, moved to PostgreSQL, and trained to its end."""
     (tmp_path / "first").mkdir()
@@ -261,8 +261,8 @@ def test_a_lab_moves_with_all_it_has_and_trains_on(
         said = command(second, "restore", str(tmp_path / "mapless.backup"))
         assert "checkpoints, as they were on" in said
         database = f"sqlite:///{tmp_path / 'second' / 'data' / 'mapless.db'}"
-        command(second, "move", database, postgres_url)
-        second.environment["MAPLESS_DATABASE_URL"] = postgres_url
+        command(second, "move", database, empty_postgres_url)
+        second.environment["MAPLESS_DATABASE_URL"] = empty_postgres_url
         second.start_server()
         before = second.checkpoints(run_id)
         assert len(before) >= 2

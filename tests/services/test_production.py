@@ -38,8 +38,8 @@ def train_stop_resume(service: Service) -> None:
 
 
 @pytest.mark.services
-def test_postgresql_and_redis_carry_the_whole_path(tmp_path: Path, postgres_url: str, redis_url: str) -> None:
-    service = Service(tmp_path, MAPLESS_DATABASE_URL=postgres_url, MAPLESS_BROKER_URL=redis_url)
+def test_postgresql_and_redis_carry_the_whole_path(tmp_path: Path, empty_postgres_url: str, redis_url: str) -> None:
+    service = Service(tmp_path, MAPLESS_DATABASE_URL=empty_postgres_url, MAPLESS_BROKER_URL=redis_url)
     try:
         train_stop_resume(service)
     finally:
