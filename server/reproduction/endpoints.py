@@ -67,3 +67,9 @@ def stop_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Repr
 def resume_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Reproduction:
     """Go on with every run of the campaign that was stopped or has failed."""
     return service.resume(campaign_id)
+
+
+@router.post("/{campaign_id}/seeds", responses=NOT_FOUND | CONFLICT, dependencies=[edit("campaign_id")])
+def add_seeds_to_reproduction(campaign_id: str, service: ReproductionServiceDep) -> Reproduction:
+    """Train the rows whose intervals are wider than their margins with five more seeds each, up to forty."""
+    return service.add_seeds(campaign_id)

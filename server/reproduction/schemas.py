@@ -33,6 +33,9 @@ class CampaignRow(Schema):
 
     id: str
     method: str
+    instead_of: str | None = Field(
+        description="Id of the paper's row that it trains another way; claims are judged with it a second time."
+    )
     paper: TableRow
     ours: RowSpread | None = Field(description="Over the seeds that are done; null before the first.")
     experiment_id: str | None = Field(description="Null where nothing was launched, or it was deleted.")
@@ -87,3 +90,6 @@ class Reproduction(Schema):
     figures: list[PaperFigure]
     rows: list[CampaignRow]
     claims: list[Verdict]
+    wanted: dict[str, int] = Field(
+        description="How many seeds rows should have, by id, whose intervals are wider than their margins; at most forty."
+    )

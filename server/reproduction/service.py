@@ -134,6 +134,39 @@ class ReproductionService:
             self._runs.announce_queued(run)
         return self.get(campaign_id)
 
+    def add_seeds(self, campaign_id: str) -> Reproduction:
+        """Queue five more runs of every row whose intervals are wider than their margins.
+
+        Raises:
+            NotFoundError: there is no such campaign.
+            ConflictError: no row wants more, or it can't be told yet.
+        """
+        wanted = self.get(campaign_id).wanted
+        if not wanted:
+            raise ConflictError(
+                "No row of this campaign wants more seeds: its runs are not all done, it is a trial, its intervals are as "
+                "narrow as their margins, or its rows have forty."
+            )
+        with self._services.database.write() as session:
+            added = []
+            for experiment in ExperimentRepository(session).campaign(campaign_id):
+                there = {run.seed for run in experiment.runs}
+                runs = [
+                    tables.Run(id=new_id(), seed=seed)
+                    for seed in range(wanted.get(experiment.campaign_row or "", 0))
+                    if seed not in there
+                ]
+                experiment.runs.extend(runs)
+                added += runs
+            added.sort(key=lambda run: run.seed)
+            if added:
+                project = added[0].experiment.project_id
+                details = f"{len(added)} more runs"
+                AuditRepository(session).add("campaign.seeds_added", target=campaign_id, project_id=project, details=details)
+        for run in added:
+            self._runs.announce_queued(run)
+        return self.get(campaign_id)
+
     def delete(self, campaign_id: str) -> None:
         """Remove a campaign with everything that it has trained. Workers that still train for it are cut off.
 

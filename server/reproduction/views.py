@@ -18,9 +18,10 @@ from server.reproduction.schemas import (
 )
 from workers.config import TrainingConfig
 from workers.reproduction.pace import Share, seconds_left
-from workers.reproduction.results import RowSpread, SeedResult, learned_at, row_spread
+from workers.reproduction.results import Results, RowSpread, SeedResult, learned_at, row_spread
 from workers.reproduction.rows import CURVE, FIGURES, ROW_BY_ID, ROWS, TABLES, Row
 from workers.reproduction.verdict import Verdict, judge_all
+from workers.reproduction.widths import seeds_wanted
 from workers.statistics.differences import LEAST_SEEDS
 from workers.training.table import TableRow
 
@@ -48,7 +49,7 @@ def reproduction_view(
     """
     by_row = {experiment.campaign_row: experiment for experiment in experiments}
     trainings = {row: training_of(experiment) for row, experiment in by_row.items()}
-    results = {row.id: _results(by_row.get(row.id), trainings.get(row.id), latest, evaluations) for row in ROWS}
+    results = results_of(experiments, latest, evaluations)
     return Reproduction(
         campaign=campaign,
         campaigns=list(campaigns),
@@ -62,12 +63,41 @@ def reproduction_view(
         rows=[
             _row_view(row, by_row.get(row.id), trainings.get(row.id, row.training), latest, results[row.id]) for row in ROWS
         ],
-        claims=list(_judged(tuple((row, tuple(seeds)) for row, seeds in results.items()))),
+        claims=list(_judged(_frozen(results))),
+        wanted=wanted_seeds(experiments, results),
     )
 
 
+def results_of(experiments: Sequence[tables.Experiment], latest: Latest, evaluations: Mapping[str, Points]) -> Results:
+    """What the campaign's runs that are done have measured, by row; see `reproduction_view`."""
+    by_row = {experiment.campaign_row: experiment for experiment in experiments}
+    return {row.id: _results(by_row.get(row.id), latest, evaluations) for row in ROWS}
+
+
+def wanted_seeds(experiments: Sequence[tables.Experiment], results: Results) -> dict[str, int]:
+    """How many seeds rows should have whose intervals are too wide; none is said of a trial, or before all runs are done."""
+    if any(run.state != "completed" for experiment in experiments for run in experiment.runs):
+        return {}
+    if any(_effort(experiment, training_of(experiment)) < 1.0 for experiment in experiments):
+        return {}
+    trained = {experiment.campaign_row: len(experiment.runs) for experiment in experiments}
+    return _wanted(_frozen(results), tuple((row, count) for row, count in trained.items() if row in ROW_BY_ID))
+
+
+_FrozenResults = tuple[tuple[str, tuple[SeedResult, ...]], ...]
+
+
+def _frozen(results: Results) -> _FrozenResults:
+    return tuple((row, tuple(seeds)) for row, seeds in results.items())
+
+
 @lru_cache(maxsize=8)
-def _judged(results: tuple[tuple[str, tuple[SeedResult, ...]], ...]) -> tuple[Verdict, ...]:
+def _wanted(results: _FrozenResults, trained: tuple[tuple[str, int], ...]) -> dict[str, int]:
+    return seeds_wanted(dict(results), dict(trained))
+
+
+@lru_cache(maxsize=8)
+def _judged(results: _FrozenResults) -> tuple[Verdict, ...]:
     """The claims; intervals take a second, and what is done stays as it is."""
     return judge_all(dict(results))
 
@@ -143,14 +173,10 @@ def _progress(run: tables.Run, training: TrainingConfig) -> float:
     return 1.0 if run.state == "completed" else min(1.0, run.step / training.steps)
 
 
-def _results(
-    experiment: tables.Experiment | None,
-    training: TrainingConfig | None,
-    latest: Latest,
-    evaluations: Mapping[str, Points],
-) -> list[SeedResult]:
-    if experiment is None or training is None:
+def _results(experiment: tables.Experiment | None, latest: Latest, evaluations: Mapping[str, Points]) -> list[SeedResult]:
+    if experiment is None:
         return []
+    training = training_of(experiment)
     results = []
     for run in experiment.runs:
         measured = _measured(run, latest)
@@ -176,6 +202,7 @@ def _row_view(
     return CampaignRow(
         id=row.id,
         method=row.method,
+        instead_of=row.instead_of,
         paper=row.paper,
         ours=_spread_of(tuple(results)),
         experiment_id=experiment.id if experiment else None,

@@ -187,6 +187,7 @@ TABLE = {
         DELETE /api/reproduction/{campaign_id}
         POST /api/reproduction/{campaign_id}/stop
         POST /api/reproduction/{campaign_id}/resume
+        POST /api/reproduction/{campaign_id}/seeds
         POST /api/studies/{study_id}/stop
         POST /api/studies/{study_id}/resume
         POST /api/studies/{study_id}/extend

@@ -75,10 +75,12 @@ def test_before_the_first_campaign_there_is_the_paper_alone(client: TestClient) 
     assert reproduction["seconds"] == pytest.approx(5 * sum(row.seconds for row in ROWS))
 
 
-def test_launching_queues_six_experiments_and_rings_seed_by_seed(client: TestClient, doorbell: RecordingDoorbell) -> None:
+def test_launching_queues_an_experiment_a_row_and_rings_seed_by_seed(
+    client: TestClient, doorbell: RecordingDoorbell
+) -> None:
     reproduction = launch(client)
 
-    assert [len(row["runs"]) for row in reproduction["rows"]] == [5] * 6
+    assert [len(row["runs"]) for row in reproduction["rows"]] == [5] * len(ROWS)
     by_seed = [row["runs"][seed]["id"] for seed in range(5) for row in reproduction["rows"]]
     assert doorbell.rings == by_seed
     campaign = reproduction["campaign"]
@@ -96,7 +98,7 @@ def test_a_second_launch_is_refused_until_the_first_has_ended(client: TestClient
     refused = client.post("/api/reproduction", json={})
     assert refused.status_code == 409
     assert refused.json() == {"detail": "A campaign is not finished yet: wait for it, or cancel it first."}
-    assert client.get("/api/experiments").json()["total"] == 6
+    assert client.get("/api/experiments").json()["total"] == len(ROWS)
 
     stopped = client.post(f"/api/reproduction/{first}/stop").json()
     assert stopped["campaign"]["state"] == "stopped"
@@ -123,7 +125,7 @@ def test_stopped_and_failed_runs_go_on(client: TestClient, doorbell: RecordingDo
     doorbell.rings.clear()
     resumed = client.post(f"/api/reproduction/{campaign}/resume").json()
     assert {run["state"] for row in resumed["rows"] for run in row["runs"]} == {"queued"}
-    assert len(doorbell.rings) == 12
+    assert len(doorbell.rings) == 2 * len(ROWS)
 
 
 def test_the_finished_campaign_is_judged(client: TestClient, services: Services, settings: Settings) -> None:
@@ -175,6 +177,39 @@ def test_time_left_follows_the_workers_and_what_is_done(client: TestClient, serv
     assert later["progress"] == pytest.approx(done / total)
     # It took 40 seconds rather than what was foreseen, and so may the rest.
     assert later["seconds_left"] == pytest.approx((total - done) / 2 * 40.0 / done)
+
+
+def test_rows_with_wide_intervals_get_five_seeds_more(
+    client: TestClient, services: Services, doorbell: RecordingDoorbell
+) -> None:
+    """Success differs from seed to seed in one row only: its claims are too wide, with whatever it is compared with."""
+    reproduction = launch(client)
+    campaign = reproduction["campaign"]["id"]
+    seeds = f"/api/reproduction/{campaign}/seeds"
+    assert client.post(seeds).status_code == 409, "they are not through"
+    for row in reproduction["rows"]:
+        for run in row["runs"]:
+            complete(services, run, 0.5 + run["seed"] / 10 if row["id"] == "complex-basic-ddpg" else 1.0)
+
+    assert client.get("/api/reproduction").json()["wanted"] == {
+        "complex-basic-ddpg": 10, "complex-basic-resblock-ppo": 10, "complex-advanced-resblock-ppo": 10,
+    }  # fmt: skip
+    doorbell.rings.clear()
+    more = client.post(seeds).json()
+    assert [run["seed"] for run in row_of(more, "complex-basic-ddpg")["runs"]] == list(range(10))
+    assert len(row_of(more, "simple-basic-ddpg")["runs"]) == 5
+    assert len(doorbell.rings) == 15
+    assert (more["wanted"], more["campaign"]["state"], more["campaign"]["seeds"]) == ({}, "queued", 10)
+    assert client.post(seeds).status_code == 409
+    assert client.post("/api/reproduction/nothing/seeds").status_code == 404
+
+
+def test_a_trial_wants_no_seeds(client: TestClient, services: Services) -> None:
+    reproduction = launch(client, seeds=2, effort=0.01)
+    for row in reproduction["rows"]:
+        for run in row["runs"]:
+            complete(services, run, run["seed"] / 2)
+    assert client.get("/api/reproduction").json()["wanted"] == {}
 
 
 def test_a_deleted_row_is_missing_and_the_rest_stays(client: TestClient, services: Services) -> None:

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from sim.config import TaskConfig
 from workers.config import DdpgConfig
 from workers.presets import paper_ddpg
-from workers.reproduction.claims import CLAIMS, Claim, Comparison, Safety
+from workers.reproduction.claims import CLAIMS, AnyClaim, Comparison, Safety
 from workers.reproduction.curves import band, binned
 from workers.reproduction.drawing import draw_curves
 from workers.reproduction.pace import Share, seconds_left
 from workers.reproduction.results import SeedResult, Trained, learned_at, row_spread
-from workers.reproduction.rows import FIGURES, ROW_BY_ID, ROWS, STEPS, TABLES, scaled
+from workers.reproduction.rows import FIGURES, LOGIT_PENALTY, OTHER_WAY, PAPER_ROWS, ROW_BY_ID, ROWS, STEPS, TABLES, scaled
 from workers.reproduction.verdict import judge, judge_all
+from workers.reproduction.widths import seeds_wanted, too_wide
 from workers.training.drives import drive
 from workers.training.table import METRICS, TableRow
 
@@ -39,7 +40,7 @@ def seeds(
     ]
 
 
-def claim(identifier: str) -> Claim:
+def claim(identifier: str) -> AnyClaim:
     return next(one for one in CLAIMS if one.id == identifier)
 
 
@@ -47,7 +48,7 @@ def claim(identifier: str) -> Claim:
 
 
 def test_the_tables_hold_every_row_and_multiply_to_about_ten_thousand_steps() -> None:
-    assert {row for table in TABLES for row in table.rows} == set(ROW_BY_ID)
+    assert {row for table in TABLES for row in table.rows} == {row.id for row in PAPER_ROWS}
     assert [len(table.rows) for table in TABLES] == [3, 2, 3]
     for row in ROWS:
         assert 9_400 < row.paper.episodes * row.paper.steps < 10_010
@@ -74,6 +75,16 @@ def test_all_methods_of_a_figure_get_the_same_steps() -> None:
 def test_the_papers_ddpg_does_not_follow_the_forms_defaults() -> None:
     assert paper_ddpg().model_fields_set | {"name"} == set(DdpgConfig.model_fields)
     assert ROW_BY_ID["simple-basic-ddpg"].training.algorithm == paper_ddpg()
+
+
+def test_ddpg_is_trained_the_other_way_with_nothing_changed_but_its_penalty() -> None:
+    assert set(OTHER_WAY) == {row.id for row in PAPER_ROWS if row.method == "DDPG"}
+    for published, penalised in ((ROW_BY_ID[one], ROW_BY_ID[other]) for one, other in OTHER_WAY.items()):
+        assert (penalised.instead_of, penalised.paper) == (published.id, published.paper)
+        cured = published.training.algorithm.model_copy(update={"logit_penalty": LOGIT_PENALTY})
+        assert penalised.training == published.training.model_copy(update={"algorithm": cured})
+        # The cure is the one that our own recipe has.
+        assert DdpgConfig().logit_penalty == LOGIT_PENALTY
 
 
 def test_a_trial_has_a_part_of_the_steps_and_as_many_evaluations() -> None:
@@ -172,6 +183,60 @@ def test_fewer_steps_are_better() -> None:
     assert verdict.word == "holds"
     assert verdict.reason.startswith("50.0 steps per episode fewer, 95 % interval [-50.0, -50.0]")
     assert judge(one, {one.better: slow, one.worse: quick}).reason.startswith("50.0 steps per episode more")
+
+
+def test_what_is_said_of_ddpg_is_judged_both_ways() -> None:
+    one = claim("simple-success-ddpg")
+    assert isinstance(one, Comparison)
+    always, once_never = seeds(1, 1, 1, 1, 1), seeds(1, 1, 0, 1, 1)
+    verdict = judge(one, {one.better: always, one.worse: once_never, OTHER_WAY[one.worse]: always})
+    assert (verdict.word, verdict.rows) == ("can't be told", (one.better, one.worse))
+    assert verdict.other_way is not None
+    assert verdict.other_way.word == "does not hold"
+    assert verdict.other_way.reason.startswith("The two are equivalent within 1.0 points")
+    assert verdict.other_way.rows == (one.better, OTHER_WAY[one.worse])
+    # Not trained the other way, nothing is told of it; where no DDPG is compared there is no other way.
+    other = judge(one, {one.better: always, one.worse: once_never}).other_way
+    assert other is not None
+    assert other.reason == "No verdict below 5 seeds: 0 of 5 done."
+    assert judge(claim("simple-success-vanilla"), {}).other_way is None
+    assert judge(claim("safe"), {}).other_way is None
+
+
+# --- more seeds ---
+
+
+def spread_evenly(centre: float, reach: float, count: int) -> list[SeedResult]:
+    return seeds(*np.linspace(centre - reach, centre + reach, count).tolist())
+
+
+@pytest.mark.parametrize("better", [0.95, 0.75])
+def test_more_seeds_go_where_intervals_are_wide_whichever_way_they_point(better: float) -> None:
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    wide = {one.better: spread_evenly(better, 0.04, 5), one.worse: spread_evenly(0.75, 0.1, 5)}
+    # Steps, rewards and collisions do not differ from seed to seed: success alone is wide.
+    assert too_wide(wide) == {one.better, one.worse}
+    narrow = {row: spread_evenly(0.75 if row == one.worse else better, 0.002, 20) for row in wide}
+    assert too_wide(narrow) == frozenset()
+
+
+def test_an_interval_that_is_wide_only_the_other_way_counts() -> None:
+    one = claim("simple-success-ddpg")
+    assert isinstance(one, Comparison)
+    results = {one.better: seeds(*[1] * 5), one.worse: seeds(*[1] * 5), OTHER_WAY[one.worse]: seeds(1, 1, 0, 1, 1)}
+    assert too_wide(results) == {one.better, OTHER_WAY[one.worse]}
+
+
+def test_five_seeds_at_a_time_up_to_a_bound() -> None:
+    one = claim("complex-success")
+    assert isinstance(one, Comparison)
+    wide = {one.better: spread_evenly(0.9, 0.08, 5), one.worse: spread_evenly(0.75, 0.1, 5)}
+    assert seeds_wanted(wide, {one.better: 5, one.worse: 5, "another": 5}) == {one.better: 10, one.worse: 10}
+    # One that failed counts: what does not end well is not tried until it does.
+    assert seeds_wanted(wide, {one.better: 6, one.worse: 38}) == {one.better: 11, one.worse: 40}
+    assert seeds_wanted(wide, {one.better: 40, one.worse: 40}) == {}
+    assert seeds_wanted(wide, {one.better: 5, one.worse: 7}, at_most=7) == {one.better: 7}
 
 
 def test_who_never_learned_counts_as_having_learned_at_the_end() -> None:

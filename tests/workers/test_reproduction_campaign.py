@@ -8,11 +8,15 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
 from workers.errors import OtherTrainingError
-from workers.reproduction.campaign import SeedDone, Tick, reproduce
+from workers.reproduction.campaign import reproduce
+from workers.reproduction.curves import CURVE_BINS, binned
+from workers.reproduction.kept import read_figures, write_figures
+from workers.reproduction.outcome import SeedDone, Tick
 from workers.reproduction.recorder import METRICS, Recorder, read_records
 from workers.reproduction.report import write_report
 from workers.reproduction.results import Progress, Trained
@@ -130,9 +134,56 @@ def test_a_campaign_runs_rows_side_by_side_tells_how_it_stands_and_reports(tmp_p
     assert "| Vanilla PPO | paper | 3.34 | 23 | 30.43 | 419.69 | – | 30.43 |" in text
     assert "ours, 2 seeds" in text
     assert text.count("**Can't be told:**") == len(judge_all({}))
+    assert text.count("With DDPG's logit penalty: **can't be told.**") == sum(
+        one.other_way is not None for one in judge_all({})
+    )
+    assert "| | ours, logit penalty | not trained |" in text
     assert "Made by `mapless reproduce` on 2026-01-01: 4 trainings" in text
     assert f"- {bad.id} with seed 0 failed and is left out: the weights became" in text
     assert (page.parent / "images" / "reproduction.svg").read_text().startswith("<svg")
+
+
+def test_rows_with_wide_intervals_get_more_seeds_and_no_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A training of 2,000 steps arrives by luck: its interval stays wide. Which rows are wide is tested with the claims."""
+    row, other = tiny_row(), tiny_row().model_copy(update={"id": "told"})
+    monkeypatch.setattr("workers.reproduction.widths.too_wide", lambda results: frozenset({row.id}))
+    done, ticks = list[SeedDone](), list[Tick]()
+    outcome = reproduce(tmp_path, seeds=1, jobs=1, at_most=4, rows=[row, other], on_done=done.append, on_tick=ticks.append)
+    assert [one.result.seed for one in outcome.of_row(row.id)] == list(range(4))
+    assert len(outcome.of_row(other.id)) == 1
+    assert len(done) == 5, "nothing is trained twice"
+    assert (ticks[-1].finished, ticks[-1].trainings) == (5, 5)
+    assert ticks[-1].done == pytest.approx(1.0)
+
+
+def test_what_was_trained_elsewhere_is_not_trained_again(tmp_path: Path) -> None:
+    row = tiny_row(20_000)
+    first = reproduce(tmp_path / "there", seeds=2, jobs=1, rows=[row])
+    figures = tmp_path / "page.json"
+    write_figures(figures, first, [row])
+
+    known, seconds = read_figures(figures, [row])
+    assert seconds == first.seconds
+    done = list[SeedDone]()
+    again = reproduce(tmp_path / "here", seeds=3, jobs=1, known=known, rows=[row], on_done=done.append)
+    assert [one.seed for one in done] == [2]
+    assert [one.result for one in again.of_row(row.id)][:2] == [one.result for one in first.of_row(row.id)]
+    # Its curve is as it was drawn: thinned once, and not a second time.
+    edges = np.linspace(0.0, 20_000, CURVE_BINS + 1)
+    for before, after in zip(first.of_row(row.id), again.of_row(row.id), strict=False):
+        drawn, again_drawn = (binned(one.curve_steps, one.curve, edges) for one in (before, after))
+        np.testing.assert_allclose(again_drawn, drawn, atol=6e-4)
+    write_figures(tmp_path / "again.json", first, [row])
+    assert read_figures(tmp_path / "again.json", [row])[0] == known
+
+
+def test_figures_of_other_settings_or_of_nothing_are_refused(tmp_path: Path) -> None:
+    figures = tmp_path / "page.json"
+    with pytest.raises(OtherTrainingError, match=r"page\.json holds no figures"):
+        read_figures(figures, [tiny_row()])
+    write_figures(figures, reproduce(tmp_path / "there", seeds=1, jobs=1, rows=[tiny_row()]), [tiny_row()])
+    with pytest.raises(OtherTrainingError, match="trained with other settings"):
+        read_figures(figures, [tiny_row(3_000)])
 
 
 # The command with a campaign of one tiny row.
@@ -166,3 +217,4 @@ def test_ctrl_c_and_the_same_command_again(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*/seed-*/result.json"))) == 3
     assert all(path.stat().st_mtime_ns == at for path, at in finished.items())
     assert "ours, 3 seeds" in (tmp_path / "report.md").read_text()
+    assert len(json.loads((tmp_path / "report.json").read_text())["results"][ROWS[1].id]) == 3

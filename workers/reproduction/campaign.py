@@ -3,7 +3,8 @@
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -17,59 +18,16 @@ from sim.config import Frozen
 from sim.errors import SimError
 from workers.errors import InterruptedCampaignError, TrainingError
 from workers.processes import die_with_parent
+from workers.reproduction.outcome import Outcome, SeedDone, Tick
 from workers.reproduction.pace import Share, seconds_left
-from workers.reproduction.results import Progress, Trained
+from workers.reproduction.results import Progress
 from workers.reproduction.rows import ROWS, Row, scaled
+from workers.reproduction.widths import seeds_wanted
 
 _TIME = "campaign.json"
 # Numbers that a process tells of its training: before, done, seconds.
 _TOLD = 3
 _TICK_SECONDS = 0.5
-
-
-class SeedDone(Frozen):
-    """One row with one seed: trained, or failed for a reason."""
-
-    row: str
-    seed: int
-    trained: Trained | None
-    error: str | None = None
-
-
-class Tick(Frozen):
-    """How a campaign stands.
-
-    Attributes:
-        finished: trainings that are through.
-        trainings: all of them.
-        done: part of the work, 0 to 1.
-        seconds_left: to the end, about.
-    """
-
-    finished: int
-    trainings: int
-    done: float
-    seconds_left: float
-
-
-class Outcome(Frozen):
-    """A campaign that is through.
-
-    Attributes:
-        done: every row with every seed, by row and seed.
-        seeds: of each row.
-        effort: part of the rows' training steps.
-        seconds: wall time, that of interrupted attempts included.
-    """
-
-    done: tuple[SeedDone, ...]
-    seeds: int
-    effort: float
-    seconds: float
-
-    def of_row(self, row: str) -> list[Trained]:
-        """The row's trainings that did not fail, by seed."""
-        return [one.trained for one in self.done if one.row == row and one.trained is not None]
 
 
 class _Time(Frozen):
@@ -81,17 +39,21 @@ def reproduce(
     seeds: int,
     jobs: int,
     *,
+    at_most: int | None = None,
+    known: Sequence[SeedDone] = (),
     effort: float = 1.0,
     rows: Sequence[Row] = ROWS,
     on_done: Callable[[SeedDone], None] = lambda _: None,
     on_tick: Callable[[Tick], None] = lambda _: None,
 ) -> Outcome:
-    """Runs every row with seeds 0 to `seeds` - 1.
+    """Runs every row with seeds 0 to `seeds` - 1, and then with more where intervals are wide.
 
     Args:
         directory: of the campaign; one that was interrupted goes on where it was.
         seeds: of each row.
         jobs: trainings side by side, one process and one thread each.
+        at_most: seeds of a row: those whose comparisons are wider than their margins get five at a time up to this.
+        known: trainings that are not done again.
         effort: part of the rows' training steps, above 0, at most 1; below 1 it is a trial.
         rows: which.
         on_done: told of each training as it ends.
@@ -105,28 +67,46 @@ def reproduce(
     spent = directory / _TIME
     before = _Time.model_validate_json(spent.read_text()) if spent.exists() else _Time()
     begun = time.monotonic()
-    # Seed by seed: the first intervals can be looked at early.
-    tasks = [(row, seed) for seed in range(seeds) for row in rows]
+    found = {(one.row, one.seed): one for one in known}
+    counts: Mapping[str, int] = {row.id: seeds for row in rows}
     try:
-        found = {(one.row, one.seed): one for one in _run(directory, tasks, effort, jobs, on_done, on_tick)}
+        while counts:
+            # Seed by seed: the first intervals can be looked at early.
+            tasks = [
+                (row, seed)
+                for seed in range(max(counts.values()))
+                for row in rows
+                if seed < counts.get(row.id, 0) and (row.id, seed) not in found
+            ]
+            earlier = [row.seconds * effort for row in rows for one in found if one[0] == row.id]
+            for one in _run(directory, tasks, earlier, effort, jobs, on_done, on_tick):
+                found[one.row, one.seed] = one
+            counts = _more(found.values(), rows, at_most) if at_most is not None else {}
     finally:
         spent.write_text(_Time(seconds=before.seconds + time.monotonic() - begun).model_dump_json())
     return Outcome(
-        done=tuple(found[row.id, seed] for row in rows for seed in range(seeds)),
-        seeds=seeds,
+        done=tuple(found[key] for row in rows for key in sorted(found) if key[0] == row.id),
         effort=effort,
         seconds=before.seconds + time.monotonic() - begun,
     )
 
 
+def _more(found: Collection[SeedDone], rows: Sequence[Row], at_most: int) -> dict[str, int]:
+    results = {row.id: [one.trained.result for one in found if one.row == row.id and one.trained] for row in rows}
+    return seeds_wanted(results, Counter(one.row for one in found), at_most)
+
+
 def _run(
     directory: Path,
     tasks: Sequence[tuple[Row, int]],
+    earlier: Sequence[float],
     effort: float,
     jobs: int,
     on_done: Callable[[SeedDone], None],
     on_tick: Callable[[Tick], None],
 ) -> Iterator[SeedDone]:
+    if not tasks:
+        return
     # A fresh interpreter for each process: torch's threads do not survive a fork.
     context = get_context("spawn")
     told, stop = context.Array("d", _TOLD * len(tasks), lock=False), context.Event()
@@ -150,7 +130,7 @@ def _run(
                 finished += 1
                 on_done(one)
                 yield one
-            on_tick(_tick(told, [row.seconds * effort for row, _ in tasks], finished, jobs))
+            on_tick(_tick(told, [row.seconds * effort for row, _ in tasks], earlier, finished, jobs))
         if finished < len(tasks):
             raise InterruptedCampaignError("interrupted: the same command goes on where it was")
 
@@ -165,7 +145,8 @@ def _result(future: "Future[SeedDone | None]") -> SeedDone | None:
         ) from error
 
 
-def _tick(told: Any, expected: Sequence[float], finished: int, jobs: int) -> Tick:
+def _tick(told: Any, expected: Sequence[float], earlier: Sequence[float], finished: int, jobs: int) -> Tick:
+    """How the trainings of this round stand, those before it counted in, of which the expected seconds are known."""
     trainings = [Progress(before=told[at], done=told[at + 1], seconds=told[at + 2]) for at in range(0, len(told), _TOLD)]
     shares = [
         # What was done in an earlier attempt is no part of what is timed in this one.
@@ -176,8 +157,13 @@ def _tick(told: Any, expected: Sequence[float], finished: int, jobs: int) -> Tic
         )
         for one, seconds in zip(trainings, expected, strict=True)
     ]
-    done = sum(one.done * seconds for one, seconds in zip(trainings, expected, strict=True)) / sum(expected)
-    return Tick(finished=finished, trainings=len(trainings), done=done, seconds_left=seconds_left(shares, jobs))
+    done = sum(earlier) + sum(one.done * seconds for one, seconds in zip(trainings, expected, strict=True))
+    return Tick(
+        finished=len(earlier) + finished,
+        trainings=len(earlier) + len(trainings),
+        done=done / (sum(earlier) + sum(expected)),
+        seconds_left=seconds_left(shares, jobs),
+    )
 
 
 @contextmanager

@@ -9,6 +9,9 @@ from workers.statistics.seeds import means_band
 
 Floats = NDArray[np.float64]
 
+CURVE_BINS = 60
+"""Of a training's steps, in which its curve is drawn and kept."""
+
 
 def binned(steps: Sequence[int], values: Sequence[float], edges: Floats) -> Floats:
     """The mean of a curve between each two edges, (edges - 1,).

@@ -6,30 +6,29 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from workers.reproduction.curves import Floats, band, binned
+from workers.reproduction.curves import CURVE_BINS, Floats, band, binned
 from workers.reproduction.results import Trained
 from workers.reproduction.rows import FIGURES, ROW_BY_ID, Figure
 
-_BINS = 60
 _COLUMNS = 2
 _WIDTH, _HEIGHT = 460, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 62, 40
 _TICKS = 5
-_LEGEND_MARK, _LEGEND_LETTER = 44, 7
+_LEGEND_MARK, _LEGEND_LETTER, _LEGEND_TOP, _LEGEND_LINE = 44, 7, 40, 16
 
 # After Okabe and Ito (2008): told apart with any colour vision, and dark enough for white, light enough for black.
-_COLORS = {"ResBlock PPO": "a", "DDPG": "b", "Vanilla PPO": "c"}
+_COLORS = {"ResBlock PPO": "a", "DDPG": "b", "Vanilla PPO": "c", "DDPG, logit penalty": "d"}
 
 _STYLE = """
   .ground { fill: #ffffff } text { font: 12px system-ui, sans-serif; fill: #5d6870 }
   .title { font-size: 13px; font-weight: 600; fill: #1c2327 } .grid { stroke: #e4e8ea } .seed, .mean { fill: none }
   .seed { stroke-width: 0.7; opacity: 0.35 } .mean { stroke-width: 2 } .band { stroke: none; opacity: 0.16 }
-  .a { stroke: #0072b2 } .b { stroke: #d55e00 } .c { stroke: #00895e }
-  .band.a { fill: #0072b2 } .band.b { fill: #d55e00 } .band.c { fill: #00895e }
+  .a { stroke: #0072b2 } .b { stroke: #d55e00 } .c { stroke: #00895e } .d { stroke: #a2497f }
+  .band.a { fill: #0072b2 } .band.b { fill: #d55e00 } .band.c { fill: #00895e } .band.d { fill: #a2497f }
   @media (prefers-color-scheme: dark) {
     .ground { fill: #171b1f } text { fill: #97a1a9 } .title { fill: #dbe0e4 } .grid { stroke: #2a3036 }
-    .a { stroke: #56a9e8 } .b { stroke: #ff8b4d } .c { stroke: #2fc796 }
-    .band.a { fill: #56a9e8 } .band.b { fill: #ff8b4d } .band.c { fill: #2fc796 }
+    .a { stroke: #56a9e8 } .b { stroke: #ff8b4d } .c { stroke: #2fc796 } .d { stroke: #e08fc4 }
+    .band.a { fill: #56a9e8 } .band.b { fill: #ff8b4d } .band.c { fill: #2fc796 } .band.d { fill: #e08fc4 }
   }"""
 
 
@@ -63,7 +62,7 @@ def _panel(figure: Figure, trained: Mapping[str, Sequence[Trained]]) -> str:
     if not present:
         return f'{title}\n<text x="{_LEFT}" y="{_HEIGHT / 2:.0f}">not trained</text>'
     last = max(one.result.steps for row in present for one in trained[row])
-    edges = np.linspace(0.0, last, _BINS + 1)
+    edges = np.linspace(0.0, last, CURVE_BINS + 1)
     curves = {
         row: np.array([binned(one.curve_steps, one.curve, edges) for one in trained[row]], np.float64) for row in present
     }
@@ -72,13 +71,20 @@ def _panel(figure: Figure, trained: Mapping[str, Sequence[Trained]]) -> str:
     parts = [title, _axes(scale)]
     for row, values in curves.items():
         parts += _curve(_COLORS[ROW_BY_ID[row].method], centres, values, scale)
-    x = float(_LEFT)
-    for row in present:
-        method = ROW_BY_ID[row].method
-        parts.append(f'<path class="mean {_COLORS[method]}" d="M{x:.0f} 40h18"/>')
-        parts.append(f'<text x="{x + 24:.0f}" y="44">{escape(method)}</text>')
-        x += _LEGEND_MARK + _LEGEND_LETTER * len(method)
-    return "\n".join(parts)
+    return "\n".join((*parts, *_legend([ROW_BY_ID[row].method for row in present])))
+
+
+def _legend(methods: Sequence[str]) -> list[str]:
+    """In one line, or in two."""
+    parts, x, y = [], _LEFT, _LEGEND_TOP
+    for method in methods:
+        width = _LEGEND_MARK + _LEGEND_LETTER * len(method)
+        if x > _LEFT and x + width > _WIDTH - _RIGHT:
+            x, y = _LEFT, y + _LEGEND_LINE
+        parts.append(f'<path class="mean {_COLORS[method]}" d="M{x} {y - 4}h18"/>')
+        parts.append(f'<text x="{x + 24}" y="{y}">{escape(method)}</text>')
+        x += width
+    return parts
 
 
 class _Scale:

@@ -44,6 +44,11 @@ export function useActions() {
       '/api/reproduction/{campaign_id}/resume',
       settle('go on with the reproduction'),
     ),
+    addSeedsToReproduction: $api.useMutation(
+      'post',
+      '/api/reproduction/{campaign_id}/seeds',
+      settle('add seeds to the reproduction'),
+    ),
     deleteReproduction: $api.useMutation(
       'delete',
       '/api/reproduction/{campaign_id}',

@@ -2118,6 +2118,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/reproduction/{campaign_id}/seeds": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Seeds To Reproduction
+         * @description Train the rows whose intervals are wider than their margins with five more seeds each, up to forty.
+         */
+        post: operations["add_seeds_to_reproduction_api_reproduction__campaign_id__seeds_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/reproduction/{campaign_id}/stop": {
         parameters: {
             query?: never;
@@ -4608,6 +4628,11 @@ export interface components {
             experiment_id: string | null;
             /** Id */
             id: string;
+            /**
+             * Instead Of
+             * @description Id of the paper's row that it trains another way; claims are judged with it a second time.
+             */
+            instead_of: string | null;
             /** Method */
             method: string;
             /** @description Over the seeds that are done; null before the first. */
@@ -10413,6 +10438,13 @@ export interface components {
             /** Tables */
             tables: components["schemas"]["PaperTable"][];
             /**
+             * Wanted
+             * @description How many seeds rows should have, by id, whose intervals are wider than their margins; at most forty.
+             */
+            wanted: {
+                [key: string]: number;
+            };
+            /**
              * Workers
              * @description That are here.
              */
@@ -10685,6 +10717,31 @@ export interface components {
         RuleChange: {
             /** @description Null for the installation's. */
             rule: components["schemas"]["KeepRule-Input"] | null;
+        };
+        /**
+         * Ruling
+         * @description What is worked out of a claim.
+         *
+         *     Attributes:
+         *         word: holds, does not hold, or can't be told.
+         *         reason: why, with figures, as a sentence.
+         *         compatibility: whether the paper's effect can be ours; None where either has no number.
+         *         rows: that were looked at.
+         */
+        Ruling: {
+            compatibility: components["schemas"]["Compatibility"] | null;
+            /** Reason */
+            reason: string;
+            /**
+             * Rows
+             * @default []
+             */
+            rows: string[];
+            /**
+             * Word
+             * @enum {string}
+             */
+            word: "holds" | "does not hold" | "can't be told";
         };
         /**
          * Run
@@ -13053,12 +13110,9 @@ export interface components {
          *
          *     Attributes:
          *         id, statement, source: of the claim.
-         *         word: holds, does not hold, or can't be told.
-         *         reason: why, with figures, as a sentence.
-         *         compatibility: whether the paper's effect can be ours; None where either has no number.
          *         evidence: what the paper's own figures can carry, as a sentence; None where it gives none.
          *         reading: what of our reading may explain a difference; None where nothing is known.
-         *         rows: that were looked at.
+         *         other_way: the same claim with DDPG's logit penalty; None where no DDPG is compared.
          */
         Verdict: {
             compatibility: components["schemas"]["Compatibility"] | null;
@@ -13066,11 +13120,15 @@ export interface components {
             evidence: string | null;
             /** Id */
             id: string;
+            other_way: components["schemas"]["Ruling"] | null;
             /** Reading */
             reading: string | null;
             /** Reason */
             reason: string;
-            /** Rows */
+            /**
+             * Rows
+             * @default []
+             */
             rows: string[];
             /** Source */
             source: string;
@@ -18007,6 +18065,36 @@ export interface operations {
         };
     };
     resume_reproduction_api_reproduction__campaign_id__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                campaign_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Reproduction"];
+                };
+            };
+            400: components["responses"]["Unreadable"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            409: components["responses"]["Conflict"];
+            422: components["responses"]["Refused"];
+            429: components["responses"]["TooManyAttempts"];
+            503: components["responses"]["NotNow"];
+        };
+    };
+    add_seeds_to_reproduction_api_reproduction__campaign_id__seeds_post: {
         parameters: {
             query?: never;
             header?: never;

@@ -34,7 +34,7 @@ test('before the first campaign one button launches all of it, and says what it 
   })
   const { user } = open('/reproduction')
   const invitation = await screen.findByTestId('invitation')
-  expect(invitation).toHaveTextContent('10 trainings, about 16 min with 2 workers')
+  expect(invitation).toHaveTextContent('15 trainings, about 16 min with 2 workers')
   expect(screen.getByTestId('paper-table')).toHaveTextContent(/67\.8\s%/)
   await user.click(screen.getByRole('button', { name: 'Reproduce the paper' }))
   expect(server.changes).toEqual([{ route: 'POST /api/reproduction', body: { seeds: 5, effort: 1 } }])
@@ -51,7 +51,7 @@ test('while it goes on: progress, time left, each seed, and what has failed', as
     'aria-valuenow',
     '43',
   )
-  const [ddpg, resblock] = screen.getAllByTestId('seeds')
+  const [ddpg, , resblock] = screen.getAllByTestId('seeds')
   expect(
     within(resblock as HTMLElement).getByRole('link', { name: /Seed 0: 83\.0\s% success/ }),
   ).toHaveAttribute('href', '/runs/run1')
@@ -84,7 +84,19 @@ test('a sentence for each claim, with its word, its figures and the paper’s ow
   expect(holds).toHaveTextContent('59 of 63 against 59 of 87')
   expect(holds).toHaveTextContent('The paper’s effect, +25.8 points, lies inside our interval: compatible.')
   expect(open_).toHaveTextContent("can't be told")
+  expect(within(open_ as HTMLElement).queryByTestId('other-way')).toBeNull()
   expect(screen.getByTestId('told')).toHaveTextContent("1 hold · 0 do not hold · 1 can't be told")
+})
+
+test('what is said of DDPG stands a second time with its logit penalty', async () => {
+  startServer(routes)
+  open('/reproduction')
+  const other = await screen.findByTestId('other-way-row')
+  expect(other).toHaveTextContent(/^DDPG, logit penaltyours–+/)
+  const again = screen.getByTestId('other-way')
+  expect(again).toHaveAttribute('data-word', "can't be told")
+  expect(again).toHaveTextContent("With DDPG's logit penalty: can't be told")
+  expect(again).toHaveTextContent('2.1 points more, 95 % interval [-1.0, +5.2]')
 })
 
 test('the curves are those of the campaign’s experiments, named by method', async () => {
@@ -114,6 +126,25 @@ test('everything is cancelled with one button, and goes on with one', async () =
     'POST /api/reproduction/camp1/stop',
     'POST /api/reproduction/camp1/resume',
   ])
+})
+
+test('rows with wide intervals get more seeds with one button', async () => {
+  const wanted = { 'complex-resblock': 7, 'complex-ddpg': 7 }
+  const server = startServer({
+    ...routes,
+    [ROUTE]: { ...ended('completed'), wanted },
+    'POST /api/reproduction/camp1/seeds': () => {
+      server.routes[ROUTE] = reproduction
+      return Response.json(reproduction)
+    },
+  })
+  const { user } = open('/reproduction')
+  const more = await screen.findByRole('button', { name: 'More seeds' })
+  await user.hover(more)
+  expect(await screen.findByRole('tooltip')).toHaveTextContent('10 more trainings of 2 rows')
+  await user.click(more)
+  expect(server.changes.map((change) => change.route)).toEqual(['POST /api/reproduction/camp1/seeds'])
+  await waitFor(() => expect(screen.queryByRole('button', { name: 'More seeds' })).toBeNull())
 })
 
 test('a campaign is deleted with everything in it, once that is confirmed', async () => {

@@ -9,7 +9,7 @@ import { isRefusal } from '../api/errors'
 import type { Reproduction } from '../api/types'
 import { Below } from '../components/Below'
 import { DeleteDialog } from '../components/DeleteDialog'
-import { IconPlayerPlay, IconPlayerStop, IconRocket, IconTrash } from '../components/icons'
+import { IconPlayerPlay, IconPlayerStop, IconPlus, IconRocket, IconTrash } from '../components/icons'
 import { useLaunchProject } from '../components/people/useLaunchProject'
 import { CampaignState } from '../components/reproduction/CampaignState'
 import { Claims } from '../components/reproduction/Claims'
@@ -140,7 +140,7 @@ function Invitation({ reproduction: { seconds, workers, rows } }: { reproduction
 }
 
 function CampaignActions({
-  reproduction: { campaign, rows },
+  reproduction: { campaign, rows, wanted },
   onLaunched,
 }: {
   reproduction: Reproduction
@@ -151,6 +151,7 @@ function CampaignActions({
   if (!campaign) return null
   const states = rows.flatMap((row) => row.runs.map((run) => run.state))
   const of = { params: { path: { campaign_id: campaign.id } } }
+  const more = rows.reduce((sum, row) => sum + Math.max(0, (wanted[row.id] ?? 0) - row.runs.length), 0)
   if (isActive(campaign.state)) {
     return (
       <Button
@@ -175,6 +176,22 @@ function CampaignActions({
         >
           Go on
         </Button>
+      )}
+      {more > 0 && (
+        <Tooltip
+          multiline
+          w={300}
+          label={`${plural(more, 'more training')} of ${plural(Object.keys(wanted).length, 'row')}: those whose intervals are wider than their margins, whichever way they point`}
+        >
+          <Button
+            variant="default"
+            leftSection={<IconPlus size={16} />}
+            loading={actions.addSeedsToReproduction.isPending}
+            onClick={() => actions.addSeedsToReproduction.mutate(of)}
+          >
+            More seeds
+          </Button>
+        </Tooltip>
       )}
       <Button
         leftSection={<IconRocket size={16} />}

@@ -670,6 +670,7 @@ export const reproduction: Reproduction = {
     {
       id: 'complex-ddpg',
       method: 'DDPG',
+      instead_of: null,
       paper: { ...paperRow, reward: 11.23, success: 0.937 },
       ours: null,
       experiment_id: 'exp2',
@@ -681,6 +682,7 @@ export const reproduction: Reproduction = {
     {
       id: 'complex-resblock',
       method: 'ResBlock PPO',
+      instead_of: null,
       paper: paperRow,
       ours: {
         reward: spread(14.2),
@@ -695,6 +697,15 @@ export const reproduction: Reproduction = {
         campaignRun,
         { ...campaignRun, id: 'run2', seed: 1, state: 'running', progress: 0.55, measured: null },
       ],
+    },
+    {
+      id: 'complex-ddpg-penalised',
+      method: 'DDPG, logit penalty',
+      instead_of: 'complex-ddpg',
+      paper: { ...paperRow, reward: 11.23, success: 0.937 },
+      ours: null,
+      experiment_id: null,
+      runs: [],
     },
   ],
   claims: [
@@ -711,6 +722,12 @@ export const reproduction: Reproduction = {
       evidence: 'The paper: 59 of 63 against 59 of 87.',
       reading: null,
       rows: ['complex-ddpg', 'complex-resblock'],
+      other_way: {
+        word: "can't be told",
+        reason: '2.1 points more, 95 % interval [-1.0, +5.2]: 5 seeds show neither.',
+        compatibility: null,
+        rows: ['complex-ddpg-penalised', 'complex-resblock'],
+      },
     },
     {
       id: 'adapts',
@@ -722,6 +739,8 @@ export const reproduction: Reproduction = {
       evidence: null,
       reading: null,
       rows: [],
+      other_way: null,
     },
   ],
+  wanted: {},
 }

@@ -15,7 +15,7 @@ const POINTS = 150
 /** Between two looks at curves that grow: each reads up to fifteen runs. */
 const EVERY_MS = 10_000
 /** A method has one colour in all figures. */
-const COLORS = ['ResBlock PPO', 'DDPG', 'Vanilla PPO']
+const COLORS = ['ResBlock PPO', 'DDPG', 'Vanilla PPO', 'DDPG, logit penalty']
 
 export function PaperFigures({ reproduction }: { reproduction: Reproduction }) {
   return (

@@ -49,7 +49,16 @@ function OneTable({ table: paper, rows }: { table: PaperTable; rows: ReadonlyMap
           <Table.Tbody>
             {paper.rows.map((id, index) => {
               const row = rows.get(id)
-              return row && <Lines key={id} row={row} label={paper.labels[index] ?? row.method} />
+              return (
+                row && (
+                  <Lines
+                    key={id}
+                    row={row}
+                    label={paper.labels[index] ?? row.method}
+                    otherWay={[...rows.values()].find((one) => one.instead_of === id)}
+                  />
+                )
+              )
             })}
           </Table.Tbody>
         </Table>
@@ -58,20 +67,20 @@ function OneTable({ table: paper, rows }: { table: PaperTable; rows: ReadonlyMap
   )
 }
 
-function Lines({ row, label }: { row: CampaignRow; label: string }) {
-  const { paper, ours } = row
-  const done = row.runs.filter((run) => run.measured !== null).length
+interface LinesProps {
+  row: CampaignRow
+  label: string
+  /** The same method trained another way; undefined where it is trained one way. */
+  otherWay: CampaignRow | undefined
+}
+
+function Lines({ row, label, otherWay }: LinesProps) {
+  const { paper } = row
   return (
     <>
       <Table.Tr className={classes.paper} data-testid="paper-row">
         <Table.Td rowSpan={2} className={classes.method}>
-          {row.experiment_id ? (
-            <Anchor component={Link} to={`/experiments/${row.experiment_id}`} inherit>
-              {label}
-            </Anchor>
-          ) : (
-            label
-          )}
+          <Method row={row} label={label} />
         </Table.Td>
         <Table.Td>paper</Table.Td>
         <Figure text={paper.reward === null ? DASH : paper.reward.toFixed(2)} />
@@ -80,20 +89,57 @@ function Lines({ row, label }: { row: CampaignRow; label: string }) {
         <Figure text={paper.steps.toFixed(1)} />
         <Figure text={DASH} />
         <Table.Td rowSpan={2}>
-          <SeedStrip row={row} />
-          {ours && <div className={`${ui.quiet} ${classes.interval}`}>{ours.failed.sentence}</div>}
+          <Seeds row={row} />
         </Table.Td>
       </Table.Tr>
       <Table.Tr className={classes.ours} data-testid="our-row">
-        <Table.Td className={`${ui.quiet} ${ui.number}`}>
-          {done > 0 ? `ours, ${plural(done, 'seed')}` : 'ours'}
-        </Table.Td>
-        <Measured spread={ours?.reward} write={(value) => decimal(value, 2)} />
-        <Measured spread={ours?.episodes} write={(value) => decimal(value, 0)} />
-        <Measured spread={ours?.success} write={percent} />
-        <Measured spread={ours?.steps} write={(value) => decimal(value, 1)} />
-        <Measured spread={ours?.collisions} write={percent} />
+        <Ours row={row} />
       </Table.Tr>
+      {otherWay && (
+        <Table.Tr className={classes.ours} data-testid="other-way-row">
+          <Table.Td className={classes.otherWay}>
+            <Method row={otherWay} label={otherWay.method} />
+          </Table.Td>
+          <Ours row={otherWay} />
+          <Table.Td>
+            <Seeds row={otherWay} />
+          </Table.Td>
+        </Table.Tr>
+      )}
+    </>
+  )
+}
+
+function Method({ row, label }: { row: CampaignRow; label: string }) {
+  if (!row.experiment_id) return label
+  return (
+    <Anchor component={Link} to={`/experiments/${row.experiment_id}`} inherit>
+      {label}
+    </Anchor>
+  )
+}
+
+function Seeds({ row }: { row: CampaignRow }) {
+  return (
+    <>
+      <SeedStrip row={row} />
+      {row.ours && <div className={`${ui.quiet} ${classes.interval}`}>{row.ours.failed.sentence}</div>}
+    </>
+  )
+}
+
+function Ours({ row: { ours, runs } }: { row: CampaignRow }) {
+  const done = runs.filter((run) => run.measured !== null).length
+  return (
+    <>
+      <Table.Td className={`${ui.quiet} ${ui.number}`}>
+        {done > 0 ? `ours, ${plural(done, 'seed')}` : 'ours'}
+      </Table.Td>
+      <Measured spread={ours?.reward} write={(value) => decimal(value, 2)} />
+      <Measured spread={ours?.episodes} write={(value) => decimal(value, 0)} />
+      <Measured spread={ours?.success} write={percent} />
+      <Measured spread={ours?.steps} write={(value) => decimal(value, 1)} />
+      <Measured spread={ours?.collisions} write={percent} />
     </>
   )
 }
