@@ -23,7 +23,12 @@ from workers.networks.modules import build_network
 from workers.networks.squashing import bound_actions
 from workers.policy import Policy, torch_policy
 
-NETWORKS: list[Network] = [ResBlockNetwork(), MlpNetwork(), MlpNetwork(hidden_sizes=(8, 4), activation="tanh")]
+NETWORKS: list[Network] = [
+    ResBlockNetwork(),
+    ResBlockNetwork(concatenations=False),
+    MlpNetwork(),
+    MlpNetwork(hidden_sizes=(8, 4), activation="tanh"),
+]
 
 
 def make_checkpoint(network: Network) -> Checkpoint:

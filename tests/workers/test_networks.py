@@ -12,7 +12,7 @@ from tests.heads import head
 from workers.algorithms.flat import FlatParameters
 from workers.config import ConvNetwork, GruNetwork, MlpNetwork, Network, ResBlockNetwork
 from workers.kernels.networks import backward, forward, input_gradient
-from workers.networks.compiled import passes_of
+from workers.networks.compiled import is_compiled, passes_of
 from workers.networks.inputs import inputs_of
 from workers.networks.modules import GaussianActor, build_network
 
@@ -33,6 +33,20 @@ def test_resblock_has_the_papers_parameter_counts() -> None:
     actor = GaussianActor(build_network(ResBlockNetwork(), 16, 2), (0.2, 0.4))
     assert count(actor.network) == 50_354
     assert count(actor) == 50_354 + 2  # the two deviations
+
+
+def test_resblock_without_its_concatenations_is_the_same_layers_one_after_another() -> None:
+    """16 to 512 to 16 to 512 to 32 to the head: nothing goes round a layer."""
+    network = build_network(ResBlockNetwork(concatenations=False), 16, 1)
+    hidden = (16 * 512 + 512) + (512 * 16 + 16) + (16 * 512 + 512) + (512 * 32 + 32)
+    assert count(network) == hidden + (32 + 1)
+    with torch.no_grad():
+        for parameter in network.get_submodule("layer1").parameters():
+            parameter.zero_()
+    observations = torch.randn(5, 16)
+    assert torch.equal(network(observations), network(-observations)), "what the first layer drops is gone"
+    assert not is_compiled(network)
+    assert is_compiled(build_network(ResBlockNetwork(), 16, 1))
 
 
 def test_mlp_has_the_parameters_of_its_layers() -> None:

@@ -27,7 +27,7 @@ def is_compiled(*networks: nn.Module) -> bool:
     """Whether compiled passes are known for all of these networks, and they are on a CPU."""
     return all(
         isinstance(network, Described)
-        and isinstance(network.config, ResBlockNetwork | MlpNetwork)
+        and (isinstance(network.config, MlpNetwork) or network.config == ResBlockNetwork())
         and next(network.parameters()).device.type == "cpu"
         for network in networks
     )
@@ -39,7 +39,7 @@ def passes_of(network: nn.Module, rows: int) -> Passes:
     Its parameters and their gradients must be parts of two vectors and stay there: `FlatParameters` sees to both.
     """
     config = network.config if isinstance(network, Described) else None
-    assert isinstance(config, ResBlockNetwork | MlpNetwork), "others go by autograd"
+    assert isinstance(config, MlpNetwork) or config == ResBlockNetwork(), "others go by autograd"
     linear = [module for module in network.modules() if isinstance(module, nn.Linear)]
     weights = [layer.weight.numel() for layer in linear]
     layers = [

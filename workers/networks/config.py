@@ -27,6 +27,12 @@ class ResBlockNetwork(NetworkConfig):
     """The paper's network (tables 'PPO Critic network structure details'): two residual concatenations, 512 wide."""
 
     name: Literal["resblock"] = Field("resblock", title="ResBlock")
+    concatenations: bool = Field(
+        True,
+        title="Concatenations",
+        description="Off: the same layers one after another, to learn what the residual connections are worth.",
+        json_schema_extra=ADVANCED,
+    )
 
 
 class MlpNetwork(NetworkConfig):

@@ -77,6 +77,22 @@ def _of_extension(network: AddedFormulaNetworkConfig, inputs: Inputs, outputs: i
 
 def _resblock(network: ResBlockNetwork, inputs: Inputs, outputs: int) -> Description:
     size, wide = inputs.size, RESBLOCK_WIDTH
+    if not network.concatenations:
+        return Description(
+            lines=(
+                "a = leaky_relu(layer2(leaky_relu(layer1(x))))",
+                "b = leaky_relu(layer4(leaky_relu(layer3(a))))",
+                "y = head(b)",
+            ),
+            layers={
+                "layer1": (wide, size),
+                "layer2": (size, wide),
+                "layer3": (wide, size),
+                "layer4": (2 * size, wide),
+                "head": (outputs, 2 * size),
+            },
+            activation="leaky_relu",
+        )
     sizes = {"layer1": (wide, size), "layer2": (size, wide), "layer3": (wide, 2 * size), "layer4": (2 * size, wide)}
     return Description(
         lines=(

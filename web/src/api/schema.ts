@@ -10456,6 +10456,12 @@ export interface components {
          */
         "ResBlockNetwork-Input": {
             /**
+             * Concatenations
+             * @description Off: the same layers one after another, to learn what the residual connections are worth.
+             * @default true
+             */
+            concatenations: boolean;
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -10466,6 +10472,12 @@ export interface components {
          * @description The paper's network (tables 'PPO Critic network structure details'): two residual concatenations, 512 wide.
          */
         "ResBlockNetwork-Output": {
+            /**
+             * Concatenations
+             * @description Off: the same layers one after another, to learn what the residual connections are worth.
+             * @default true
+             */
+            concatenations: boolean;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
