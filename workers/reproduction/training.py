@@ -26,6 +26,7 @@ def train_in(
     seed: int,
     told: Callable[[Progress], None] = lambda _: None,
     stop_requested: Callable[[], bool] = lambda: False,
+    start: Path | None = None,
 ) -> Trained | None:
     """Trains and measures; done work is not done again.
 
@@ -35,6 +36,7 @@ def train_in(
         seed: with which.
         told: of its progress.
         stop_requested: asked between updates.
+        start: the archive of `training.start_from`, needed where that is set.
 
     Returns:
         The result; None where it was asked to stop, with a checkpoint to go on from.
@@ -55,7 +57,7 @@ def train_in(
         told(Progress(before=min(1.0, before / training.steps), done=part, seconds=time.monotonic() - begun))
 
     recorder = Recorder(folder, before if archive else -1, tell, stop_requested)
-    if train(training, seed, recorder, folder, archive) == "stopped":
+    if train(training, seed, recorder, folder, archive, start) == "stopped":
         return None
     trained = _read(folder, training, seed)
     partial = done.with_suffix(".part")
