@@ -55,7 +55,7 @@ def test_every_part_of_the_papers_observation_is_left_out_once_and_the_arena_cha
 ) -> None:
     """The real thing with 4,096 steps: nothing is learned, every table is whole, and the second run trains nothing."""
     algorithm = PpoConfig(network=MlpNetwork(hidden_sizes=(8,)), robots=32, rollout_steps=16, minibatch_size=256, epochs=1)
-    evaluation = EvaluationConfig(every_steps=2_048, drives=2, drive_steps=600)
+    evaluation = EvaluationConfig(every_steps=4_096, drives=1, drive_steps=400)
     tiny = {
         name: row.model_copy(
             update={
@@ -69,7 +69,7 @@ def test_every_part_of_the_papers_observation_is_left_out_once_and_the_arena_cha
     monkeypatch.setattr(observation, "ROW_BY_ID", tiny)
     monkeypatch.setattr(adaptation, "ROW_BY_ID", tiny)
     monkeypatch.setattr(adaptation, "AFTER_CHANGE", 4_096)
-    monkeypatch.setattr(adaptation, "EVALUATE_EVERY", 2_048)
+    monkeypatch.setattr(adaptation, "EVALUATE_EVERY", 4_096)
 
     trainings = Trainings(tmp_path, 2)
     parts = list(observation.observation(trainings))
