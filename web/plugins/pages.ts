@@ -7,6 +7,7 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs'
 import { join } from 'node:path'
 import type { Plugin, Rolldown } from 'vite'
 import { frameHtml } from '../src/frame'
+import { headOf } from '../src/heads'
 import { ROUTES } from '../src/routes'
 
 type Bundle = Rolldown.OutputBundle
@@ -45,6 +46,7 @@ export function pages(): Plugin {
       mkdirSync(join(dir, 'pages'), { recursive: true })
       const routes: [pattern: string, file: string][] = []
       for (const [path, name] of Object.entries(ROUTES)) {
+        const head = headOf(name)
         const { code, styles } = partsOf(bundle, name)
         const links = (rel: string, files: Iterable<string>) =>
           [...files]
@@ -54,7 +56,8 @@ export function pages(): Plugin {
         const page = html
           .replace('</head>', `${links('modulepreload', code)}</head>`)
           .replace(ROOT, `${links('stylesheet', styles)}${ROOT}`)
-          .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, '')))
+          .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, ''), head))
+          .replace('<title>Mapless', `<title>${head ? `${head.title} – ` : ''}Mapless`)
         writeFileSync(join(dir, 'pages', `${name}.html`), page)
         if (path !== '*') routes.push([patternOf(path), `${name}.html`])
       }

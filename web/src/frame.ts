@@ -1,4 +1,5 @@
 /** The header as the build writes it into every HTML (plugins/pages), and as the application draws it (components/Shell). */
+import { type Head, partsOf } from './heads'
 
 /** What the header leads to; where room is short, only what comes before the stroke is said. */
 export const NAVIGATION = [
@@ -28,8 +29,25 @@ export const SUN = [
 const icon = (paths: readonly string[]) =>
   `<svg viewBox="0 0 24 24" aria-hidden="true">${paths.map((d) => `<path d="${d}"/>`).join('')}</svg>`
 
-/** The header at the address `path`: its links lead, and its switch of the colour scheme works (public/frame.js). */
-export function frameHtml(path: string): string {
+const escaped = (text: string) => text.replace(/&/g, '&amp;').replace(/</g, '&lt;')
+
+/** A page's title and introduction, as `components/ui` draws them. */
+function headHtml({ title, about }: Head): string {
+  const said = partsOf(about ?? '').map(({ text, to, code }) => {
+    if (code) return `<code>${escaped(text)}</code>`
+    return to ? `<a href="${to}">${escaped(text)}</a>` : escaped(text)
+  })
+  return [
+    '<main class="frame-page"><div class="frame-top"><div class="frame-text">',
+    `<h1>${escaped(title)}</h1>${about ? `<p class="frame-about">${said.join('')}</p>` : ''}</div></div></main>`,
+  ].join('')
+}
+
+/**
+ * The header at the address `path`: its links lead, and its switch of the colour scheme works (public/frame.js). Below it
+ * the head of the page, where that is known.
+ */
+export function frameHtml(path: string, head?: Head): string {
   const links = NAVIGATION.map(([to, label]) => {
     const [short, rest] = label.split('|')
     const current = to === path ? ' aria-current="page"' : ''
@@ -44,6 +62,6 @@ export function frameHtml(path: string): string {
     `<a href="/alerts" class="frame-icon" aria-label="Alerts" title="Alerts">${icon(BELL)}</a>`,
     `<button type="button" class="frame-icon" data-scheme="dark" aria-label="Dark colours">${icon(MOON)}</button>`,
     `<button type="button" class="frame-icon" data-scheme="light" aria-label="Light colours">${icon(SUN)}</button>`,
-    '</div></header></div>',
+    `</div></header>${head ? headHtml(head) : ''}</div>`,
   ].join('')
 }

@@ -30,7 +30,7 @@ function FrameGone() {
 
 const selectorOf = (element: Element) =>
   element instanceof HTMLAnchorElement
-    ? `header a[href="${element.getAttribute('href')}"]:not([aria-label="Mapless, home"])`
+    ? `${element.closest('main') ? 'main' : 'header'} a[href="${element.getAttribute('href')}"]:not([aria-label="Mapless, home"])`
     : `[aria-label="${element.getAttribute('aria-label')}"]`
 
 // A transition: drawn in slices, between which the browser answers.

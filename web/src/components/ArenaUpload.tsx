@@ -5,6 +5,7 @@ import { useState } from 'react'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaView } from '../api/types'
+import { HEADS } from '../heads'
 import { arenaFacts } from '../lib/arenas'
 import { filesForUpload, type UploadFile } from '../lib/upload'
 import { ArenaDrawing } from './ArenaDrawing'
@@ -13,16 +14,6 @@ import { IconUpload } from './icons'
 import { Notice } from './ui'
 
 const ACCEPTED = '.yaml,.yml,.json,.world,.sdf,.pgm,.png,.cc'
-
-/** What can be imported. */
-export const ArenaFormats = () => (
-  <Text size="sm" c="dimmed" maw="90ch">
-    Imported are arenas in our own YAML or JSON, Gazebo worlds (.world, .sdf) with cylinders and boxes, and
-    ROS maps (the YAML file and its image, chosen together). What moves in a world comes with it: actors by
-    their trajectories, models that a plugin moves by its keyframes or its source (.cc), chosen together with
-    the world.
-  </Text>
-)
 
 interface ArenaUploadProps {
   /** Called with the hash of one that was kept. */
@@ -97,7 +88,11 @@ export function ArenaUpload({ onImported }: ArenaUploadProps) {
               {problem}
             </Notice>
           )}
-          {problem && <ArenaFormats />}
+          {problem && (
+            <Text size="sm" c="dimmed">
+              {HEADS.ArenasPage.about}
+            </Text>
+          )}
           <Group justify="flex-end">
             <Button variant="default" onClick={close}>
               {preview ? 'Cancel' : 'Close'}

@@ -8,34 +8,7 @@ import { IconAlertCircle, IconAlertTriangle } from './icons'
 import { endsOf, STATES } from './states'
 import classes from './ui.module.css'
 
-/** A page's frame: its title on the left, what can be done on the right. */
-export function Page({
-  title,
-  above,
-  below,
-  actions,
-  children,
-}: {
-  title: ReactNode
-  above?: ReactNode
-  below?: ReactNode
-  actions?: ReactNode
-  children: ReactNode
-}) {
-  return (
-    <div className={classes.page}>
-      <div className={classes.top}>
-        <div className={classes.topText}>
-          {above}
-          <Title order={1}>{title}</Title>
-          {below}
-        </div>
-        {actions}
-      </div>
-      {children}
-    </div>
-  )
-}
+export { Page } from './Page'
 
 export function Panel({
   title,

@@ -6,12 +6,13 @@ import { RuleTable } from '../alerts/RuleTable'
 import { SaidTable } from '../alerts/SaidTable'
 import { IconBell } from '../components/icons'
 import { Page, Panel } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 
 export function AlertsPage() {
-  useTitle('Alerts')
+  useTitle(HEADS.AlertsPage.title)
   return (
-    <Page title="Alerts" actions={<Permission />}>
+    <Page {...HEADS.AlertsPage} actions={<Permission />}>
       <Stack gap="md">
         <Panel title="New rule">
           <RuleForm />

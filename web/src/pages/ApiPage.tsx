@@ -1,11 +1,11 @@
 /** The API in words: how to begin, and every operation, from the description that the server writes of itself. */
-import { Anchor, Code, Group, Skeleton, Stack, Text, TextInput } from '@mantine/core'
+import { Group, Skeleton, Stack, Text, TextInput } from '@mantine/core'
 import { useQuery } from '@tanstack/react-query'
 import { useState } from 'react'
-import { Link } from 'react-router'
 import { errorOf } from '../api/errors'
 import { IconSearch } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
+import { HEADS } from '../heads'
 import { at } from '../lib/base'
 import { plural, words } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -38,7 +38,7 @@ interface Listed extends Operation {
 }
 
 export function ApiPage() {
-  useTitle('API')
+  useTitle(HEADS.ApiPage.title)
   const [search, setSearch] = useState('')
   const { data, error, refetch } = useQuery({
     queryKey: [DESCRIPTION],
@@ -51,23 +51,7 @@ export function ApiPage() {
   })
   const found = data ? operationsOf(data).filter((one) => isCalled(one, search)) : []
   return (
-    <Page
-      title="API"
-      below={
-        <Text size="sm" c="dimmed" mt={4} maw="80ch">
-          Everything on these pages goes over HTTP, and so it does from a program. Send a token as{' '}
-          <Code>Authorization: Bearer …</Code>;{' '}
-          <Anchor component={Link} to="/account" inherit>
-            your account
-          </Anchor>{' '}
-          makes one. The Python client and the commands do that for you. Programs read the same from{' '}
-          <Anchor href={DESCRIPTION} inherit>
-            openapi.json
-          </Anchor>
-          .
-        </Text>
-      }
-    >
+    <Page {...HEADS.ApiPage}>
       {error ? (
         <Panel>
           <QueryError error={error} what="description" retry={() => void refetch()} />

@@ -21,6 +21,7 @@ import { useGestures } from '../components/arena-editor/useGestures'
 import { useKeys, useUndoKeys } from '../components/arena-editor/useKeys'
 import { useView } from '../components/arena-editor/useView'
 import { Notice, Page, Panel } from '../components/ui'
+import { HEADS } from '../heads'
 import { arenaFromSearch } from '../lib/arenas'
 import { useTitle } from '../lib/hooks'
 
@@ -33,7 +34,7 @@ const BURGER = 0.2
 const SETTINGS: ToolSettings = { thickness: 0.1, door: 1, slides: false, kind: 'pedestrian' }
 
 export function ArenaEditorPage() {
-  useTitle('Draw an arena')
+  useTitle(HEADS.ArenaEditorPage.title)
   const draft = useDraft()
   const [starting, setStarting] = useState(false)
   const [tool, setTool] = useState<Tool>('select')
@@ -55,7 +56,7 @@ export function ArenaEditorPage() {
   const remarks = review?.remarks ?? []
   return (
     <Page
-      title="Draw an arena"
+      {...HEADS.ArenaEditorPage}
       actions={
         <div className={classes.row}>
           <Button variant="default" onClick={() => setStarting(true)}>

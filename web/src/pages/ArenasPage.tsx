@@ -7,10 +7,11 @@ import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaSummary } from '../api/types'
 import { ArenaCard } from '../components/ArenaCard'
-import { ArenaFormats, ArenaUpload } from '../components/ArenaUpload'
+import { ArenaUpload } from '../components/ArenaUpload'
 import { Below } from '../components/Below'
 import { IconPencil, IconSearch } from '../components/icons'
 import { Notice, Page, Panel, QueryError } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 import classes from './ArenasPage.module.css'
 
@@ -31,14 +32,13 @@ const FIRST = 24
 const CARD_HEIGHT = 330
 
 export function ArenasPage() {
-  useTitle('Arenas')
+  useTitle(HEADS.ArenasPage.title)
   const { data, error, refetch } = $api.useQuery('get', '/api/arenas')
   const [newest, setNewest] = useState<string>()
   const [deleting, setDeleting] = useState<ArenaSummary>()
   return (
     <Page
-      title="Arenas"
-      below={<ArenaFormats />}
+      {...HEADS.ArenasPage}
       actions={
         <Group gap="xs">
           <Button component={Link} to="/arenas/draw" leftSection={<IconPencil size={16} />}>

@@ -7,6 +7,7 @@ import { IconDownload } from '../components/icons'
 import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { Page, Panel } from '../components/ui'
+import { HEADS } from '../heads'
 import { at } from '../lib/base'
 import { dateTime } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -31,7 +32,7 @@ const KINDS = [
 ]
 
 export function AuditPage() {
-  useTitle('What was done')
+  useTitle(HEADS.AuditPage.title)
   const [page, setPage] = useState(1)
   const [typed, setTyped] = useState('')
   const [kind, setKind] = useState<string | null>(null)
@@ -42,7 +43,7 @@ export function AuditPage() {
   })
   return (
     <Page
-      title="What was done"
+      {...HEADS.AuditPage}
       actions={
         <Button
           component="a"

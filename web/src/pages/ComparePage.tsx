@@ -19,6 +19,7 @@ import ui from '../components/ui.module.css'
 import { labelsOf } from '../form/labels'
 import type { Schema } from '../form/schema'
 import { settingText } from '../form/settingText'
+import { HEADS } from '../heads'
 import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
@@ -34,7 +35,7 @@ const MARGIN = 0.02
 const [HEAD_PX, FIGURES_PX, VERDICTS_PX, DISTRIBUTIONS_PX] = [40, 86, 250, 280]
 
 export function ComparePage() {
-  useTitle('Compare')
+  useTitle(HEADS.ComparePage.title)
   const [search, setSearch] = useSearchParams()
   const chosen = search.getAll('experiment')
   const [picking, setPicking] = useState(false)
@@ -106,7 +107,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
   )
   return (
     <Page
-      title="Compare"
+      {...HEADS.ComparePage}
       below={
         <Text size="sm" c="dimmed" mt={4}>
           {plural(chosen.length, 'training')}, each in its colour everywhere

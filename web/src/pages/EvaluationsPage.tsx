@@ -10,6 +10,7 @@ import { OwnSuites } from '../components/evaluations/OwnSuites'
 import { PolicyUpload } from '../components/evaluations/PolicyUpload'
 import { Pager } from '../components/Pager'
 import { Message, Page, Panel, QueryError } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 
 const SIZE = 50
@@ -17,7 +18,7 @@ const SIZE = 50
 const EVERY_MS = 1_500
 
 export function EvaluationsPage() {
-  useTitle('Evaluations')
+  useTitle(HEADS.EvaluationsPage.title)
   const [page, setPage] = useState(1)
   const [search] = useSearchParams()
   const { data, error, refetch } = $api.useQuery(
@@ -28,7 +29,7 @@ export function EvaluationsPage() {
   )
   return (
     <Page
-      title="Evaluations"
+      {...HEADS.EvaluationsPage}
       actions={
         <Group gap="sm">
           <Button component={Link} to="/leaderboards" variant="default">

@@ -24,6 +24,7 @@ import type { Json, Schema } from '../form/schema'
 import { SearchContext, settingsOf, useSearchState } from '../form/search'
 import { type Form, useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
+import { HEADS } from '../heads'
 import { arenaFromSearch } from '../lib/arenas'
 import { BASE } from '../lib/base'
 import { suggestedName } from '../lib/experiments'
@@ -41,7 +42,7 @@ type ExperimentLaunch = components['schemas']['ExperimentLaunch']
 type StudyLaunch = components['schemas']['StudyLaunch']
 
 export function NewTrainingPage() {
-  useTitle('New training')
+  useTitle(HEADS.NewTrainingPage.title)
   const [search] = useSearchParams()
   const checkpoint = search.get('checkpoint')
   const start = $api.useQuery(
@@ -80,7 +81,7 @@ export function NewTrainingPage() {
   const key = checkpoint ?? from ?? (shipped ? `from ${shipped}` : like) ?? chosen ?? told ?? ''
 
   return (
-    <Page title="New training">
+    <Page {...HEADS.NewTrainingPage}>
       {error && !(form.data && initial) ? (
         <Panel>
           <QueryError

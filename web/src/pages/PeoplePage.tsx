@@ -11,6 +11,7 @@ import { Rows } from '../components/people/Rows'
 import { Secret } from '../components/people/Secret'
 import { useChange } from '../components/people/useChange'
 import { Page, Panel } from '../components/ui'
+import { HEADS } from '../heads'
 import { at } from '../lib/base'
 import { dateTime } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -18,14 +19,15 @@ import { useTitle } from '../lib/hooks'
 const SIZE = 50
 
 export function PeoplePage() {
-  useTitle('People and workers')
+  useTitle(HEADS.PeoplePage.title)
   const projects = $api.useQuery('get', '/api/projects', { params: { query: { limit: 200 } } })
   return (
-    <Page title="People and workers">
+    <Page {...HEADS.PeoplePage}>
       <Stack gap="md">
         <People />
         <Panel title="Invite">
-          {projects.data && <InviteForm projects={projects.data.items} administrators />}
+          {/* Made anew when the projects are there, one of which it begins with. */}
+          <InviteForm key={projects.status} projects={projects.data?.items ?? []} administrators />
         </Panel>
         <Invitations />
         <WorkerTokens />

@@ -12,6 +12,7 @@ import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { PolicyActions } from '../components/PolicyActions'
 import { Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { HEADS } from '../heads'
 import { inShort, summaryOf } from '../lib/experiments'
 import { percent } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -22,19 +23,12 @@ const CARD_HEIGHT = 240
 const WATCH: ToWatch = { watch: true }
 
 export function PoliciesPage() {
-  useTitle('Policies')
+  useTitle(HEADS.PoliciesPage.title)
   const { data, error, refetch } = $api.useQuery('get', '/api/policies', undefined, {
     staleTime: Number.POSITIVE_INFINITY,
   })
   return (
-    <Page
-      title="Policies"
-      below={
-        <Text size="sm" c="dimmed" mt={4}>
-          Trained policies that come with Mapless: to watch, to take away, to start from.
-        </Text>
-      }
-    >
+    <Page {...HEADS.PoliciesPage}>
       {error && !data ? (
         <Panel>
           <QueryError error={error} what="list of policies" retry={refetch} />

@@ -83,9 +83,9 @@ export function ProjectPage() {
             onChange={setPage}
           />
         </Panel>
-        {project && (
+        {(project || projects.isPending) && (
           <Panel title="Invite">
-            <InviteForm projects={[project]} />
+            <InviteForm key={project?.id ?? ''} projects={project ? [project] : []} />
           </Panel>
         )}
         <Invitations projectId={projectId} />

@@ -11,6 +11,7 @@ import { Pager } from '../components/Pager'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
 import { Page, Panel } from '../components/ui'
+import { HEADS } from '../heads'
 import { at } from '../lib/base'
 import { count, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
@@ -18,7 +19,7 @@ import { useTitle } from '../lib/hooks'
 const SIZE = 50
 
 export function ProjectsPage() {
-  useTitle('Projects')
+  useTitle(HEADS.ProjectsPage.title)
   const settle = useChange()
   const { data: account } = useAccount()
   const [page, setPage] = useState(1)
@@ -28,7 +29,7 @@ export function ProjectsPage() {
   })
   const create = $api.useMutation('post', '/api/projects', settle('add the project'))
   return (
-    <Page title="Projects">
+    <Page {...HEADS.ProjectsPage}>
       <Panel flush>
         {account?.administrates && (
           <Group

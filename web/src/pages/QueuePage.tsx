@@ -2,16 +2,17 @@
 import { Stack } from '@mantine/core'
 import { useAccount } from '../api/account'
 import { Page } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 import { Jobs } from '../queue/Jobs'
 import { Waiting } from '../queue/Waiting'
 import { Workers } from '../queue/Workers'
 
 export function QueuePage() {
-  useTitle('Queue and workers')
+  useTitle(HEADS.QueuePage.title)
   const administrates = useAccount().data?.administrates ?? false
   return (
-    <Page title="Queue and workers">
+    <Page {...HEADS.QueuePage}>
       <Stack gap="md">
         <Waiting />
         <Workers />

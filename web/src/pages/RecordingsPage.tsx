@@ -11,13 +11,14 @@ import { useChange } from '../components/people/useChange'
 import { RecordingUpload } from '../components/recordings/RecordingUpload'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { HEADS } from '../heads'
 import { age, dateTime, fileSize } from '../lib/format'
 import { useNow, useTitle } from '../lib/hooks'
 
 const SIZE = 50
 
 export function RecordingsPage() {
-  useTitle('From a robot')
+  useTitle(HEADS.RecordingsPage.title)
   const now = useNow()
   const settle = useChange()
   const [page, setPage] = useState(1)
@@ -27,7 +28,7 @@ export function RecordingsPage() {
   })
   const remove = $api.useMutation('delete', '/api/recordings/{recording_id}', settle('delete the recording'))
   return (
-    <Page title="From a robot">
+    <Page {...HEADS.RecordingsPage}>
       <Stack gap="md">
         <Panel>
           <RecordingUpload />

@@ -17,6 +17,7 @@ import { PaperFigures } from '../components/reproduction/PaperFigures'
 import { PaperTables } from '../components/reproduction/PaperTables'
 import { canResume, isActive } from '../components/states'
 import { Message, Page, Panel, QueryError } from '../components/ui'
+import { HEADS } from '../heads'
 import { age, dateTime, duration, plural } from '../lib/format'
 import { useNow, useTitle } from '../lib/hooks'
 
@@ -27,7 +28,7 @@ const EVERY_MS = 5_000
 const TRIAL = { seeds: 1, effort: 0.01 }
 
 export function ReproductionPage() {
-  useTitle('Reproduce the paper')
+  useTitle(HEADS.ReproductionPage.title)
   const [search, setSearch] = useSearchParams()
   const campaign = search.get('campaign')
   const { data, error, refetch } = $api.useQuery(
@@ -43,7 +44,7 @@ export function ReproductionPage() {
   const showNewest = () => setSearch({}, { replace: true })
   return (
     <Page
-      title="Reproduce the paper"
+      {...HEADS.ReproductionPage}
       below={
         <Text size="sm" c="dimmed" mt={4} maw="78ch">
           Taheri, Hosseini, Nekoui:{' '}

@@ -10,13 +10,14 @@ import { RuleDialog } from '../components/storage/RuleDialog'
 import { curveRuleInWords, ruleInWords } from '../components/storage/rules'
 import { Notice, Page, Panel } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { HEADS } from '../heads'
 import { count, fileSize, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
 const SIZE = 25
 
 export function StoragePage() {
-  useTitle('Storage')
+  useTitle(HEADS.StoragePage.title)
   const [page, setPage] = useState(1)
   const [chosen, choose] = useState<StoredExperiment | null>(null)
   const storage = $api.useQuery('get', '/api/storage', {
@@ -25,7 +26,7 @@ export function StoragePage() {
   const data = storage.data
   return (
     <Page
-      title="Storage"
+      {...HEADS.StoragePage}
       below={
         // Its place is kept: two lines on a phone.
         <Text size="sm" c="dimmed" mih={{ base: '2lh', sm: '1lh' }}>
@@ -139,9 +140,8 @@ export function StoragePage() {
         />
       )}
       <Text size="sm" c="dimmed" mt="md">
-        Of each run the newest checkpoint always stays, and so does what a training began with, what somebody
-        had evaluated, and what a run stands by on leaderboards. What a rule takes is gone after{' '}
-        {plural(data?.keep_days ?? 7, 'day')}; until then it can be kept after all.
+        What a rule takes is gone after {plural(data?.keep_days ?? 7, 'day')}; until then it can be kept after
+        all.
       </Text>
     </Page>
   )

@@ -10,6 +10,7 @@ import { StudyStateLabel } from '../components/studies/StudyStateLabel'
 import { goesOn, type ListedStudy, STUDY_STATES } from '../components/studies/study'
 import { Message, Page, Panel, ProgressBar, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { HEADS } from '../heads'
 import { age, dateTime, percent } from '../lib/format'
 import { useNow, useTitle } from '../lib/hooks'
 
@@ -18,7 +19,7 @@ const SIZE = 50
 const EVERY_MS = 3_000
 
 export function StudiesPage() {
-  useTitle('Studies')
+  useTitle(HEADS.StudiesPage.title)
   const [page, setPage] = useState(1)
   const { data, error, refetch } = $api.useQuery(
     'get',
@@ -27,7 +28,7 @@ export function StudiesPage() {
     { refetchInterval: (query) => (query.state.data?.items.some(goesOn) ? EVERY_MS : false) },
   )
   return (
-    <Page title="Studies">
+    <Page {...HEADS.StudiesPage}>
       <Panel flush>
         {error && !data ? (
           <QueryError error={error} what="list of studies" retry={refetch} />

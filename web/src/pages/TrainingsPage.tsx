@@ -4,6 +4,7 @@ import { useState } from 'react'
 import { Link } from 'react-router'
 import { IconPlus, IconRobot } from '../components/icons'
 import { Message, Page } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 import { ChosenBar, useAct } from '../workbench/ChosenBar'
 import { Trainings } from '../workbench/Trainings'
@@ -11,13 +12,13 @@ import { ViewsMenu } from '../workbench/ViewsMenu'
 import { useView } from '../workbench/view'
 
 export function TrainingsPage() {
-  useTitle('Trainings')
+  useTitle(HEADS.TrainingsPage.title)
   const [view, setView] = useView()
   const [ticked, setTicked] = useState<readonly string[]>([])
   const { act } = useAct()
   return (
     <Page
-      title="Trainings"
+      {...HEADS.TrainingsPage}
       actions={
         <Button component={Link} to="/new" leftSection={<IconPlus size={16} />}>
           New training

@@ -1,5 +1,5 @@
 /** Which policies are to be measured on which suites. */
-import { Button, Group, MultiSelect, Stack, Text } from '@mantine/core'
+import { Button, Group, MultiSelect, Stack } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
@@ -191,9 +191,6 @@ export function AskForm() {
         <Button type="submit" disabled={policies.length === 0} loading={ask.isPending}>
           {policies.length === 0 ? 'Evaluate' : `Evaluate, ${plural(many, 'time')}`}
         </Button>
-        <Text size="xs" c="dimmed">
-          Some seconds each, beside trainings; what is measured already is not measured again.
-        </Text>
       </Group>
     </Stack>
   )

@@ -1,0 +1,97 @@
+/**
+ * What stands at the head of the pages that are called the same for everybody: the build writes it into their HTML
+ * (plugins/pages), where it is read before any script has come, and the application draws the same (components/ui).
+ */
+import type { ROUTES } from './routes'
+
+type PageName = (typeof ROUTES)[keyof typeof ROUTES]
+
+export interface Head {
+  title: string
+  /** What the page is for. In it `code`, and [links](/to) within the pages and without. */
+  about?: string
+}
+
+export const HEADS = {
+  TrainingsPage: {
+    title: 'Trainings',
+    about:
+      'What robots learn now and have learned: how far each training is, and how well its robots arrive.',
+  },
+  NewTrainingPage: {
+    title: 'New training',
+    about:
+      'What is to be learned, where, and for how long. Every setting has a value that works: only what matters to you needs a change.',
+  },
+  ComparePage: { title: 'Compare' },
+  PoliciesPage: {
+    title: 'Policies',
+    about: 'Trained policies that come with Mapless: to watch, to take away, to start from.',
+  },
+  ArenasPage: {
+    title: 'Arenas',
+    about:
+      'Imported are arenas in our own YAML or JSON, Gazebo worlds (.world, .sdf) with cylinders and boxes, and ROS maps (the YAML ' +
+      'file and its image, chosen together). What moves in a world comes with it: actors by their trajectories, models that a ' +
+      'plugin moves by its keyframes or its source (.cc), chosen together with the world.',
+  },
+  ArenaEditorPage: {
+    title: 'Draw an arena',
+    about:
+      'Walls, boxes, people and where robots start: draw them, see at once whether every target can be reached, and train in it.',
+  },
+  QueuePage: { title: 'Queue and workers' },
+  EvaluationsPage: {
+    title: 'Evaluations',
+    about:
+      'How well policies do where you want to know it: some seconds each, beside trainings. What is measured already is not measured again.',
+  },
+  RecordingsPage: { title: 'From a robot' },
+  StudiesPage: { title: 'Studies' },
+  ReproductionPage: { title: 'Reproduce the paper' },
+  ProjectsPage: { title: 'Projects' },
+  AlertsPage: {
+    title: 'Alerts',
+    about:
+      'Be told when a training ends, fails or stands still: on these pages, and by the channels of the server.',
+  },
+  PeoplePage: { title: 'People and workers' },
+  StoragePage: {
+    title: 'Storage',
+    about:
+      'Of each run the newest checkpoint always stays, and so does what a training began with, what somebody had evaluated, and ' +
+      'what a run stands by on leaderboards.',
+  },
+  AuditPage: { title: 'What was done' },
+  ApiPage: {
+    title: 'API',
+    about:
+      'Everything on these pages goes over HTTP, and so it does from a program. Send a token as `Authorization: Bearer …`; ' +
+      '[your account](/account) makes one. The Python client and the commands do that for you. Programs read the same from ' +
+      '[openapi.json](/api/openapi.json).',
+  },
+} as const satisfies Partial<Record<PageName, Head>>
+
+/** Of the page of this name; none where each has a title of its own. */
+export const headOf = (page: string): Head | undefined => (HEADS as Partial<Record<string, Head>>)[page]
+
+export interface Part {
+  text: string
+  to?: string | undefined
+  code?: boolean
+}
+
+const MARKED = /`([^`]+)`|\[([^\]]+)\]\(([^)]+)\)/
+
+/** An introduction as it is drawn: text, code and links. */
+export function partsOf(about: string): Part[] {
+  const marked = MARKED.exec(about)
+  if (!marked) return about ? [{ text: about }] : []
+  const [all, code, text, to] = marked
+  const before = about.slice(0, marked.index)
+  return [
+    ...(before ? [{ text: before }] : []),
+    code ? { text: code, code: true } : { text: text ?? '', to },
+    ...partsOf(about.slice(marked.index + all.length)),
+  ]
+}
