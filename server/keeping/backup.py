@@ -2,7 +2,8 @@
 
 A zip: the database's rows as `tables/NAME.jsonl`, one JSON list each; every checkpoint's archive as it lies in the store;
 imported arenas; the two tokens where they are kept in the data directory; and `manifest.json` with the SHA-256 of all of it.
-Recordings and bundles are not in it: they are made again when somebody asks.
+Robots' recordings are rows like others. Recordings of evaluations and bundles are not in it: they are made again when
+somebody asks.
 """
 
 import hashlib

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from server.audit.repository import AuditRepository
+from server.bags.schemas import MAX_BAG_BYTES
 from server.checkpoints.archives import LooseArchives, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
@@ -25,7 +26,7 @@ from server.files import StoredFile
 from server.metrics.buckets import BUCKET_BYTES, MAX_BUCKETS, Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository, PackedSeries
-from server.project_archives.others import take_arena, take_evaluation, take_policy
+from server.project_archives.others import take_arena, take_evaluation, take_policy, take_recording
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import (
     ArchivedAskedEvaluation,
@@ -35,6 +36,7 @@ from server.project_archives.schemas import (
     ArchivedLog,
     ArchivedPoints,
     ArchivedPolicy,
+    ArchivedRecording,
     ArchivedRun,
     ArchivedStudy,
     ArchiveManifest,
@@ -59,9 +61,16 @@ MAX_RUNS = 10_000
 """Of one archive."""
 
 MAX_OTHERS = 10_000
-"""Of arenas, policies and evaluations of one archive."""
+"""Of arenas, policies, recordings and evaluations of one archive."""
 
-_OTHERS: dict[str, Kind] = {"arenas": "arena", "policies": "policy", "evaluations": "evaluation"}
+_OTHERS: dict[str, Kind] = {
+    "arenas": "arena",
+    "policies": "policy",
+    "recordings": "recording",
+    "evaluations": "evaluation",
+}
+# Of those that have a file beside their document: how it ends, and its most bytes.
+_FILES: dict[Kind, tuple[str, int]] = {"policy": ("onnx", MAX_FILE_BYTES), "recording": ("bag", MAX_BAG_BYTES)}
 _MAX_DOCUMENT = 64 * 2**20
 # Of a run, in memory before it is written.
 _MAX_POINTS = 10_000_000
@@ -121,7 +130,7 @@ class ProjectArrival:
                 if len(parts) == 2 and parts[1] == "experiment.json":
                     experiment = _read(ArchivedExperiment, await incoming.whole(_MAX_DOCUMENT))
                 elif len(parts) == 2 and parts[0] in _OTHERS:
-                    await self._other(_OTHERS[parts[0]], parts[1], incoming)
+                    await self._other(parts[0], parts[1], incoming)
                 elif len(parts) == 2 and parts[0] == "studies":
                     await self._lane.run(self._study, _read(ArchivedStudy, await incoming.whole(_MAX_DOCUMENT)))
                 elif experiment is not None and parts[0] == experiment.id and len(parts) == 3 and parts[2] == "run.json":
@@ -135,7 +144,8 @@ class ProjectArrival:
             project_id=self._project_id, runs=self._outcomes, checkpoints=self._checkpoints, others=self._others
         )
 
-    async def _other(self, kind: Kind, name: str, incoming: IncomingTar) -> None:
+    async def _other(self, folder: str, name: str, incoming: IncomingTar) -> None:
+        kind = _OTHERS[folder]
         if len(self._others) >= MAX_OTHERS:
             raise InvalidRequestError(
                 f"An archive may hold {MAX_OTHERS} things beside its runs: import the rest as another one."
@@ -144,19 +154,20 @@ class ProjectArrival:
         if form != "json":
             raise InvalidRequestError(f"This is no project's archive: {name} has no place in it.")
         content = await incoming.whole(_MAX_DOCUMENT)
-        graph = b""
-        if kind == "policy":
-            if await incoming.next() != f"policies/{identifier}.onnx":
-                raise InvalidRequestError(f"This is no project's archive: the file of the policy {identifier} is missing.")
-            graph = await incoming.whole(MAX_FILE_BYTES)
+        file = b""
+        if kind in _FILES:
+            ending, most = _FILES[kind]
+            if await incoming.next() != f"{folder}/{identifier}.{ending}":
+                raise InvalidRequestError(f"This is no project's archive: the file of the {kind} {identifier} is missing.")
+            file = await incoming.whole(most)
         try:
-            new = await self._lane.run(self._take, kind, identifier, content, graph)
+            new = await self._lane.run(self._take, kind, identifier, content, file)
             outcome = ImportedThing(kind=kind, id=identifier, outcome="imported" if new else "there", why=None)
         except (ConflictError, CorruptUploadError) as error:
             outcome = ImportedThing(kind=kind, id=identifier, outcome="refused", why=error.message)
         self._others.append(outcome)
 
-    def _take(self, kind: Kind, identifier: str, content: bytes, graph: bytes) -> bool:
+    def _take(self, kind: Kind, identifier: str, content: bytes, file: bytes) -> bool:
         """Take something beside the runs; False where it was here.
 
         Raises:
@@ -169,7 +180,9 @@ class ProjectArrival:
         with self._services.database.write() as session:
             ProjectRepository(session).get(self._project_id)
             if kind == "policy":
-                return take_policy(session, self._project_id, _read(ArchivedPolicy, content), graph)
+                return take_policy(session, self._project_id, _read(ArchivedPolicy, content), file)
+            if kind == "recording":
+                return take_recording(session, self._project_id, _read(ArchivedRecording, content), file)
             evaluation = _read(ArchivedAskedEvaluation, content)
             return take_evaluation(session, self._project_id, evaluation, of_everybodys=self._of_everybodys)
 

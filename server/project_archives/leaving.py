@@ -12,7 +12,7 @@ from server.database import tables
 from server.errors import NotFoundError
 from server.file_names import slug
 from server.project_archives import tar
-from server.project_archives.others import archived_evaluation, archived_policy, arenas_of
+from server.project_archives.others import archived_evaluation, archived_policy, archived_recording, arenas_of
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import (
     ArchivedCheckpoint,
@@ -36,8 +36,9 @@ from server.workbench.marks import MarkRepository
 def leaving(services: Services, project_id: str) -> OutgoingFile:
     """The project as one file: studies, experiments with tags and notes, runs with all that hangs on them.
 
-    That is events, printed lines, points, checkpoints and their evaluations. Beside them uploaded policies, evaluations that
-    were asked for of any of these, of shipped policies and of baselines, and the imported arenas that any of these use.
+    That is events, printed lines, points, checkpoints and their evaluations. Beside them uploaded policies, robots'
+    recordings, evaluations that were asked for of any of these, of shipped policies and of baselines, and the imported
+    arenas that any of these use.
 
     What lies in the trash stays, and so do a damaged checkpoint and one whose archive is gone. A run that goes on leaves
     as it is when its turn comes. Only one run's documents are held at a time.
@@ -63,10 +64,13 @@ def _whole(
         # One after another: a thousand of them, each of some kilobytes.
         arenas = list(arenas_of(session, services.arenas, project_id))
         policy_ids = ProjectArchiveRepository(session).policies(project_id)
+        recording_ids = ProjectArchiveRepository(session).recordings(project_id)
     for arena in arenas:
         yield from _document(f"arenas/{arena.sha256}.json", arena)
     for policy_id in policy_ids:
         yield from _policy(services, policy_id)
+    for recording_id in recording_ids:
+        yield from _recording(services, recording_id)
     for study_id in study_ids:
         with services.database.read() as session:
             study = archived_study(session, study_id)
@@ -100,6 +104,16 @@ def _policy(services: Services, policy_id: str) -> Iterator[bytes]:
         archived, graph = archived_policy(row), row.graph
     yield from _document(f"policies/{policy_id}.json", archived)
     yield from tar.member(f"policies/{policy_id}.onnx", len(graph), [graph])
+
+
+def _recording(services: Services, recording_id: str) -> Iterator[bytes]:
+    with services.database.read() as session:
+        row = session.get(tables.Bag, recording_id)
+        if row is None:
+            return
+        archived, content = archived_recording(row), row.content
+    yield from _document(f"recordings/{recording_id}.json", archived)
+    yield from tar.member(f"recordings/{recording_id}.bag", len(content), [content])
 
 
 def _run(services: Services, folder: str, run_id: str) -> Iterator[bytes]:

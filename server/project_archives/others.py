@@ -1,4 +1,4 @@
-"""What a project has beside its runs, out and in: arenas, uploaded policies, evaluations that were asked for.
+"""What a project has beside its runs, out and in: arenas, uploaded policies, robots' recordings, evaluations asked for.
 
 Each is taken whole or not at all. Where one of its id is here already it is left as it is.
 """
@@ -11,6 +11,8 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from server.arenas.store import ArenaStore
+from server.bags.repository import BagRepository
+from server.bags.service import MAX_BAGS
 from server.database import tables
 from server.errors import ConflictError, CorruptUploadError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository, encode_episodes, episodes_of
@@ -18,7 +20,7 @@ from server.evaluations.schemas import EvaluationFigures
 from server.evaluations.ways import KeptWays
 from server.ids import new_id
 from server.project_archives.repository import ProjectArchiveRepository
-from server.project_archives.schemas import ArchivedAskedEvaluation, ArchivedPolicy
+from server.project_archives.schemas import ArchivedAskedEvaluation, ArchivedPolicy, ArchivedRecording
 from server.uploads.repository import UploadRepository
 from server.uploads.service import MAX_UPLOADS
 from sim.config import ArenaFile, ImportedArenaConfig, TaskConfig
@@ -101,6 +103,32 @@ def take_policy(session: Session, project_id: str, archived: ArchivedPolicy, gra
     told = archived.model_dump(exclude={"task"})
     task = archived.task.model_dump(mode="json")
     repository.add(tables.UploadedPolicy(**told, task=task, project_id=project_id, graph=graph))
+    return True
+
+
+def archived_recording(row: tables.Bag) -> ArchivedRecording:
+    """What a robot recorded, without its file."""
+    return ArchivedRecording(id=row.id, name=row.name, sha256=row.sha256, size=row.size, created_at=row.created_at)
+
+
+def take_recording(session: Session, project_id: str, archived: ArchivedRecording, content: bytes) -> bool:
+    """Add what a robot recorded; False where it was here.
+
+    Raises:
+        CorruptUploadError: the file is not the one that was announced.
+        ConflictError: there is another one of its id, or there are too many.
+    """
+    if len(content) != archived.size or hashlib.sha256(content).hexdigest() != archived.sha256:
+        raise CorruptUploadError(f"{archived.name} is damaged: its SHA-256 is not the one that was announced")
+    known = session.get(tables.Bag, archived.id)
+    if known is not None:
+        if known.project_id != project_id or known.sha256 != archived.sha256:
+            raise ConflictError(f"This server has another recording of the id {archived.id}.")
+        return False
+    repository = BagRepository(session)
+    if repository.count() >= MAX_BAGS:
+        raise ConflictError(f"There are {MAX_BAGS} recordings already: delete some first.")
+    repository.add(tables.Bag(**archived.model_dump(), project_id=project_id, content=content))
     return True
 
 

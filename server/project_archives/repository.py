@@ -62,6 +62,13 @@ class ProjectArchiveRepository:
             select(row.id).where(row.project_id == project_id).order_by(row.created_at, row.id)
         ).all()
 
+    def recordings(self, project_id: str) -> Sequence[str]:
+        """The ids of a project's recordings of robots, the oldest first."""
+        row = tables.Bag
+        return self._session.scalars(
+            select(row.id).where(row.project_id == project_id).order_by(row.created_at, row.id)
+        ).all()
+
     def evaluations(self, project_id: str) -> Sequence[str]:
         """The ids of the evaluations that stand beside one another in a project, the oldest first.
 

@@ -4,6 +4,8 @@ manifest.json                     ArchiveManifest
 arenas/SHA256.json                an imported arena that its trainings or evaluations use (ArenaFile)
 policies/POLICY.json              ArchivedPolicy
 policies/POLICY.onnx              the file of a policy that was uploaded
+recordings/RECORDING.json         ArchivedRecording
+recordings/RECORDING.bag          the file that a robot recorded
 studies/STUDY.json                ArchivedStudy
 EXPERIMENT/experiment.json        ArchivedExperiment
 EXPERIMENT/RUN/run.json           ArchivedRun
@@ -20,6 +22,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
+from server.bags.schemas import MAX_BAG_BYTES
 from server.database.tables import RunState, StudyState, TrialState
 from server.evaluations.schemas import EvaluationFigures
 from server.evaluations.ways import KeptWays
@@ -41,10 +44,10 @@ class ArchiveManifest(Schema):
     """What an archive is.
 
     Those of the first format have neither studies nor logs, of the second nothing of `Kind`, of the third no thinned curves,
-    of the fourth no evaluations of what is everybody's.
+    of the fourth no evaluations of what is everybody's, of the fifth no recordings of robots.
     """
 
-    format: Literal[1, 2, 3, 4, 5] = 5
+    format: Literal[1, 2, 3, 4, 5, 6] = 6
     version: ShortLine
     project: ShortLine
 
@@ -170,6 +173,16 @@ class ArchivedPolicy(Schema):
     created_at: Time
 
 
+class ArchivedRecording(Schema):
+    """What a robot recorded, without its file; it is read anew where it comes to, with the same outcome."""
+
+    id: Id
+    name: ShortLine
+    sha256: Sha256
+    size: int = Field(ge=1, le=MAX_BAG_BYTES)
+    created_at: Time
+
+
 class ArchivedAskedEvaluation(Schema):
     """An evaluation that was asked for, and measured, or given up for a reason.
 
@@ -199,7 +212,7 @@ class ImportedRun(Schema):
     why: str | None = Field(description="Why it was refused.")
 
 
-Kind = Literal["arena", "policy", "evaluation"]
+Kind = Literal["arena", "policy", "recording", "evaluation"]
 
 
 class ImportedThing(Schema):
@@ -217,4 +230,6 @@ class ProjectImport(Schema):
     project_id: str
     runs: list[ImportedRun] = Field(max_length=10_000)
     checkpoints: int = Field(description="That came with the imported runs.")
-    others: list[ImportedThing] = Field([], description="Arenas, uploaded policies, and evaluations that were asked for.")
+    others: list[ImportedThing] = Field(
+        [], description="Arenas, uploaded policies, robots' recordings, and evaluations that were asked for."
+    )

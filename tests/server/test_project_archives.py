@@ -21,6 +21,7 @@ from fastapi.testclient import TestClient
 
 import mapless_client
 from server.app import create_app
+from server.bags.schemas import MAX_BAG_BYTES
 from server.checkpoints.repository import CheckpointRepository
 from server.curve_thinning.rule import CurveRule
 from server.curve_thinning.service import CurveThinningService
@@ -39,8 +40,11 @@ from server.settings import Settings
 from server.studies.schemas import StudySpec
 from sim.config import ArenaFile
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
+from tests.server.job_worker import working
 from tests.server.test_evaluations import ended
 from tests.server.test_own_suites import add, made, scenario
+from tests.workers.robot_bags import as_mcap, messages, simulated
+from tests.workers.test_bags import task
 from tests.workers.test_onnx_policy import SIZE, graph
 from workers.export.bundle import bundle, export_checkpoint
 from workers.protocol import LogBatch, LogLine
@@ -340,6 +344,83 @@ def test_what_is_everybodys_comes_along_where_an_administrator_brings_it(
     assert others(there.http, asked) == others(client, asked)
 
 
+@pytest.fixture(scope="module")
+def drive() -> bytes:
+    """What a robot recorded in the simulator."""
+    return as_mcap(messages(simulated(seed=3, seconds=20.0, jitter=0.002, speed_noise=0.01, **task())))
+
+
+def test_what_a_robot_recorded_comes_along_and_tells_the_same_there(
+    client: TestClient,
+    services: Services,
+    servers: tuple[Server, Server],
+    job_worker: None,
+    drive: bytes,
+    tmp_path: Path,
+) -> None:
+    recording = client.post("/api/recordings", params={"name": "corridor.mcap"}, content=drive).json()
+    path = f"/api/recordings/{recording['id']}"
+    beside = f"{path}/beside?shipped=complex"
+    told = [client.get(path).json(), client.get(f"{path}/reading").json(), client.get(beside).json()]
+    assert told[1]["fitted"]
+    mine, (there, _) = mapless_client.Client(BASE_URL, http=client), servers
+    archive = mine.export_project("default", tmp_path)
+
+    came = there.client.import_project(archive, "default")
+
+    assert [(each.kind, each.id, each.outcome) for each in came.others] == [("recording", recording["id"], "imported")]
+    with there.services.database.read() as session:
+        assert session.get_one(tables.Bag, recording["id"]).content == drive
+    with working(there.http, there.services, tmp_path / "work"):
+        assert [there.http.get(each).json() for each in (path, f"{path}/reading", beside)] == told
+    assert [each.outcome for each in there.client.import_project(archive, "default").others] == ["there"]
+    # And back, where it was lost.
+    back = there.client.export_project("default", tmp_path / "back")
+    assert client.delete(path).status_code == 204
+    assert [each.outcome for each in mine.import_project(back, "default").others] == ["imported"]
+    assert client.get(path).json() == recording
+
+
+def test_a_recording_that_is_damaged_or_anothers_is_refused_by_name(
+    servers: tuple[Server, Server], drive: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, there = servers
+    recording, sound = (
+        here.http.post("/api/recordings", params={"name": name}, content=drive).json()["id"] for name in ("a.mcap", "b.mcap")
+    )
+    archive = here.client.export_project("default", tmp_path)
+    file = f"recordings/{recording}.bag"
+
+    def sent(change: Callable[[str, bytes], bytes | None], project: str = "default") -> Any:
+        return there.http.post(f"/api/projects/{project}/import", content=rewritten(archive, change))
+
+    def others(answer: Any) -> dict[str, str | None]:
+        return {each["id"]: each["why"] for each in answer.json()["others"]}
+
+    for damage in (lambda content: content[:-1] + b"x", lambda content: content[:-1], lambda _: b""):
+        why = others(sent(lambda name, content, damage=damage: damage(content) if name == file else content))[recording]
+        assert why == "a.mcap is damaged: its SHA-256 is not the one that was announced"
+        with there.services.database.read() as session:
+            assert session.get(tables.Bag, recording) is None
+            assert session.get(tables.Bag, sound) is not None
+    missing = sent(lambda name, content: None if name == file else content)
+    assert (missing.status_code, f"the file of the recording {recording} is missing" in missing.text) == (400, True)
+    large = sent(lambda name, content: bytes(MAX_BAG_BYTES + 1) if name == file else content)
+    assert (large.status_code, "is larger than" in large.text) == (400, True)
+    with monkeypatch.context() as patch:
+        patch.setattr("server.project_archives.others.MAX_BAGS", 1)
+        assert others(sent(lambda _, content: content)) == {
+            recording: "There are 1 recordings already: delete some first.",
+            sound: None,
+        }
+    # Of another project it is nobody's to bring in again.
+    assert others(sent(lambda _, content: content)) == {recording: None, sound: None}
+    other = there.http.post("/api/projects", json={"name": "Other"}).json()["id"]
+    assert others(sent(lambda _, content: content, other)) == {
+        each: f"This server has another recording of the id {each}." for each in (recording, sound)
+    }
+
+
 def archived(archive: Path, evaluation_id: str) -> ArchivedAskedEvaluation:
     """As it stands in an archive."""
     with tarfile.open(archive) as file:
@@ -348,7 +429,7 @@ def archived(archive: Path, evaluation_id: str) -> ArchivedAskedEvaluation:
         return ArchivedAskedEvaluation.model_validate_json(member.read())
 
 
-@pytest.mark.parametrize("number", [2, 3, 4])
+@pytest.mark.parametrize("number", [2, 3, 4, 5])
 def test_an_archive_of_an_older_format_is_read(
     servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path, number: int
 ) -> None:
@@ -356,8 +437,8 @@ def test_an_archive_of_an_older_format_is_read(
 
     def older(name: str, content: bytes) -> bytes:
         if name == "manifest.json":
-            assert b'"format":5' in content
-            return content.replace(b'"format":5', b'"format":%d' % number)
+            assert b'"format":6' in content
+            return content.replace(b'"format":6', b'"format":%d' % number)
         return content.replace(b'"thinned_at":null,', b"")
 
     archive = rewritten(here.client.export_project("default", tmp_path), older)
@@ -544,7 +625,7 @@ def test_an_archive_of_the_first_format_is_read(
         if name.endswith("experiment.json"):
             told = json.loads(content)
             return json.dumps({key: told[key] for key in told.keys() - {"campaign", "campaign_row", "study_id"}}).encode()
-        return content.replace(b'"format":5', b'"format":1') if name == "manifest.json" else content
+        return content.replace(b'"format":6', b'"format":1') if name == "manifest.json" else content
 
     archive = rewritten(here.client.export_project("default", tmp_path), before)
     assert [run["outcome"] for run in send(there, archive).json()["runs"]] == ["imported", "imported"]

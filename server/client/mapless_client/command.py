@@ -227,7 +227,7 @@ def import_project(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Bring an exported project to another server, with the same ids; exit status 1 where a run was refused."""
+    """Bring an exported project to another server, with the same ids; exit status 1 where anything was refused."""
     if not archive.is_file():
         _refuse(f"{archive} is no file.")
     with _server(url) as client:
@@ -237,7 +237,11 @@ def import_project(
     else:
         for run in came.runs:
             typer.echo("  ".join([f"{run.id:16}", f"{run.outcome:8}", *([run.why] if run.why else [])]))
-    if any(run.outcome == "refused" for run in came.runs):
+        for thing in came.others:
+            typer.echo(
+                "  ".join([f"{thing.id:16.16}", f"{thing.outcome:8}", thing.kind, *([thing.why] if thing.why else [])])
+            )
+    if any(each.outcome == "refused" for each in [*came.runs, *came.others]):
         raise typer.Exit(1)
 
 

@@ -182,7 +182,7 @@ class ImportedRun(Model):
 
 
 class ImportedThing(Model):
-    """What came of something beside the runs: an `arena`, a `policy`, or an `evaluation` that was asked for."""
+    """What came of something beside the runs: an `arena`, a `policy`, a robot's `recording`, or an asked `evaluation`."""
 
     kind: str
     id: str

@@ -6931,7 +6931,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "arena" | "policy" | "evaluation";
+            kind: "arena" | "policy" | "recording" | "evaluation";
             /**
              * Outcome
              * @enum {string}
@@ -9537,7 +9537,7 @@ export interface components {
             checkpoints: number;
             /**
              * Others
-             * @description Arenas, uploaded policies, and evaluations that were asked for.
+             * @description Arenas, uploaded policies, robots' recordings, and evaluations that were asked for.
              * @default []
              */
             others: components["schemas"]["ImportedThing"][];

@@ -142,6 +142,7 @@ function ProjectTools({ project, people }: { project: Project; people: boolean }
 const KINDS = [
   ['run', 'run'],
   ['policy', 'upload'],
+  ['recording', 'recording'],
   ['evaluation', 'evaluation'],
   ['arena', 'arena'],
 ] as const
