@@ -9,6 +9,7 @@ import { factors, fitted, type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
 import { dashes, lineColor } from './palette'
+import { listenForPinch } from './pinch'
 import { Swatch } from './Swatch'
 import { aboveZero, allPositive, type ChartData, type Line, lastValue, valueAt } from './series'
 
@@ -43,7 +44,7 @@ interface ChartProps {
 }
 
 /**
- * Draws `data`. Drag across, or up and down, to zoom in; a button appears that zooms out. Charts within `LinkedCharts` share
+ * Draws `data`. Drag across, or up and down, or pinch to zoom in; a button appears that zooms out. Charts within `LinkedCharts` share
  * their cursor and what they show of x. A name in the legend hides its lines and brings them back.
  */
 export function Chart({
@@ -96,6 +97,24 @@ export function Chart({
   useEffect(() => {
     const element = frame.current
     if (!element || !near) return
+    /** Two fingers choose what is shown of x. */
+    const pinchable = (chart: uPlot) => {
+      const inner = ([from, to]: readonly [number, number]): [number, number] =>
+        logX ? [Math.log10(from), Math.log10(to)] : [from, to]
+      const outer = ([from, to]: readonly [number, number]): [number, number] =>
+        logX ? [10 ** from, 10 ** to] : [from, to]
+      listenForPinch(chart.over, {
+        shown: () => inner(rangeOf(chart)),
+        all: () => inner([newest.current[0][0] ?? 0, newest.current[0].at(-1) ?? 0]),
+        show: (range) => {
+          if (!range) return zoomOut.current()
+          const [min, max] = outer(range)
+          setZoomed(true)
+          chart.setScale('x', { min, max })
+        },
+        end: (range) => range && link.current?.zoomTo(outer(range)),
+      })
+    }
     const made = new uPlot(
       {
         // A strip among others says below what x is, where it reads its values.
@@ -142,6 +161,7 @@ export function Chart({
                 const left = chart.cursor.left ?? -1
                 if (left >= 0) seek.current?.(chart.posToVal(left, 'x'))
               })
+              pinchable(chart)
               // Its scales are known only now, and nothing may move the cursor again.
               putCursor(chart, place.current)
             },

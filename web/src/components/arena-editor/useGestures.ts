@@ -1,5 +1,5 @@
-/** What a pointer does on the drawing: chooses, moves, pulls handles, draws with the tool, looks elsewhere. */
-import { type PointerEvent, useState } from 'react'
+/** What a pointer does on the drawing: chooses, moves, pulls handles, draws with the tool, looks elsewhere; two pinch. */
+import { type PointerEvent, useRef, useState } from 'react'
 import type { ArenaGeometry } from '../../api/types'
 import { dragged, handleAt, handlesOf, pulled, thingAt } from './handles'
 import { added, fullOf, moved, type Point, snapped, type Thing, within } from './things'
@@ -14,13 +14,14 @@ import {
   withDoor,
 } from './tools'
 import type { Draft } from './useDraft'
-import { placeIn, type View } from './useView'
+import { type Pinch, placeIn, type View } from './useView'
 
 type Gesture =
   | { does: 'move'; thing: Thing; from: Point }
   | { does: 'pull'; thing: Thing; handle: string }
   | { does: 'draw'; from: Point }
   | { does: 'look'; from: { x: number; y: number }; centre: Point }
+  | { does: 'tap'; at: Point; slack: number }
 
 /** Pixels beside a thing that still count, by how exactly one points. */
 const SLACK = { fine: 5, coarse: 16 }
@@ -43,6 +44,9 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
   const [held, setHeld] = useState<{ arena: ArenaGeometry; chosen: Thing | null } | null>(null)
   const [way, setWay] = useState<readonly Point[]>([])
   const [pointer, setPointer] = useState<Point | null>(null)
+  /** Where the fingers are, in the window; and what two of them began with, until the last is lifted. */
+  const fingers = useRef(new Map<number, { clientX: number; clientY: number }>())
+  const pinch = useRef<Pinch | null>(null)
 
   /** What a tool makes of a drag, or of a click where both are one. */
   const drawn = (from: Point, to: Point): [ArenaGeometry, Thing] | string => {
@@ -105,13 +109,32 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
     setWay([...way, at])
   }
 
+  const tap = (at: Point, slack: number) => {
+    if (tool === 'door') openDoor(at, slack)
+    else addCorner(snapped(at, grid))
+  }
+
   const onPointerDown = (event: PointerEvent<SVGSVGElement>) => {
     if (event.button !== 0) return
     event.currentTarget.setPointerCapture?.(event.pointerId)
+    const touches = event.pointerType === 'touch'
+    if (touches) {
+      fingers.current.set(event.pointerId, { clientX: event.clientX, clientY: event.clientY })
+      if (fingers.current.size > 1) {
+        // What the first finger had begun it did not mean.
+        setHeld(null)
+        setGesture(null)
+        const between = twoOf(fingers.current)
+        const place = placeIn(event.currentTarget, between)
+        pinch.current = { place, apart: between.apart, zoom: view.zoom }
+        return
+      }
+    }
     const at = placeIn(event.currentTarget, event)
-    const slack = SLACK[event.pointerType === 'touch' ? 'coarse' : 'fine'] * view.pixel
-    if (tool === 'door') return openDoor(at, slack)
-    if (tool === 'way') return addCorner(snapped(at, grid))
+    const slack = SLACK[touches ? 'coarse' : 'fine'] * view.pixel
+    if (tool === 'door' || tool === 'way')
+      // Whether a finger comes alone shows when it is lifted.
+      return touches ? setGesture({ does: 'tap', at, slack }) : tap(at, slack)
     if (tool !== 'select') {
       const from = snapped(at, grid)
       setGesture({ does: 'draw', from })
@@ -132,6 +155,15 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
   }
 
   const onPointerMove = (event: PointerEvent<SVGSVGElement>) => {
+    if (fingers.current.has(event.pointerId))
+      fingers.current.set(event.pointerId, { clientX: event.clientX, clientY: event.clientY })
+    if (pinch.current) {
+      if (fingers.current.size < 2) return
+      const { clientX, clientY, apart } = twoOf(fingers.current)
+      const box = event.currentTarget.getBoundingClientRect()
+      const middle = { x: clientX - box.x - box.width / 2, y: clientY - box.y - box.height / 2 }
+      return view.pinch(pinch.current, middle, apart)
+    }
     const at = placeIn(event.currentTarget, event)
     if (tool === 'way' && way.length > 0) setPointer(snapped(at, grid))
     if (!gesture) return
@@ -161,7 +193,14 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
     }
   }
 
-  const onPointerUp = () => {
+  const lift = (event: PointerEvent<SVGSVGElement>) => {
+    fingers.current.delete(event.pointerId)
+    if (fingers.current.size === 0) pinch.current = null
+  }
+
+  const onPointerUp = (event: PointerEvent<SVGSVGElement>) => {
+    lift(event)
+    if (gesture?.does === 'tap') tap(gesture.at, gesture.slack)
     if (held) draft.change(held.arena, { chosen: held.chosen })
     setHeld(null)
     setGesture(null)
@@ -174,6 +213,11 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
     setPointer(null)
   }
 
+  const onPointerCancel = (event: PointerEvent<SVGSVGElement>) => {
+    lift(event)
+    cancel()
+  }
+
   return {
     shown: held ?? { arena, chosen },
     way: pointer ? [...way, pointer] : way,
@@ -183,7 +227,17 @@ export function useGestures({ draft, view, tool, settings, grid, say }: Gestures
     addCorner,
     endWay,
     cancel,
-    pointer: { onPointerDown, onPointerMove, onPointerUp, onPointerCancel: cancel },
+    pointer: { onPointerDown, onPointerMove, onPointerUp, onPointerCancel },
+  }
+}
+
+/** What is in the middle of the first two fingers, and how far apart they are, pixels. */
+function twoOf(fingers: ReadonlyMap<number, { clientX: number; clientY: number }>) {
+  const [first = { clientX: 0, clientY: 0 }, second = first] = fingers.values()
+  return {
+    clientX: (first.clientX + second.clientX) / 2,
+    clientY: (first.clientY + second.clientY) / 2,
+    apart: Math.max(1, Math.hypot(first.clientX - second.clientX, first.clientY - second.clientY)),
   }
 }
 

@@ -9,6 +9,13 @@ const CLOSEST = 20
 /** Pixels, where the browser has not said yet. */
 const UNKNOWN = 600
 
+/** Two fingers on the drawing: the place that is between them, metres, and how far apart they are, pixels. */
+export interface Pinch {
+  place: Point
+  apart: number
+  zoom: number
+}
+
 export function useView({ width, height }: { width: number; height: number }) {
   const { ref, width: wide, height: high } = useElementSize<HTMLDivElement>()
   const [zoom, setZoom] = useState(1)
@@ -29,6 +36,14 @@ export function useView({ width, height }: { width: number; height: number }) {
     zoom,
     viewBox: `${at.x - shown.width / 2} ${-at.y - shown.height / 2} ${shown.width} ${shown.height}`,
     look: (to: Point) => setCentre(kept(to)),
+    /** Shows what was between two fingers where they are now, as much larger as they are farther apart. */
+    pinch: (from: Pinch, middle: Point, apart: number) => {
+      const next = Math.min(CLOSEST, Math.max(1, (from.zoom * apart) / from.apart))
+      // From the drawing's centre, in the pixels of the new zoom.
+      const pixel = zoom / (scale * next)
+      setCentre(kept({ x: from.place.x - middle.x * pixel, y: from.place.y + middle.y * pixel }))
+      setZoom(next)
+    },
     zoomBy: (factor: number) => {
       setCentre(at)
       setZoom(Math.min(CLOSEST, Math.max(1, zoom * factor)))
