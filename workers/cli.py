@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from sim.config.refusals import to_tell
 from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import WorkerError
@@ -152,7 +153,7 @@ def train(
             signal.signal(signal.SIGINT, reporter.request_stop)
             outcome = run(training.as_installed(), seed, reporter, out, resume, beginning)
     except ValidationError as error:
-        lines = (f"  {'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
+        lines = (f"  {'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in to_tell(error.errors()))
         _fail("\n".join(("not a valid training:", *lines)))
     except (WorkerError, SimError, KeyError) as error:
         _fail(str(error.args[0]))

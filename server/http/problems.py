@@ -13,6 +13,7 @@ from starlette.websockets import WebSocketState
 
 from server.errors import ErrorBody, RefusedFieldError, ServiceError
 from server.http.refusals import refusal
+from sim.config.refusals import to_tell
 
 logger = logging.getLogger(__name__)
 
@@ -77,6 +78,6 @@ def install_error_handlers(app: FastAPI) -> None:
         # What was sent is not sent back: it may be a token, and it may be a number that JSON can't hold.
         problems = [
             {"loc": problem["loc"], "msg": problem["msg"].removeprefix("Value error, "), "type": problem["type"]}
-            for problem in error.errors()
+            for problem in to_tell(error.errors())
         ]
         return JSONResponse({"detail": problems}, status_code=422)

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from server.schemas import Schema
+from sim.config.refusals import to_tell
 from sim.errors import MaplessError
 from workers.config import TrainingConfig
 
@@ -158,7 +159,7 @@ class Space:
 
 def wording(error: ValidationError) -> str:
     """What a training is refused for, in a line."""
-    return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.errors())[:500]
+    return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in to_tell(error.errors()))[:500]
 
 
 def _names(location: tuple[int | str, ...]) -> set[str]:

@@ -106,6 +106,20 @@ def test_a_wrong_value_is_refused_next_to_its_field(client: TestClient, body: di
     assert client.get("/api/experiments").json()["total"] == 0
 
 
+def test_a_part_with_a_wrong_value_is_refused_for_that_alone(client: TestClient) -> None:
+    def refused(parts: list[dict[str, Any]]) -> list[tuple[list[Any], str]]:
+        answer = client.post("/api/experiments", json={"training": {"task": {"observation": {"parts": parts}}}})
+        assert answer.status_code == 422
+        return [(each["loc"][-4:], each["msg"]) for each in answer.json()["detail"]]
+
+    # Its wrong part out, the list would be empty: that is nobody's mistake.
+    assert refused([{"name": "trail", "sectors": 2}]) == [
+        (["parts", 0, "trail", "sectors"], "Input should be greater than or equal to 4")
+    ]
+    # One that is empty as it was sent is told so.
+    assert [place[-1] for place, _ in refused([])] == ["parts"]
+
+
 def test_a_minibatch_that_does_not_fit_is_answered_with_what_does(client: TestClient) -> None:
     algorithm = {"name": "ppo", "robots": 8, "rollout_steps": 32}
     response = client.post("/api/experiments", json={"training": {"algorithm": algorithm}})
