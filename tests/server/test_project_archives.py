@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -397,8 +398,11 @@ def test_a_recording_that_is_damaged_or_anothers_is_refused_by_name(
     def others(answer: Any) -> dict[str, str | None]:
         return {each["id"]: each["why"] for each in answer.json()["others"]}
 
+    def damaged(damage: Callable[[bytes], bytes], name: str, content: bytes) -> bytes:
+        return damage(content) if name == file else content
+
     for damage in (lambda content: content[:-1] + b"x", lambda content: content[:-1], lambda _: b""):
-        why = others(sent(lambda name, content, damage=damage: damage(content) if name == file else content))[recording]
+        why = others(sent(partial(damaged, damage)))[recording]
         assert why == "a.mcap is damaged: its SHA-256 is not the one that was announced"
         with there.services.database.read() as session:
             assert session.get(tables.Bag, recording) is None

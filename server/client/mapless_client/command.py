@@ -241,7 +241,7 @@ def import_project(
             typer.echo(
                 "  ".join([f"{thing.id:16.16}", f"{thing.outcome:8}", thing.kind, *([thing.why] if thing.why else [])])
             )
-    if any(each.outcome == "refused" for each in [*came.runs, *came.others]):
+    if "refused" in {run.outcome for run in came.runs} | {thing.outcome for thing in came.others}:
         raise typer.Exit(1)
 
 

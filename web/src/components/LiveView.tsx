@@ -11,14 +11,14 @@ import {
   useComputedColorScheme,
 } from '@mantine/core'
 import { type QueryClient, useQuery, useQueryClient } from '@tanstack/react-query'
-import { type ReactNode, type RefObject, useEffect, useRef, useState } from 'react'
+import { type ReactNode, type Ref, type RefObject, useEffect, useRef, useState } from 'react'
 import { useLocation } from 'react-router'
 import { $api } from '../api/client'
 import type { LiveSettings, LiveState, RunState } from '../api/types'
 import { useStatus } from '../api/useStatus'
 import { at } from '../lib/base'
 import { count } from '../lib/format'
-import { IconMaximize, IconPlayerPlay } from './icons'
+import { IconMaximize, IconMinimize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
 
 const MAX_ROBOTS = 64
@@ -154,7 +154,7 @@ interface LiveViewProps extends LiveControlsProps {
 function LiveView({ page, overlay, ...controls }: LiveViewProps) {
   const whole = useRef<HTMLDivElement>(null)
   return (
-    <div ref={whole} className={classes.whole}>
+    <WholeScreen ref={whole}>
       <LiveFrame
         page={page}
         overlay={overlay}
@@ -162,6 +162,15 @@ function LiveView({ page, overlay, ...controls }: LiveViewProps) {
         whole={whole}
       />
       <LiveControls {...controls} />
+    </WholeScreen>
+  )
+}
+
+/** A picture with its controls, as they fill the screen together. */
+export function WholeScreen({ ref, children }: { ref: Ref<HTMLDivElement>; children: ReactNode }) {
+  return (
+    <div ref={ref} className={classes.whole} data-testid="whole-screen">
+      {children}
     </div>
   )
 }
@@ -177,6 +186,7 @@ interface LiveFrameProps extends Pick<LiveViewProps, 'page' | 'overlay'> {
 export function LiveFrame({ page, overlay, receiving, whole }: LiveFrameProps) {
   const dark = useComputedColorScheme('light') === 'dark'
   const box = useRef<HTMLDivElement>(null)
+  const full = useFullScreen()
   return (
     <div ref={box} className={classes.view} data-testid="live-view" data-receiving={receiving}>
       {page && (
@@ -193,24 +203,35 @@ export function LiveFrame({ page, overlay, receiving, whole }: LiveFrameProps) {
           {overlay}
         </div>
       )}
-      {page && (
-        <Tooltip label="Full screen">
+      {page && document.fullscreenEnabled && (
+        <Tooltip label={full ? 'Leave full screen' : 'Full screen'} {...WITHIN}>
           <ActionIcon
             className={classes.full}
             variant="default"
-            aria-label="Full screen"
+            aria-label={full ? 'Leave full screen' : 'Full screen'}
             onClick={() =>
               void (document.fullscreenElement
                 ? document.exitFullscreen()
                 : (whole ?? box).current?.requestFullscreen())
             }
           >
-            <IconMaximize size={16} />
+            {full ? <IconMinimize size={16} /> : <IconMaximize size={16} />}
           </ActionIcon>
         </Tooltip>
       )}
     </div>
   )
+}
+
+/** Whether something fills the screen. */
+function useFullScreen(): boolean {
+  const [full, setFull] = useState(document.fullscreenElement != null)
+  useEffect(() => {
+    const follow = () => setFull(document.fullscreenElement != null)
+    document.addEventListener('fullscreenchange', follow)
+    return () => document.removeEventListener('fullscreenchange', follow)
+  }, [])
+  return full
 }
 
 /** What stands in place of the picture of a run that has nothing to show. */

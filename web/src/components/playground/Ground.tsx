@@ -1,8 +1,9 @@
 /** An open playground: the picture, what time does, what stands where, what the robot perceives and makes of it. */
 import { Button, Group, SegmentedControl, Text } from '@mantine/core'
+import { useRef } from 'react'
 import type { Playground } from '../../api/types'
 import { count, significant } from '../../lib/format'
-import { LiveFrame, useWatching } from '../LiveView'
+import { LiveFrame, useWatching, WholeScreen } from '../LiveView'
 import { Notice, Panel } from '../ui'
 import classes from './Ground.module.css'
 import { KeepArena } from './KeepArena'
@@ -17,41 +18,45 @@ const ENDS = { arrival: 'arrives', collision: 'collides', timeout: 'runs out of 
 export function Ground({ ground }: { ground: Playground }) {
   const watching = useWatching()
   const actions = useGround(ground)
+  const whole = useRef<HTMLDivElement>(null)
   const { paused, speed } = ground.settings
   return (
     <div className={classes.ground} data-testid="playground" data-sim-time={ground.sim_time}>
       <div className={classes.stage}>
         <Panel flush>
-          <LiveFrame
-            page={watching ? `/live/${ground.id}/` : null}
-            overlay={watching ? null : 'It stands still while nobody looks.'}
-            receiving={ground.driving}
-          />
-          <fieldset className={classes.time} aria-label="Time">
-            <Group gap="xs">
-              <Button size="xs" variant="default" onClick={() => actions.configure({ paused: !paused })}>
-                {paused ? 'Go on' : 'Pause'}
-              </Button>
-              <Button
-                size="xs"
-                variant="default"
-                disabled={!paused}
-                onClick={() => actions.change({ act: 'step', count: 1 })}
-              >
-                One step
-              </Button>
-              <SegmentedControl
-                size="xs"
-                aria-label="Speed"
-                value={String(speed)}
-                onChange={(next) => actions.configure({ speed: Number(next) })}
-                data={SPEEDS.map((each) => ({ value: String(each), label: `${each}×` }))}
-              />
-            </Group>
-            <Text size="xs" c="dimmed" mt={6}>
-              Click the floor: the target goes there. Click a thing: it gets handles to drag it by.
-            </Text>
-          </fieldset>
+          <WholeScreen ref={whole}>
+            <LiveFrame
+              page={watching ? `/live/${ground.id}/` : null}
+              overlay={watching ? null : 'It stands still while nobody looks.'}
+              receiving={ground.driving}
+              whole={whole}
+            />
+            <fieldset className={classes.time} aria-label="Time">
+              <Group gap="xs">
+                <Button size="xs" variant="default" onClick={() => actions.configure({ paused: !paused })}>
+                  {paused ? 'Go on' : 'Pause'}
+                </Button>
+                <Button
+                  size="xs"
+                  variant="default"
+                  disabled={!paused}
+                  onClick={() => actions.change({ act: 'step', count: 1 })}
+                >
+                  One step
+                </Button>
+                <SegmentedControl
+                  size="xs"
+                  aria-label="Speed"
+                  value={String(speed)}
+                  onChange={(next) => actions.configure({ speed: Number(next) })}
+                  data={SPEEDS.map((each) => ({ value: String(each), label: `${each}×` }))}
+                />
+              </Group>
+              <Text size="xs" c="dimmed" mt={6}>
+                Click the floor: the target goes there. Click a thing: it gets handles to drag it by.
+              </Text>
+            </fieldset>
+          </WholeScreen>
         </Panel>
         <Panel title="What it sees coming">
           <dl className={classes.facts} data-testid="foresight">

@@ -1,7 +1,7 @@
 /** What stands in a playground, and where: the numbers behind the handles in the picture, for keyboards and for exactness. */
 import { Button, Group, NumberInput, Select, Stack, Text } from '@mantine/core'
 import { useDebouncedCallback } from '@mantine/hooks'
-import { useState } from 'react'
+import { useRef, useState } from 'react'
 import type { Playground } from '../../api/types'
 import { Panel } from '../ui'
 import classes from './Ground.module.css'
@@ -18,6 +18,7 @@ interface ThingsProps {
 
 export function Things({ ground, actions }: ThingsProps) {
   const key = keyOf(ground.chosen)
+  const handles = useRef<HTMLInputElement>(null)
   const chosen = chosenOf(key)
   const fields = chosen && fieldsOf(ground, chosen)
   const near = ground.robot ?? { x: 0, y: 0 }
@@ -47,16 +48,19 @@ export function Things({ ground, actions }: ThingsProps) {
             <Button
               size="xs"
               variant="default"
-              onClick={() =>
-                (chosen.thing === 'circle' || chosen.thing === 'box') &&
+              onClick={() => {
+                if (chosen.thing !== 'circle' && chosen.thing !== 'box') return
+                // This button goes with it, and would take the focus along.
+                handles.current?.focus()
                 actions.change({ act: 'remove', thing: chosen.thing, index: chosen.index })
-              }
+              }}
             >
               Remove it
             </Button>
           )}
         </Group>
         <Select
+          ref={handles}
           label="Handles on"
           size="xs"
           searchable
