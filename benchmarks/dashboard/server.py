@@ -50,9 +50,10 @@ class Server:
 
 
 @contextmanager
-def serving(data_dir: Path) -> Iterator[Server]:
-    """The server over a data directory, without workers; ended on leaving."""
-    command = (sys.executable, "-m", "server", "serve", "--port", "0", "--data-dir", str(data_dir))
+def serving(data_dir: Path, workers: int = 0) -> Iterator[Server]:
+    """The server over a data directory, with so many workers; ended on leaving."""
+    begin = ("up", "--workers", str(workers)) if workers else ("serve",)
+    command = (sys.executable, "-m", "server", *begin, "--port", "0", "--data-dir", str(data_dir))
     environment = {**os.environ, "MAPLESS_WORKER_TOKEN": WORKER_TOKEN}
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment)
     try:
