@@ -9,6 +9,8 @@ import io
 import sqlite3
 import sys
 import tempfile
+import time
+from http import HTTPStatus
 from pathlib import Path
 from typing import TypeVar
 
@@ -79,9 +81,11 @@ def recorded(server: Server) -> dict[str, tuple[str, str]]:
     with server.client() as client:
         answer = client.post("/api/recordings", params={"name": "corridor.mcap"}, content=drive)
         found = answer.raise_for_status().json()["id"]
-        # The page asks a second time, and is answered at once.
+        # The page asks a second time, and is answered at once. Until a worker is there, the service says when to come again.
         for what in ("reading", "beside?shipped=complex"):
-            client.get(f"/api/recordings/{found}/{what}").raise_for_status()
+            while (answer := client.get(f"/api/recordings/{found}/{what}")).status_code == HTTPStatus.SERVICE_UNAVAILABLE:
+                time.sleep(float(answer.headers["Retry-After"]))
+            answer.raise_for_status()
     return {
         "recordings": ("/recordings", "text=corridor.mcap"),
         "recording": (f"/recordings/{found}?policy=shipped:complex", "[aria-label='Where they part most'] button"),
