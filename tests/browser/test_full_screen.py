@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import BrowserContext, Locator, Page, expect
 
 from tests.browser.hand import PHONE, Hand
+from tests.browser.test_playground_keyboard import reach
 
 pytestmark = pytest.mark.browser
 
@@ -65,20 +66,14 @@ def test_a_policys_view_is_steered_in_full_screen_by_mouse_touch_and_keyboard(co
     opener.focus()
     page.keyboard.press("Enter")
     whole = fill(page)
-    page.keyboard.press("Tab")
-    expect(whole.get_by_role("radiogroup", name="Speed").locator("input:checked")).to_be_focused()
+    reach(page, whole.get_by_role("radiogroup", name="Speed").locator("input:checked"))
     page.keyboard.press("ArrowLeft")
-    page.keyboard.press("Tab")
-    page.keyboard.press("Tab")
-    expect(whole.get_by_role("combobox", name="Follow")).to_be_focused()
+    reach(page, whole.get_by_role("combobox", name="Follow"))
     page.keyboard.press("ArrowDown")
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
     settings(page, live, speed=2, follow=2)
-    page.keyboard.press("Shift+Tab")
-    page.keyboard.press("Shift+Tab")
-    page.keyboard.press("Shift+Tab")
-    expect(whole.get_by_role("button", name="Leave full screen")).to_be_focused()
+    reach(page, whole.get_by_role("button", name="Leave full screen"))
     page.keyboard.press("Enter")
     left(page)
 

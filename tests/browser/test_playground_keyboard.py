@@ -19,7 +19,8 @@ STOPS = 200
 
 def reach(page: Page, wanted: Locator) -> None:
     """Tab, until the focus is there."""
-    wanted.wait_for()
+    # What is drawn as a segment is a radio button of no size.
+    wanted.wait_for(state="attached")
     for _ in range(STOPS):
         if wanted.evaluate("element => element === document.activeElement"):
             return
