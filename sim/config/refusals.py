@@ -18,7 +18,10 @@ def to_tell(problems: Sequence[Problem]) -> list[Problem]:
 
 
 def _only_counted(problem: Problem) -> bool:
-    return problem["type"] == "too_short" and len(problem["input"]) >= problem["ctx"]["min_length"]
+    if problem["type"] != "too_short":
+        return False
+    least: int = problem["ctx"]["min_length"]
+    return len(problem["input"]) >= least
 
 
 def _has_below(place: tuple[int | str, ...], places: Sequence[tuple[int | str, ...]]) -> bool:
