@@ -3,11 +3,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 .DEFAULT_GOAL := help
-# Parts of the tests that run beside all the rest, each with services, ports and databases of its own.
-PARTS := browser services server
-TESTS_browser := tests/browser
-TESTS_services := tests/benchmarks tests/services
-TESTS_server := tests/server
+# Parts of the tests that run beside all the rest, each with services, ports and databases of its own. One: with more,
+# browsers on two cores wait longer than their tests do.
+PARTS := stack
+TESTS_stack := tests/benchmarks tests/browser tests/services
 .PHONY: help run test check format lock pages types sbom
 
 help:
@@ -69,7 +68,7 @@ test: .venv/.dev pages .venv/.kernels
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
 else
-	@# In four parts side by side, of which some wait while others reckon. AGAIN=5: up to so many that fail are tried once more, alone.
+	@# In two halves side by side, one with whole services and a browser. AGAIN=5: up to so many that fail are tried once more, alone.
 	@logs=$$(mktemp -d) && trap 'rm -rf $$logs' EXIT; started=; \
 	$(foreach part,$(PARTS),$(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(part) $(TESTS_$(part)) >$$logs/$(part) 2>&1 & \
 	started="$$started $(part)=$$!";) \
