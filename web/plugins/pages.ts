@@ -6,7 +6,6 @@
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs'
 import { join } from 'node:path'
 import type { Plugin, Rolldown } from 'vite'
-import { asksOf } from '../src/asks'
 import { frameHtml } from '../src/frame'
 import { headOf } from '../src/heads'
 import { ROUTES } from '../src/routes'
@@ -58,7 +57,6 @@ export function pages(): Plugin {
           .replace('</head>', `${links('modulepreload', code)}</head>`)
           .replace(ROOT, `${links('stylesheet', styles)}${ROOT}`)
           .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, ''), head))
-          .replace(' data-entry=', ` data-asks="${asksOf(name).replaceAll('&', '&amp;')}" data-entry=`)
           .replace('<title>Mapless', `<title>${head ? `${head.title} – ` : ''}Mapless`)
         writeFileSync(join(dir, 'pages', `${name}.html`), page)
         if (path !== '*') routes.push([patternOf(path), `${name}.html`])

@@ -4,14 +4,13 @@ import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
 import { useDeferredValue, useMemo } from 'react'
 import { BASE } from '../lib/base'
-import { early } from './early'
 import { ApiError, errorOf, isUnauthorized, OfflineError } from './errors'
 import type { paths } from './schema'
 
 export const api = createFetchClient<paths>({
   baseUrl: window.location.origin + BASE,
   // Looked up at each call, so that a test can stand in for the network.
-  fetch: (request) => early(request) ?? globalThis.fetch(request),
+  fetch: (request) => globalThis.fetch(request),
 })
 
 let firstPosition: string | undefined
