@@ -1,8 +1,8 @@
 """Watches a DDPG actor run onto the flat ends of its sigmoid and tanh, and, with a logit penalty, come back.
 
-    python -m benchmarks.actor_saturation --seed 2 [--penalty 1e-3]
+    python -m benchmarks.actor_saturation --seed 0 [--penalty 1e-3]
 
-The settings are those of the paper's campaign in the simple arena, where seed 2 fails; the penalty alone is changed. Each
+The settings are those of the paper's campaign in the simple arena; the penalty alone is changed. Each
 line looks at what the 64 robots see at that step: the actor's mean logits and actions, the part of the
 observations in which its critic asks for more speed, and the slope of the sigmoid by which that reaches the actor.
 """
@@ -45,7 +45,7 @@ def look(ddpg: Ddpg, observations: torch.Tensor) -> dict[str, float | list[float
 def main() -> None:
     """Train, and look now and then."""
     options = parser(__doc__)
-    options.add_argument("--seed", type=int, default=2)
+    options.add_argument("--seed", type=int, default=0)
     options.add_argument("--penalty", type=float, default=0.0)
     options.add_argument("--steps", type=int, default=30_000)
     arguments = options.parse_args()

@@ -9,7 +9,7 @@ import pytest
 from tests.browser.conftest import ROOT
 
 PAGES = ("list", "run, few checkpoints")
-SMALL = "--experiments 8 --points 60 --long-experiments 1 --long-points 5000 --checkpoints 60 --live 2 --tabs 2 --seconds 5"
+SMALL = "--experiments 10 --points 60 --long-experiments 1 --long-points 5000 --checkpoints 60 --live 2 --tabs 2 --seconds 5"
 
 
 @pytest.mark.usefixtures("browser")  # where there is none, there is nothing to measure

@@ -65,8 +65,8 @@ def test_what_differs_in_the_configuration_is_listed_by_its_path(client: TestCli
         {"path": "algorithm.network.name", "values": ["mlp", "resblock"], "left_out": neither},
         {"path": "algorithm.network.hidden_sizes", "values": [[64, 64], None], "left_out": neither},
         {"path": "algorithm.network.activation", "values": ["relu", None], "left_out": neither},
-        {"path": "algorithm.network.concatenations", "values": [None, True], "left_out": neither},
         {"path": "steps", "values": [5_000, 6_000], "left_out": neither},
+        {"path": "algorithm.network.concatenations", "values": [None, True], "left_out": neither},
     ]
     steps = {"path": "steps", "values": [6_000, 5_000], "left_out": neither}
     assert steps in compare(client, other, one)["differences"]
