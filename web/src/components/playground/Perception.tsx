@@ -1,6 +1,6 @@
 /** What the robot perceives, how badly, and what the picture shows of it. */
 import { Checkbox, Group, Slider, Stack, Text } from '@mantine/core'
-import { useState } from 'react'
+import { useEffect, useState } from 'react'
 import type { Playground } from '../../api/types'
 import { Panel } from '../ui'
 import classes from './Ground.module.css'
@@ -94,7 +94,11 @@ interface DialledProps {
 
 /** A slider that tells of its end only: each change is another world. */
 function Dialled({ label, value, text, onChange, ...limits }: DialledProps) {
+  // Held until the settings say the same: the next press of an arrow key goes on from here.
   const [held, setHeld] = useState<number | null>(null)
+  useEffect(() => {
+    if (value === held) setHeld(null)
+  }, [value, held])
   return (
     <div className={classes.slider}>
       <Text size="xs" component="span" aria-hidden>
@@ -106,10 +110,8 @@ function Dialled({ label, value, text, onChange, ...limits }: DialledProps) {
         label={null}
         value={held ?? value}
         onChange={setHeld}
-        onChangeEnd={(next) => {
-          setHeld(null)
-          onChange(next)
-        }}
+        onChangeEnd={onChange}
+        onBlur={() => setHeld(null)}
         {...limits}
       />
       <Text size="xs" component="span" ta="right">
