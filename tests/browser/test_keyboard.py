@@ -1,15 +1,12 @@
 """Every page by keyboard alone: nothing holds the focus, it is always seen, and a dialog gives it back."""
 
 import re
-import sys
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from benchmarks.dashboard.addresses import SMALL, addresses
-from benchmarks.dashboard.data import Sizes, make
-from tests.browser.conftest import logged_in, running
+from tests.browser.small_lab import Addresses, small_lab
 
 pytestmark = pytest.mark.browser
 
@@ -36,16 +33,9 @@ FOCUSED = """
 
 
 @pytest.fixture(scope="module")
-def lab(
-    tmp_path_factory: pytest.TempPathFactory, browser: Browser
-) -> Iterator[tuple[dict[str, tuple[str, str]], BrowserContext]]:
+def lab(tmp_path_factory: pytest.TempPathFactory, browser: Browser) -> Iterator[tuple[Addresses, BrowserContext]]:
     """The addresses of a service with one of everything, and a browser that stands still."""
-    directory = tmp_path_factory.mktemp("lab")
-    found = addresses(make(directory, Sizes(**SMALL)))
-    with (
-        running([sys.executable, "-m", "server"], directory, workers=0) as address,
-        logged_in(browser, address) as context,
-    ):
+    with small_lab(tmp_path_factory.mktemp("lab"), browser) as (found, context):
         # The robots in 3D are a page of their own.
         context.route("**/live/**", lambda route: route.abort())
         yield found, context

@@ -1,30 +1,20 @@
 """Two fingers on a phone: they zoom and move charts and the arena that is drawn, and one does what it did."""
 
-import sys
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
-from benchmarks.dashboard.addresses import SMALL, addresses
-from benchmarks.dashboard.data import Sizes, make
-from tests.browser.conftest import logged_in, running
 from tests.browser.hand import Hand, Place
+from tests.browser.small_lab import Addresses, small_lab
 
 pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
-def lab(
-    tmp_path_factory: pytest.TempPathFactory, browser: Browser
-) -> Iterator[tuple[dict[str, tuple[str, str]], BrowserContext]]:
+def lab(tmp_path_factory: pytest.TempPathFactory, browser: Browser) -> Iterator[tuple[Addresses, BrowserContext]]:
     """The addresses of a service with one of everything, and a browser that stands still."""
-    directory = tmp_path_factory.mktemp("lab")
-    found = addresses(make(directory, Sizes(**SMALL)))
-    with (
-        running([sys.executable, "-m", "server"], directory, workers=0) as address,
-        logged_in(browser, address) as context,
-    ):
+    with small_lab(tmp_path_factory.mktemp("lab"), browser) as (found, context):
         yield found, context
 
 
