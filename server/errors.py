@@ -173,7 +173,7 @@ class PartAwayError(ServiceError):
 
 
 class DatabaseAwayError(PartAwayError):
-    """The database can't be reached, or was lost in the middle of a transaction, nothing of which was kept."""
+    """The database can't be reached, or was lost in a transaction: none of it was kept, or all, with the answer lost."""
 
 
 class DatabaseBusyError(ServiceError):

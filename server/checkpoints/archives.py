@@ -7,6 +7,7 @@ registered any more, whatever the clock says, and its file may go. What a traini
 training does, whatever became of the checkpoint.
 """
 
+import logging
 import time
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
@@ -17,7 +18,10 @@ from sqlalchemy.orm import Session
 from server.background import kept_up
 from server.checkpoints.hold import removing
 from server.database import tables
+from server.errors import DatabaseAwayError, DatabaseBusyError
 from server.services import Services
+
+logger = logging.getLogger(__name__)
 
 GRACE_SECONDS = 3_600.0
 """An upload that takes longer is begun anew."""
@@ -59,6 +63,12 @@ class LooseArchives:
         self._session.execute(old.values(doomed=True))
         return list(self._session.scalars(select(loose.id).where(loose.doomed).order_by(loose.since).limit(_AT_ONCE)))
 
+    def give_up(self, archive_ids: Collection[str]) -> list[str]:
+        """Doom those of them that are still loose; the ids of these. What a checkpoint names by now stays."""
+        loose = tables.LooseArchive
+        self._session.execute(update(loose).where(loose.id.in_(archive_ids)).values(doomed=True))
+        return list(self._session.scalars(select(loose.id).where(loose.id.in_(archive_ids))))
+
     def forget(self, archive_ids: Collection[str]) -> None:
         """They are gone from the store."""
         self._session.execute(delete(tables.LooseArchive).where(tables.LooseArchive.id.in_(archive_ids)))
@@ -80,6 +90,20 @@ def remove_archives(services: Services, archive_ids: Collection[str]) -> int:
     with services.database.write() as session:
         LooseArchives(session).forget(archive_ids)
     return len(archive_ids)
+
+
+def give_up_archives(services: Services, archive_ids: Collection[str]) -> None:
+    """Remove archives whose registration did not come to its end, as far as anybody knows. Blocks.
+
+    A commit whose answer was lost may have registered them all the same: the database is asked, and where it can't be, the
+    sweep finds out later.
+    """
+    try:
+        with services.database.write() as session:
+            doomed = LooseArchives(session).give_up(archive_ids)
+        remove_archives(services, doomed)
+    except (DatabaseAwayError, DatabaseBusyError, OSError):
+        logger.info("archives that may not have been registered are left to the sweep: %s", ", ".join(sorted(archive_ids)))
 
 
 def sweep_archives(services: Services, now: float) -> int:

@@ -204,7 +204,8 @@ def _create_engine(url: str) -> Engine:
         connection.isolation_level = None
         # SQLite's own knows no letters but the 26 of ASCII.
         connection.create_function("lower", 1, _lower, deterministic=True)
-        for pragma in ("journal_mode=WAL", "synchronous=NORMAL", f"busy_timeout={_BUSY_TIMEOUT_MS}", "foreign_keys=ON"):
+        # With less, the last commits before a power cut may not be there after it.
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", f"busy_timeout={_BUSY_TIMEOUT_MS}", "foreign_keys=ON"):
             connection.execute(f"PRAGMA {pragma}")
 
     @event.listens_for(engine, "begin")

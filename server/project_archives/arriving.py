@@ -7,7 +7,6 @@ its end is swept away; the run's last word (`end`) registers everything in one t
 import time
 import zlib
 from collections.abc import AsyncIterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -16,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from server.audit.repository import AuditRepository
 from server.bags.schemas import MAX_BAG_BYTES
-from server.checkpoints.archives import LooseArchives, remove_archives
+from server.checkpoints.archives import LooseArchives, give_up_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
 from server.errors import ConflictError, CorruptUploadError, InvalidRequestError
@@ -216,10 +215,9 @@ class ProjectArrival:
                 except ConflictError as error:
                     problem = error.message
         finally:
-            # Of a run that was not registered, whatever the reason.
+            # Of a run that was not registered, or of which nobody knows.
             if run.files:
-                with suppress(OSError):
-                    await self._lane.run(remove_archives, self._services, list(run.files))
+                await self._lane.run(give_up_archives, self._services, list(run.files))
         outcome = ImportedRun(
             id=archived.id,
             experiment_id=experiment.id,

@@ -11,6 +11,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 from starlette.websockets import WebSocketDisconnect
 
+from server.checkpoints.archives import give_up_archives
 from server.errors import TooLargeError
 from server.ids import new_id
 from server.run_log.service import LogService
@@ -106,7 +107,7 @@ async def put_checkpoint(
         registered = await lane.run(service.register, run_id, attempt, step, file, upload)
     finally:
         if not registered:
-            await lane.run(services.files.delete, file.id)
+            await lane.run(give_up_archives, services, [file.id])
 
 
 @router.get("/checkpoints/{checkpoint_id}", dependencies=[WORK])

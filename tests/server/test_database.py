@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 
 import pytest
+from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from server.database import tables
@@ -77,6 +78,15 @@ def test_writers_wait_for_one_another(database: Database) -> None:
 
     with database.read() as session:
         assert session.get_one(tables.Worker, "counter").last_seen == 160
+
+
+def test_what_was_committed_is_on_the_disk(database: Database) -> None:
+    """A launch that was answered is there after a power cut, and so is what a worker no longer keeps in its spool."""
+    asked, safe = (
+        ("SHOW synchronous_commit", "on") if database.engine.dialect.name == "postgresql" else ("PRAGMA synchronous", 2)
+    )
+    with database.write() as session:
+        assert session.scalar(text(asked)) == safe
 
 
 def test_an_experiment_takes_everything_along_when_it_goes(database: Database) -> None:

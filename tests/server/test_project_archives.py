@@ -27,12 +27,13 @@ from server.checkpoints.repository import CheckpointRepository
 from server.curve_thinning.rule import CurveRule
 from server.curve_thinning.service import CurveThinningService
 from server.database import tables
-from server.errors import ConflictError
+from server.errors import ConflictError, DatabaseAwayError
 from server.files import StoredFile
 from server.ids import new_id
 from server.metrics.buckets import Buckets
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
+from server.project_archives.arriving import ProjectArrival
 from server.project_archives.others import take_evaluation
 from server.project_archives.schemas import ArchivedAskedEvaluation
 from server.run_log.repository import LogRepository
@@ -585,6 +586,25 @@ def test_a_run_that_is_damaged_or_not_complete_is_not_taken_and_leaves_nothing(
         assert [run.id for run in session.query(tables.Run)] == [first]
     # Sent again, it goes on.
     assert [run["outcome"] for run in send(there, whole).json()["runs"]] == ["there", "imported"]
+
+
+def test_a_run_whose_commit_was_never_answered_keeps_its_checkpoints(
+    servers: tuple[Server, Server], trained: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, there = servers
+    whole = here.client.export_project("default", tmp_path).read_bytes()
+    register = ProjectArrival._register
+
+    def unanswered(*arguments: Any) -> None:
+        register(*arguments)
+        raise DatabaseAwayError("The database can't be reached now.")
+
+    with monkeypatch.context() as cut:
+        cut.setattr(ProjectArrival, "_register", unanswered)
+        assert send(there, whole).status_code == 503
+    assert "there" in [run["outcome"] for run in send(there, whole).json()["runs"]]
+    with there.services.database.read() as session:
+        assert {checkpoint.id for checkpoint in session.query(tables.Checkpoint)} == there.services.files.ids() != set()
 
 
 def test_what_is_here_already_is_refused_in_clear_words(

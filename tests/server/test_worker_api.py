@@ -11,10 +11,13 @@ from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
+from server.checkpoints.archives import GRACE_SECONDS, LooseArchives, sweep_archives
+from server.errors import DatabaseAwayError
 from server.metrics.repository import MetricRepository
 from server.services import Services
 from server.settings import Settings
 from server.worker_api.leases import Leases
+from server.worker_api.service import WorkerService
 from workers.protocol import (
     CLOSE_FENCED,
     CLOSE_NOT_UNDERSTOOD,
@@ -276,6 +279,43 @@ def test_a_damaged_upload_is_refused_and_leaves_nothing(
     claim(worker, run_id)
     response = worker.put(f"/api/worker/runs/{run_id}/checkpoints/5", params={"attempt": 1}, content=body)
     assert response.status_code == status
+    assert services.files.ids() == set()
+
+
+def test_a_checkpoint_whose_commit_was_never_answered_keeps_its_archive(
+    client: TestClient, worker: TestClient, run_id: str, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The database had committed when the way to it was cut: nobody knows, and the worker sends the checkpoint again."""
+    claim(worker, run_id)
+    register = WorkerService.register
+
+    def unanswered(*arguments: Any) -> bool:
+        register(*arguments)
+        raise DatabaseAwayError("The database can't be reached now.")
+
+    with monkeypatch.context() as cut:
+        cut.setattr(WorkerService, "register", unanswered)
+        assert upload(worker, run_id, 5, 1) == 503
+    (checkpoint,) = client.get(f"/api/runs/{run_id}/checkpoints").json()["items"]
+    assert services.files.ids() == {checkpoint["id"]}
+    assert upload(worker, run_id, 5, 1) == 204
+    assert services.files.ids() == {checkpoint["id"]}
+
+
+def test_a_checkpoint_that_was_not_registered_while_the_database_is_away_is_left_to_the_sweep(
+    worker: TestClient, run_id: str, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claim(worker, run_id)
+
+    def away(*_arguments: Any) -> Any:
+        raise DatabaseAwayError("The database can't be reached now.")
+
+    with monkeypatch.context() as cut:
+        cut.setattr(WorkerService, "register", away)
+        cut.setattr(LooseArchives, "give_up", away)
+        assert upload(worker, run_id, 5, 1) == 503
+    assert len(services.files.ids()) == 1
+    assert sweep_archives(services, time.time() + GRACE_SECONDS + 1.0) == 1
     assert services.files.ids() == set()
 
 
