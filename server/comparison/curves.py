@@ -12,8 +12,9 @@ from server.comparison.schemas import ExperimentCurves, SeedCurve
 from server.database import tables
 from server.estimates import is_rate
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
+from server.metrics.lines import cut_lines
 from server.metrics.points import Points
-from server.metrics.repository import MetricRepository, cut_curves
+from server.metrics.repository import MetricRepository
 from server.metrics.service import json_rows
 from server.metrics.thinning import EVALUATIONS
 from workers.statistics.seeds import means_band, rates_band
@@ -30,8 +31,8 @@ def finer(
     """Series finer than a grid of so many places, by run and name: long ones as their summaries know them."""
     if points > SUMMARY_WIDTH:
         return repository.curves(run_ids, names, points)
-    known = repository.curves_by_summaries(run_ids, names)
-    return {run_id: cut_curves(series, _width(points)) for run_id, series in known.items()}
+    known = repository.lines(run_ids, names)
+    return {run_id: cut_lines(lines, _width(points)) for run_id, lines in known.items()}
 
 
 def beyond(tails: Mapping[str, Points], known: Followed, points: int) -> tuple[dict[str, Curve], Grid] | None:

@@ -3,8 +3,9 @@
 from server.diagnoses.schemas import Diagnoses
 from server.experiments.stored import training_of
 from server.metrics.buckets import SUMMARY_WIDTH
-from server.metrics.repository import MetricRepository, cut_curves
-from server.metrics.service import curves_of_run
+from server.metrics.lines import cut_lines
+from server.metrics.repository import MetricRepository
+from server.metrics.service import lines_of_run
 from server.runs.repository import PointsState, RunRepository
 from server.services import Services
 from workers.diagnoses import History, Series, diagnose
@@ -25,7 +26,7 @@ class DiagnosisService:
         with self._services.database.read() as session:
             run = RunRepository(session).get(run_id)
             training = training_of(run.experiment)
-            series = curves_of_run(self._services, MetricRepository(session), PointsState.of(run))
-        curves = {name: Series(buckets.steps, buckets.mean) for name, buckets in cut_curves(series, SUMMARY_WIDTH).items()}
+            series = lines_of_run(self._services, MetricRepository(session), PointsState.of(run))
+        curves = {name: Series(buckets.steps, buckets.mean) for name, buckets in cut_lines(series, SUMMARY_WIDTH).items()}
         history = History(training, curves)
         return Diagnoses(run_id=run_id, step=history.step, diagnoses=diagnose(history))

@@ -5,8 +5,7 @@ from collections import OrderedDict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from server.metrics.buckets import Buckets
-from server.metrics.lines import Line, grown
+from server.metrics.lines import Line, grown, sharing_places
 from server.metrics.repository import MetricRepository
 from server.recent import Turns
 from server.runs.repository import PointsState
@@ -51,7 +50,7 @@ class KeptSeries:
         self._runs: OrderedDict[str, _Kept] = OrderedDict()
         self._bytes = 0
 
-    def of(self, run: PointsState, repository: MetricRepository) -> dict[str, Buckets]:
+    def of(self, run: PointsState, repository: MetricRepository) -> Mapping[str, Line]:
         """A run's series, by name; what has come since the last look is read, once for all who ask at once.
 
         Args:
@@ -63,7 +62,7 @@ class KeptSeries:
                 known = self._runs.get(run.run_id)
             if known is None or known.state != run:
                 known = self._keep(run, self._read(run, known, repository))
-        return {name: line.buckets for name, line in known.lines.items()}
+        return known.lines
 
     def _read(self, run: PointsState, known: _Kept | None, repository: MetricRepository) -> dict[str, Line]:
         if known is not None and known.goes_on_to(run):
@@ -71,7 +70,7 @@ class KeptSeries:
             lines = None if fresh is None else grown(known.lines, fresh)
             if lines is not None and all(len(line.points) <= _MAX_POINTS for line in lines.values()):
                 return lines
-        return repository.lines(run.run_id)
+        return sharing_places(repository.lines([run.run_id])[run.run_id])
 
     def _keep(self, run: PointsState, lines: Mapping[str, Line]) -> _Kept:
         kept = _Kept(run, lines, _nbytes(lines.values()))

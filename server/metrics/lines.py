@@ -64,10 +64,29 @@ def grown(lines: Mapping[str, Line], fresh: Mapping[str, Points]) -> dict[str, L
     return sharing_places({name: followed[name] for name in sorted(followed)})
 
 
+def cut_lines(lines: Mapping[str, Line], limit: int) -> dict[str, Buckets]:
+    """Series at most `limit` (at least 2) buckets wide, by name; no two are there in full at a time."""
+    return {name: line.buckets.cut(limit) for name, line in lines.items()}
+
+
 def sharing_places(lines: Mapping[str, Line]) -> dict[str, Line]:
-    """The same series: what was reported together has its steps and times once, a fifth of the bytes that it would take."""
+    """The same series: what was reported together has where it lies once, which is most of the bytes that it would take."""
     places: list[Points] = []
-    return {name: Line(line.before, _placed(line.points, places)) for name, line in lines.items()}
+    grids: list[Buckets] = []
+    return {
+        name: Line(None if line.before is None else _gridded(line.before, grids), _placed(line.points, places))
+        for name, line in lines.items()
+    }
+
+
+def _gridded(buckets: Buckets, grids: list[Buckets]) -> Buckets:
+    """These buckets on the first of the grids that is theirs, which they add where there is none."""
+    for known in grids:
+        alike = ((known.steps, buckets.steps), (known.sizes, buckets.sizes), (known.finite, buckets.finite))
+        if all(np.array_equal(one, other) for one, other in alike):
+            return Buckets(known.steps, known.sizes, known.finite, buckets.low, buckets.mean, buckets.high)
+    grids.append(buckets)
+    return buckets
 
 
 def _placed(points: Points, places: list[Points]) -> Points:

@@ -17,7 +17,7 @@ from server.metrics.axes import AxisRepository, digest
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
 from server.metrics.cutting import cut_chunks
 from server.metrics.latest import set_latest
-from server.metrics.lines import Line, sharing_places
+from server.metrics.lines import Line, cut_lines
 from server.metrics.points import Points
 from server.metrics.summaries import SummaryRepository, summarized, summary_of
 from server.metrics.thinning import Thinned, ThinningRepository, thinned_row
@@ -264,24 +264,14 @@ class MetricRepository:
         Of a long series its summary is read, and what came after it, unless more is asked for than the summary shows.
         """
         lines = self._lines(run_ids, names, by_summaries=limit <= SUMMARY_WIDTH)
-        return {
-            run_id: cut_curves({name: line.buckets for name, line in series.items()}, limit)
-            for run_id, series in lines.items()
-        }
+        return {run_id: cut_lines(series, limit) for run_id, series in lines.items()}
 
-    def curves_by_summaries(
-        self, run_ids: Collection[str], names: Collection[str] | None = None
-    ) -> dict[str, dict[str, Buckets]]:
+    def lines(self, run_ids: Collection[str], names: Collection[str] | None = None) -> dict[str, dict[str, Line]]:
         """The series, all or those named, as fine as they are known without the points of long ones, by run and name.
 
         Good for any `SUMMARY_WIDTH` or less.
         """
-        lines = self._lines(run_ids, names, by_summaries=True)
-        return {run_id: {name: line.buckets for name, line in series.items()} for run_id, series in lines.items()}
-
-    def lines(self, run_id: str) -> dict[str, Line]:
-        """All of a run's series as `curves_by_summaries` has them, to be kept."""
-        return sharing_places(self._lines([run_id], None, by_summaries=True)[run_id])
+        return self._lines(run_ids, names, by_summaries=True)
 
     def _lines(
         self, run_ids: Collection[str], names: Collection[str] | None, *, by_summaries: bool
@@ -436,11 +426,6 @@ class MetricRepository:
 
     def _set_latest(self, run_id: str, newest: Mapping[str, tuple[int, float]]) -> None:
         set_latest(self._session, {(run_id, name): last for name, last in newest.items()})
-
-
-def cut_curves(series: Mapping[str, Buckets], limit: int) -> dict[str, Buckets]:
-    """Series at most `limit` (at least 2) buckets wide, by name."""
-    return {name: buckets.cut(limit) for name, buckets in series.items()}
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from server.metrics.buckets import SUMMARY_WIDTH, Buckets
+from server.metrics.lines import Line, cut_lines
 from server.metrics.points import Points
-from server.metrics.repository import MetricRepository, cut_curves
+from server.metrics.repository import MetricRepository
 from server.metrics.thinning import ThinningRepository
 from server.metrics.views import thinned_view
 from server.runs.repository import PointsState, RunRepository
@@ -69,11 +70,11 @@ class MetricService:
         self, repository: MetricRepository, run: PointsState, names: Collection[str] | None, points: int
     ) -> dict[str, Buckets]:
         if names is None and points <= SUMMARY_WIDTH:
-            return cut_curves(curves_of_run(self._services, repository, run), points)
+            return cut_lines(lines_of_run(self._services, repository, run), points)
         return repository.curves([run.run_id], names, points)[run.run_id]
 
 
-def curves_of_run(services: Services, repository: MetricRepository, run: PointsState) -> Mapping[str, Buckets]:
+def lines_of_run(services: Services, repository: MetricRepository, run: PointsState) -> Mapping[str, Line]:
     """All series of a run, fine enough for `SUMMARY_WIDTH`, as the repository's transaction sees them."""
     return services.series.of(run, repository)
 

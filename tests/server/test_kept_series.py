@@ -69,7 +69,8 @@ def take_back(database: Database, step: int) -> None:
 
 def look(database: Database, kept: KeptSeries) -> dict[str, Buckets]:
     with database.read() as session:
-        return kept.of(RunRepository(session).points_state("r"), MetricRepository(session))
+        lines = kept.of(RunRepository(session).points_state("r"), MetricRepository(session))
+    return {name: line.buckets for name, line in lines.items()}
 
 
 def assert_same(seen: dict[str, Buckets], anew: dict[str, Buckets]) -> None:
@@ -99,10 +100,10 @@ def test_a_second_look_reads_what_was_reported_since(database: Database) -> None
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(MetricRepository, "_rows_of", counted)
-            seen = kept.of(RunRepository(session).points_state("r"), MetricRepository(session))
+            lines = kept.of(RunRepository(session).points_state("r"), MetricRepository(session))
     assert read == ["8000", "8010", "8020", "8030"]
-    assert_same(seen, look(database, KeptSeries()))
-    assert len(seen["loss"]) == 803
+    assert_same({name: line.buckets for name, line in lines.items()}, look(database, KeptSeries()))
+    assert len(lines["loss"].buckets) == 803
     database.dispose()
 
 
@@ -173,4 +174,21 @@ def test_what_is_kept_is_bounded(database: Database) -> None:
     look(database, kept)
     assert not kept._runs
     assert kept._bytes == 0
+    database.dispose()
+
+
+def test_series_that_were_reported_together_lie_on_one_grid(database: Database) -> None:
+    """However many there are: else a long run of forty series took four megabytes, and few were kept."""
+    report(database, 5_000, ("loss", "rate"))
+    compact(database)
+    report(database, 10, ("loss", "rate"))
+    kept = KeptSeries()
+    with database.read() as session:
+        lines = kept.of(RunRepository(session).points_state("r"), MetricRepository(session))
+    loss, rate = lines["loss"], lines["rate"]
+    assert loss.before is not None
+    assert rate.before is not None
+    for field in ("steps", "sizes", "finite"):
+        assert getattr(loss.before, field) is getattr(rate.before, field)
+    assert loss.points.steps is rate.points.steps
     database.dispose()
