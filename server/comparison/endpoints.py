@@ -20,7 +20,11 @@ ExperimentIds = Annotated[
 
 Margin = Annotated[float, Query(gt=0.0, le=0.5, description="Success rates that differ by less are equivalent, 0 to 1.")]
 Base = Annotated[
-    str | None, Query(max_length=64, description="Id of the one that the others are held against; the first without it.")
+    str | None,
+    Query(
+        max_length=64,
+        description="Id of the one that the others are held against; without it the first with seeds enough for a verdict.",
+    ),
 ]
 EveryPair = Annotated[bool, Query(alias="pairs", description="Judge every pair, of 12 experiments at most.")]
 Metric = Annotated[str, Query(max_length=64, description="Of the metric.")]

@@ -90,6 +90,7 @@ class Comparison(Schema):
     """Experiments side by side, in the order asked for."""
 
     experiments: list[ComparedExperiment]
+    base: str | None = Field(description="Id of the one that the others are held against; null for every pair.")
     verdicts: list[ComparisonVerdict] = Field(description="Every experiment against the base, or every pair.")
     comparisons: int = Field(description="Verdicts that were not refused: of so many at 95 %, about one in twenty misses.")
     improvements: list[Improvement] = Field(description="Of every pair with verdicts on one suite.")

@@ -25,6 +25,7 @@ from server.errors import InvalidRequestError
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_numbers
 from server.services import Services
+from workers.statistics.differences import LEAST_SEEDS
 from workers.statistics.improvement import performance_profile
 
 MOST_IN_PAIRS = 12
@@ -65,21 +66,24 @@ class ComparisonService:
         Args:
             experiment_ids: of those to compare.
             margin: success rates that differ by less are equivalent, 0 to 1.
-            base: what the others are held against; the first without it.
+            base: what the others are held against; without it the first that has seeds enough, or the first of all.
             every_pair: hold each against all before it instead.
 
         Raises:
             NotFoundError: one of the experiments is missing.
             InvalidRequestError: the base is none of them, or there are too many for every pair.
         """
-        held = _held(experiment_ids, base, every_pair=every_pair)
+        _check_held(experiment_ids, base, every_pair=every_pair)
         compared = self._compared(experiment_ids)
         figures = compared.figures
+        held_against = None if every_pair else base or _usual_base(figures)
+        held = _held(experiment_ids, held_against)
         by_id = {one.id: one for one in figures}
         pairs = [(by_id[one], by_id[other]) for one, other in held]
         told = verdicts(pairs, margin)
         return Comparison(
             experiments=[one.view() for one in figures],
+            base=held_against,
             verdicts=told,
             comparisons=sum(verdict.word != "refused" for verdict in told),
             improvements=improvements(pairs),
@@ -179,16 +183,23 @@ class ComparisonService:
         )
 
 
-def _held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) -> list[tuple[str, str]]:
-    """What is held against what: pairs of a base and another."""
+def _check_held(experiment_ids: Sequence[str], base: str | None, *, every_pair: bool) -> None:
     if base is not None and base not in experiment_ids:
         raise InvalidRequestError("The base is none of the experiments that are compared.")
-    if every_pair:
-        if len(experiment_ids) > MOST_IN_PAIRS:
-            raise InvalidRequestError(f"Every pair is judged of {MOST_IN_PAIRS} experiments at most: choose a base.")
+    if every_pair and len(experiment_ids) > MOST_IN_PAIRS:
+        raise InvalidRequestError(f"Every pair is judged of {MOST_IN_PAIRS} experiments at most: choose a base.")
+
+
+def _usual_base(figures: Sequence[FinalFigures]) -> str:
+    """Against what has just begun nothing could be said."""
+    return next((one.id for one in figures if one.seeds >= LEAST_SEEDS), figures[0].id)
+
+
+def _held(experiment_ids: Sequence[str], base: str | None) -> list[tuple[str, str]]:
+    """What is held against what: pairs of the base and another; every pair without a base."""
+    if base is None:
         return list(combinations(experiment_ids, 2))
-    first = base or experiment_ids[0]
-    return [(first, other) for other in experiment_ids if other != first]
+    return [(base, other) for other in experiment_ids if other != base]
 
 
 def _profile(figures: FinalFigures) -> Profile:

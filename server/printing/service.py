@@ -30,7 +30,7 @@ class Wanted:
     Attributes:
         experiment_ids: in order.
         margin: success rates that differ by less are equivalent.
-        base: what the others are held against; the first without it.
+        base: what the others are held against; None for what is usual.
         every_pair: hold each against all before it instead.
     """
 

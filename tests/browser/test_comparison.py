@@ -221,6 +221,7 @@ def test_an_experiment_has_one_colour_everywhere(compared: tuple[BrowserContext,
     expect(swatches).to_have_count(2)
     assert [each.get_attribute("data-color") for each in swatches.all()] == [str(color_of(each)) for each in ids]
     legend = page.get_by_role("figure", name="Success rate").first.locator("svg[data-color]")
+    expect(legend).to_have_count(2)
     assert [each.get_attribute("data-color") for each in legend.all()] == [str(color_of(each)) for each in ids]
     page.get_by_role("button", name="Export the chart Performance profile").click()
     with page.expect_download() as download:

@@ -203,6 +203,16 @@ def test_many_comparisons_are_counted_and_their_p_adjusted(client: TestClient, r
     assert said == [one["p_holm"] >= 0.05 for one in verdicts if one["word"] == "better"]
 
 
+def test_what_has_seeds_enough_is_the_base_before_what_was_named_first(client: TestClient, reports: Reports) -> None:
+    few, good = measured(reports, "few", (900, 880)), measured(reports, "good", (900, 880, 910, 890, 905))
+    other = measured(reports, "other", (800, 780, 810, 790, 805))
+    comparison = compare(client, few, good, other)
+    assert comparison["base"] == good["id"]
+    assert [one["word"] == "refused" for one in comparison["verdicts"] if one["measure"] == "success"] == [True, False]
+    # Where none has, it is the first.
+    assert compare(client, few, measured(reports, "fewer", (900,)))["base"] == few["id"]
+
+
 def test_another_base_and_every_pair(client: TestClient, reports: Reports) -> None:
     ids = [measured(reports, name, (900,) * 5)["id"] for name in "abc"]
 

@@ -4998,6 +4998,11 @@ export interface components {
          */
         Comparison: {
             /**
+             * Base
+             * @description Id of the one that the others are held against; null for every pair.
+             */
+            base: string | null;
+            /**
              * Comparisons
              * @description Verdicts that were not refused: of so many at 95 %, about one in twenty misses.
              */
@@ -14816,7 +14821,7 @@ export interface operations {
     compare_api_compare_get: {
         parameters: {
             query: {
-                /** @description Id of the one that the others are held against; the first without it. */
+                /** @description Id of the one that the others are held against; without it the first with seeds enough for a verdict. */
                 base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
@@ -15055,7 +15060,7 @@ export interface operations {
     compare_report_api_compare_report_get: {
         parameters: {
             query: {
-                /** @description Id of the one that the others are held against; the first without it. */
+                /** @description Id of the one that the others are held against; without it the first with seeds enough for a verdict. */
                 base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
@@ -15099,7 +15104,7 @@ export interface operations {
     compare_table_api_compare_table_get: {
         parameters: {
             query: {
-                /** @description Id of the one that the others are held against; the first without it. */
+                /** @description Id of the one that the others are held against; without it the first with seeds enough for a verdict. */
                 base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];

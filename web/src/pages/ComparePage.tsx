@@ -61,9 +61,9 @@ export function ComparePage() {
   }
   const margin = Number(search.get('margin')) || MARGIN
   const wanted = search.get('base')
-  const base = wanted === EVERY_PAIR || (wanted && chosen.includes(wanted)) ? wanted : (chosen[0] ?? '')
+  const base = wanted === EVERY_PAIR || (wanted && chosen.includes(wanted)) ? wanted : null
   /** Keeps a choice in the address; what is chosen anyway does not stand there. */
-  const keep = (name: string, value: string, usual: string) =>
+  const keep = (name: string, value: string, usual?: string) =>
     setSearch(
       (before) => {
         const after = new URLSearchParams(before)
@@ -79,7 +79,7 @@ export function ComparePage() {
       margin={margin}
       onMargin={(next) => keep('margin', String(next), String(MARGIN))}
       base={base}
-      onBase={(next) => keep('base', next, chosen[0] ?? '')}
+      onBase={(next) => keep('base', next)}
       onChange={() => setPicking(true)}
     />
   )
@@ -89,14 +89,14 @@ interface ChosenProps {
   chosen: readonly string[]
   margin: number
   onMargin: (margin: number) => void
-  /** What the others are held against: an id, or `EVERY_PAIR`. */
-  base: string
+  /** What the others are held against: an id, or `EVERY_PAIR`; null for what the server takes. */
+  base: string | null
   onBase: (base: string) => void
   onChange: () => void
 }
 
 function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
-  const held = base === EVERY_PAIR ? { pairs: true } : base === chosen[0] ? {} : { base }
+  const held = base === EVERY_PAIR ? { pairs: true } : base === null ? {} : { base }
   const query = comparisonQuery(chosen, margin, held)
   const [view] = useChartView()
   const { data, error, refetch } = $api.useQuery(
@@ -152,7 +152,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
               comparison={data}
               margin={margin}
               onMargin={onMargin}
-              base={base}
+              base={base ?? data.base ?? EVERY_PAIR}
               onBase={onBase}
               query={query}
             />

@@ -408,6 +408,7 @@ export const comparison: Comparison = {
     { path: 'algorithm.network.hidden_sizes', values: [[64, 64], null], left_out: [false, false] },
     { path: 'task.reward.terms.progress.weight', values: [500, null], left_out: [false, true] },
   ],
+  base: 'exp1',
   verdicts: [
     {
       measure: 'success',
