@@ -99,7 +99,7 @@ def _parameters(safety: Safety) -> str:
     numbers = "\n".join(line if "." in line or "e" in line.split(": ")[1] else f"{line}.0" for line in lines)
     return (
         "# Lengths in metres, angles in radians, times in seconds; mapless_navigator/navigator.py says what each one does.\n"
-        f"mapless_navigator:\n  ros__parameters:\n    stamped_twist: false\n    measured_speeds: true\n{numbers}\n"
+        f"mapless_navigator:\n  ros__parameters:\n    stamped_twist: true\n    measured_speeds: true\n{numbers}\n"
     )
 
 

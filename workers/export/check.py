@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from workers.errors import ExportError
@@ -25,6 +24,7 @@ from workers.export.graph import (
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
 from workers.manifest import Manifest
+from workers.onnx_runtime import session
 from workers.policy import TorchPolicy
 
 TOLERANCE = 1e-5
@@ -90,12 +90,9 @@ def check_export(
 
 def run_graph(model: bytes, inputs: Mapping[str, Floats]) -> dict[str, Floats]:
     """All outputs of an ONNX file by name, computed by onnxruntime on one thread."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.log_severity_level = 3
-    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
-    names = [output.name for output in session.get_outputs()]
-    return dict(zip(names, session.run(names, dict(inputs)), strict=True))
+    runs = session(model)
+    names = [output.name for output in runs.get_outputs()]
+    return dict(zip(names, runs.run(names, dict(inputs)), strict=True))
 
 
 def _scene(rng: np.random.Generator, shipped: ShippedPolicy) -> dict[str, Floats]:

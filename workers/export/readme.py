@@ -48,7 +48,11 @@ NAMES = actions[0] * policy.specification.action_limits
 """
 
 _ONNX_EXAMPLE = """\
-IMPORTimport numpy as np
+IMPORTimport os
+
+import numpy as np
+
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # else it reports what it runs to its maker
 import onnxruntime
 
 session = onnxruntime.InferenceSession("policy_from_scan.onnx")
@@ -110,7 +114,7 @@ def _onnx_example(specification: Specification) -> str:
     example = (
         example.replace("OUTPUTS", ", ".join(outputs)).replace("QUOTED", '", "'.join(outputs)).replace("NEXT", following)
     )
-    return _filled(example.replace("IMPORT", "import json\n\n" if earlier else ""), specification)
+    return _filled(example.replace("IMPORT", "import json\n" if earlier else ""), specification)
 
 
 def _filled(example: str, specification: Specification) -> str:
@@ -276,7 +280,8 @@ def _cell(text: str) -> str:
 
 def _ros(specification: Specification) -> str:
     second = ", `scan_second`" if len(specification.mounts) > 1 else ""
-    topic = "`ackermann_cmd` (ackermann_msgs/AckermannDriveStamped)" if specification.drive == "ackermann" else "`cmd_vel`"
+    steers = specification.drive == "ackermann"
+    topic = "`ackermann_cmd` (ackermann_msgs/AckermannDriveStamped)" if steers else "`cmd_vel` (geometry_msgs/TwistStamped)"
     return f"""\
 ## ROS 2
 
@@ -291,7 +296,8 @@ It reads `scan`{second}, `odom` and `goal_pose`, and writes {topic} every
 {specification.control_period:g} s while it has a goal
 (launch arguments of these names give other topics). It stops when the scan or the odometry is stale, when the scan
 leaves a part of the field of view unknown, when something is nearer than {specification.collision_distance:g} m ahead or
-touches the body beside or behind, and within {specification.arrival_distance:g} m of the goal. The goal must be in the
-odometry's frame. Parameters are in `config/navigator.yaml`: mind `sensor_yaw` where a LiDAR is not turned as in training.
+touches the body beside or behind, and within {specification.arrival_distance:g} m of the goal. The goal may be in
+any frame that TF connects with the odometry's, as `map`. Parameters are in `config/navigator.yaml`: mind `sensor_yaw` where
+a LiDAR is not turned as in training, and set `stamped_twist` to false for a robot that takes plain Twist messages.
 Lift the wheels off the ground for the first start, and keep a hand on the emergency stop.
 """

@@ -1,5 +1,6 @@
 """A fake ROS 2 for machines without one."""
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from types import ModuleType, SimpleNamespace
@@ -55,6 +56,26 @@ class FakeNode:
         self.log.append("destroyed")
 
 
+class FakeTransformError(Exception):
+    """What `tf2_ros` raises where it knows no way from a frame to another."""
+
+
+class FakeBuffer:
+    """What the navigator uses of `tf2_ros.Buffer`: from (target, source) to when, x, y and heading, as a test sets them."""
+
+    transforms: dict[tuple[str, str], tuple[float, float, float, float]] = {}  # noqa: RUF012 (a test fills it)
+
+    def lookup_transform(self, target: str, source: str, _when: Any) -> Any:
+        if (target, source) not in self.transforms:
+            raise FakeTransformError(f"{source} is not connected with {target}")
+        at, x, y, heading = self.transforms[target, source]
+        turned = SimpleNamespace(x=0.0, y=0.0, z=math.sin(heading / 2.0), w=math.cos(heading / 2.0))
+        return SimpleNamespace(
+            header=SimpleNamespace(stamp=FakeClock.stamp(at), frame_id=target),
+            transform=SimpleNamespace(translation=SimpleNamespace(x=x, y=y, z=0.0), rotation=turned),
+        )
+
+
 def _message(**fields: Callable[[], Any]) -> type:
     """A message class whose fields start at their default."""
     return type("Message", (), {"__init__": lambda self: self.__dict__.update({k: make() for k, make in fields.items()})})
@@ -88,6 +109,7 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
     goal = _message(header=header, pose=pose)
     odometry = _message(
         header=header,
+        child_frame_id=lambda: "base_footprint",
         pose=lambda: SimpleNamespace(pose=pose()),
         twist=lambda: SimpleNamespace(twist=twist()),
     )
@@ -105,6 +127,13 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
         _module("rclpy.node", Node=FakeNode),
         _module("rclpy.qos", qos_profile_sensor_data="sensor data"),
         _module("rclpy.signals", SignalHandlerOptions=SimpleNamespace(NO="no handlers")),
+        _module("rclpy.time", Time=lambda: "the newest"),
+        _module(
+            "tf2_ros",
+            Buffer=FakeBuffer,
+            TransformException=FakeTransformError,
+            TransformListener=lambda _buffer, _node: None,
+        ),
         _module("ackermann_msgs"),
         _module("ackermann_msgs.msg", AckermannDriveStamped=steered),
         _module("geometry_msgs"),
@@ -119,5 +148,14 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
     name = "workers.export.ros2.mapless_navigator.node"
     monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setattr(FakeNode, "parameters", {})
-    yield SimpleNamespace(rclpy=rclpy, Node=FakeNode, LaserScan=scan, Odometry=odometry, PoseStamped=goal, Twist=twist)
+    monkeypatch.setattr(FakeBuffer, "transforms", {})
+    yield SimpleNamespace(
+        rclpy=rclpy,
+        Node=FakeNode,
+        LaserScan=scan,
+        Odometry=odometry,
+        PoseStamped=goal,
+        Twist=twist,
+        transforms=FakeBuffer.transforms,
+    )
     sys.modules.pop(name, None)

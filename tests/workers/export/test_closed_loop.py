@@ -70,7 +70,8 @@ def test_a_trained_policy_arrives_through_the_code_that_ships(tmp_path: Path) ->
     limits = np.array([policy.specification.max_linear_speed, policy.specification.max_angular_speed])
     navigators = [Navigator(policy, safety) for _ in range(robots)]
     for navigator, target in zip(navigators, env.targets, strict=True):
-        navigator.set_goal(*map(float, target))
+        x, y = map(float, target)
+        navigator.set_goal(x, y)
 
     arrived = np.zeros(robots, np.bool_)
     for step in range(300):

@@ -23,6 +23,8 @@ class State(Enum):
     ARRIVED = "arrived"
     NO_ODOMETRY = "stopped: no odometry yet"
     STALE_ODOMETRY = "stopped: odometry is stale"
+    NO_FRAME = "stopped: the place of the goal's frame is not known yet"
+    STALE_FRAME = "stopped: the place of the goal's frame is stale"
     NO_SCAN = "stopped: no scan yet"
     STALE_SCAN = "stopped: scan is stale"
     BLIND = "stopped: scan does not cover the policy's field of view"
@@ -40,6 +42,7 @@ class Safety:
             proportion to its outline.
         resume_margin: metres more than either that let it drive again.
         scan_timeout, odometry_timeout: seconds after which the newest message is stale.
+        transform_timeout: seconds after which the newest place of a goal's frame is.
         goal_tolerance: distance to the goal that counts as arrived.
         max_linear_speed, max_angular_speed: limits below the policy's slow it down on the same arc.
         sensor_yaw, second_sensor_yaw: of the x axis of each LiDAR's scan against the heading.
@@ -57,6 +60,7 @@ class Safety:
     sensor_yaw: float = 0.0
     second_sensor_yaw: float = 0.0
     max_gap: float = 0.0873  # 5 degrees
+    transform_timeout: float = 1.0
 
     @classmethod
     def of(cls, specification: Specification) -> "Safety":
@@ -121,6 +125,8 @@ class Navigator:
         self._pose: tuple[float, tuple[float, float, float]] | None = None
         self._velocities: tuple[float, float, float] | None = None
         self._goal: tuple[float, float] | None = None
+        self._goal_frame = ""
+        self._place: tuple[float, tuple[float, float, float]] | None = None
         self._arrived = False
         self._too_near = False
         self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
@@ -136,16 +142,35 @@ class Navigator:
     def set_odometry(
         self, at: float, x: float, y: float, heading: float, velocities: tuple[float, float, float] | None = None
     ) -> None:
-        """The robot's pose in the goal's frame then, and how fast it drives forwards, to the left and turns, if measured."""
+        """The robot's pose in the odometry's frame, and how fast it drives forwards, to the left and turns, if measured."""
         self._pose = (at, (x, y, heading))
         self._velocities = velocities
 
-    def set_goal(self, x: float, y: float) -> None:
-        """Where to go; further from the last goal than arriving allows, the way to it begins here."""
-        moved = self._goal is None or math.dist(self._goal, (x, y)) > self._safety.goal_tolerance
+    def set_goal(self, x: float, y: float, frame: str = "") -> None:
+        """Where to go; further from the last goal than arriving allows, the way to it begins here.
+
+        Args:
+            x: of the goal in the frame.
+            y: likewise.
+            frame: whose place `place_goal_frame` tells, again and again where it moves; empty: the odometry's.
+        """
+        moved = (
+            self._goal is None or frame != self._goal_frame or math.dist(self._goal, (x, y)) > self._safety.goal_tolerance
+        )
         if self._trail is not None and moved:
             self._trail.clear()
-        self._goal, self._arrived = (x, y), False
+        if frame != self._goal_frame:
+            self._place = None
+        self._goal, self._goal_frame, self._arrived = (x, y), frame, False
+
+    @property
+    def goal_frame(self) -> str:
+        """Of the goal that is driven to; empty: the odometry's, or there is no goal."""
+        return self._goal_frame if self._goal is not None else ""
+
+    def place_goal_frame(self, at: float, x: float, y: float, heading: float) -> None:
+        """Where the goal's frame lay in the odometry's then, and how far it was turned."""
+        self._place = (at, (x, y, heading))
 
     def cancel(self) -> None:
         """Stay where it is."""
@@ -171,6 +196,10 @@ class Navigator:
             return State.NO_ODOMETRY, None
         if now - self._pose[0] > safety.odometry_timeout:
             return State.STALE_ODOMETRY, None
+        if self._goal_frame and self._place is None:
+            return State.NO_FRAME, None
+        if self._goal_frame and self._place is not None and now - self._place[0] > safety.transform_timeout:
+            return State.STALE_FRAME, None
         scans: list[Scan] = []
         for newest in self._scans:
             if newest is None:
@@ -178,7 +207,7 @@ class Navigator:
             if now - newest[0] > safety.scan_timeout:
                 return State.STALE_SCAN, None
             scans.append(newest[1])
-        pose, goal = np.array(self._pose[1]), np.array(self._goal)
+        pose, goal = np.array(self._pose[1]), self._goal_by_odometry(self._goal)
         if not (np.isfinite(pose).all() and np.isfinite(goal).all() and np.isfinite(self._speeds()).all()):
             return State.NOT_FINITE, None
         if np.hypot(*(goal - pose[:2])) < safety.goal_tolerance:
@@ -205,6 +234,14 @@ class Navigator:
             added["trail"] = self._trail.see(ranges, pose)[None]
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)
+
+    def _goal_by_odometry(self, goal: tuple[float, float]) -> Reals:
+        """The goal in the odometry's frame, (2,)."""
+        if not self._goal_frame or self._place is None:
+            return np.array(goal)
+        x, y, heading = self._place[1]
+        cos, sin = math.cos(heading), math.sin(heading)
+        return np.array((x + cos * goal[0] - sin * goal[1], y + sin * goal[0] + cos * goal[1]))
 
     def _speeds(self) -> Floats:
         """What the robot does as fractions of its limits, (A,): its speeds as measured, else as last commanded."""

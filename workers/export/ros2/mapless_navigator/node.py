@@ -1,15 +1,15 @@
-"""The ROS 2 node: LaserScan, Odometry and a goal PoseStamped in, Twist or AckermannDriveStamped out.
+"""The ROS 2 node: LaserScan, Odometry and a goal PoseStamped in, TwistStamped, Twist or AckermannDriveStamped out.
 
 | topic         | type                        |                                                                  |
 |---------------|-----------------------------|------------------------------------------------------------------|
 | `scan`        | sensor_msgs/LaserScan       | in                                                               |
 | `scan_second` | sensor_msgs/LaserScan       | in: the second LiDAR's, where the policy has two                 |
 | `odom`        | nav_msgs/Odometry           | in: the robot's pose, and its velocities (`measured_speeds`)     |
-| `goal_pose`   | geometry_msgs/PoseStamped   | in: only its position counts; its frame must be the odometry's   |
-| `cmd_vel`     | geometry_msgs/Twist         | out, once per control period while a goal is set, then one stop  |
+| `goal_pose`   | geometry_msgs/PoseStamped   | in: only its position counts, in any frame that TF knows         |
+| `cmd_vel`     | geometry_msgs/TwistStamped  | out, once per control period while a goal is set, then one stop  |
 
-A policy of an Ackermann drive speaks on `ackermann_cmd` instead, an ackermann_msgs/AckermannDriveStamped: the speed of the
-rear axle and the steering angle.
+A robot that takes a plain geometry_msgs/Twist gets it where `stamped_twist` is false. A policy of an Ackermann drive speaks
+on `ackermann_cmd` instead, an ackermann_msgs/AckermannDriveStamped: the speed of the rear axle and the steering angle.
 
 Everything that is decided is decided in `navigator`; this file translates messages.
 """
@@ -26,7 +26,9 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
+from tf2_ros import Buffer, TransformException, TransformListener
 
 from .navigator import Command, Navigator, Safety, State
 from .observation import Scan
@@ -42,9 +44,12 @@ class NavigatorNode(Node):
         super().__init__("mapless_navigator")
         policy = Policy.load(self._parameter("policy_directory", "") or default_policy_directory())
         self._measured_speeds = bool(self._parameter("measured_speeds", True))
-        self._stamped = bool(self._parameter("stamped_twist", False))
+        self._stamped = bool(self._parameter("stamped_twist", True))
         self._navigator = Navigator(policy, self._safety(Safety.of(policy.specification)))
-        self._frame = ""
+        self._frame, self._body = "", ""
+        self._transforms = Buffer()
+        self._listener = TransformListener(self._transforms, self)
+        self._trouble = ""
         self._state: State | None = None
         self._steers = policy.specification.drive == "ackermann"
         if self._steers:
@@ -75,7 +80,7 @@ class NavigatorNode(Node):
 
     def on_odometry(self, message: Any) -> None:
         """An `Odometry`."""
-        self._frame = message.header.frame_id
+        self._frame, self._body = message.header.frame_id, message.child_frame_id
         position, orientation = message.pose.pose.position, message.pose.pose.orientation
         twist = message.twist.twist
         velocities = (twist.linear.x, twist.linear.y, twist.angular.z) if self._measured_speeds else None
@@ -84,17 +89,13 @@ class NavigatorNode(Node):
         )
 
     def on_goal(self, message: Any) -> None:
-        """A goal `PoseStamped`; one in another frame than the odometry's is refused."""
-        frame = message.header.frame_id
-        if frame and self._frame and frame != self._frame:
-            self.get_logger().error(
-                f"goal refused: its frame is '{frame}', the odometry's '{self._frame}': send it in the odometry's frame"
-            )
-            return
-        self._navigator.set_goal(message.pose.position.x, message.pose.position.y)
+        """A goal `PoseStamped`; one without a frame is in the odometry's."""
+        self._trouble = ""
+        self._navigator.set_goal(message.pose.position.x, message.pose.position.y, message.header.frame_id)
 
     def on_timer(self) -> None:
         """Once per control period: decide and send."""
+        self._place_goal_frame()
         command = self._navigator.command(self._now())
         if command.state is not self._state:
             self.get_logger().info(command.state.value)
@@ -115,11 +116,31 @@ class NavigatorNode(Node):
         twist.linear.x, twist.linear.y, twist.angular.z = command.linear, command.lateral, command.angular
         if self._stamped:
             stamped = TwistStamped()
-            stamped.header.stamp = self.get_clock().now().to_msg()
+            stamped.header.stamp, stamped.header.frame_id = self.get_clock().now().to_msg(), self._body
             stamped.twist = twist
             self._publisher.publish(stamped)
         else:
             self._publisher.publish(twist)
+
+    def _place_goal_frame(self) -> None:
+        """Tell where the goal's frame lies now: what corrects the odometry moves it, as a map's."""
+        frame = self._navigator.goal_frame
+        if not frame or not self._frame:
+            return
+        if frame == self._frame:
+            self._navigator.place_goal_frame(self._now(), 0.0, 0.0, 0.0)
+            return
+        try:
+            found = self._transforms.lookup_transform(self._frame, frame, Time())
+        except TransformException as error:
+            if not self._trouble:
+                self._trouble = f"no transform from the goal's frame '{frame}' to the odometry's '{self._frame}': {error}"
+                self.get_logger().error(self._trouble)
+            return
+        self._trouble = ""
+        moved, turned = found.transform.translation, found.transform.rotation
+        # One that never changes has no time.
+        self._navigator.place_goal_frame(self._measured_at(found.header.stamp), moved.x, moved.y, yaw_of(turned))
 
     def _parameter(self, name: str, default: Any) -> Any:
         return self.declare_parameter(name, default).value

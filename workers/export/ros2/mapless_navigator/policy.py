@@ -11,6 +11,7 @@ own, `policy.onnx` is there too, and onnxruntime runs it.
 import hashlib
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -251,6 +252,8 @@ def _session(graph: bytes) -> Any:
     Raises:
         PolicyFileError: onnxruntime is not installed here.
     """
+    # Since 1.29 it reports what it runs to its maker, unless it is told not to before it is loaded: a robot tells nobody.
+    os.environ["ORT_DISABLE_TELEMETRY"] = "1"
     try:
         import onnxruntime
     except ImportError as error:
