@@ -14,6 +14,7 @@ from sim.config import TaskConfig
 from sim.observations import observation_layout
 from workers.errors import ForeignPolicyError
 from workers.export.graph import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
+from workers.onnx_runtime import session
 
 MAX_MEMORY = 65_536
 """Numbers that such a policy may remember of a robot."""
@@ -34,14 +35,9 @@ class OnnxPolicy:
     """
 
     def __init__(self, graph: bytes, task: TaskConfig) -> None:
-        import onnxruntime
-
         _refuse_other_files(graph)
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
         try:
-            self._session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+            self._session = session(graph)
         except Exception as error:  # onnxruntime's errors share no base but this
             raise ForeignPolicyError(f"onnxruntime does not run this file: {_first_line(error)}") from error
         actions = action_layout(task.robot)
