@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from sim.config import ArenaConfig, Frozen, ObservationConfig, TaskConfig
+from sim.config import ArenaConfig, Frozen, GeneratedArenaConfig, LidarConfig, ObservationConfig, TaskConfig
 from workers.config import (
     DdpgConfig,
     EvaluationConfig,
@@ -86,7 +86,22 @@ COMPLEX = Preset(
     ),
 )
 
-PRESETS: tuple[Preset, ...] = (DEFAULT, PAPER, COMPLEX)
+NEW_PLACES = Preset(
+    id="new-places",
+    title="New places",
+    description="For clutter that it has never met, by a noisy LiDAR and with commands that come late: PPO on 256 maps.",
+    training=TrainingConfig(
+        task=TaskConfig(
+            arena=GeneratedArenaConfig(name="clutter", difficulty=0.5, maps=256),
+            lidar=LidarConfig(noise=0.01, dropout=0.01),
+            command_delay=1,
+        ),
+        steps=1_000_000,
+        evaluation=EvaluationConfig(every_steps=250_000),
+    ),
+)
+
+PRESETS: tuple[Preset, ...] = (DEFAULT, PAPER, COMPLEX, NEW_PLACES)
 
 
 def preset(identifier: str) -> Preset:
