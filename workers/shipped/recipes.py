@@ -192,7 +192,7 @@ RECIPES: tuple[Recipe, ...] = (
                 robot=RoundConfig(radius=0.25, max_linear_speed=1.0, max_angular_speed=2.0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0, range=6.0),
                 observation=ObservationConfig.preset("improved", batches=60, frames=3),
-                reward=_along_the_path(-2000.0),
+                reward=_along_the_path(-5000.0),
                 arrival_distance=0.3,
                 collision_distance=0.0,
                 step_limit=300,
