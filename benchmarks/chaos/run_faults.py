@@ -26,6 +26,13 @@ def _kill_trainer(scene: Scene) -> None:
     kill([trainer])
 
 
+def _kill_nursery(scene: Scene) -> None:
+    nursery = scene.node.nursery()
+    if nursery is None or scene.node.trainer() is None:
+        raise MissedError
+    kill([nursery])
+
+
 def _stop_trainer(scene: Scene) -> None:
     trainer = scene.node.trainer()
     if trainer is None:
@@ -195,6 +202,7 @@ def _set_clock_forward(scene: Scene) -> None:
 
 RUN_FAULTS = (
     Kind("trainer killed", "SIGKILL to the process that trains", _kill_trainer, "run", "closed", True),
+    Kind("nursery killed", "SIGKILL to the process that trainers are forked from", _kill_nursery, "run", "closed", True),
     Kind("trainer stopped", f"SIGSTOP, SIGCONT {_STILL_SECONDS:g} s later", _stop_trainer, "run", "closed"),
     Kind("worker killed", "SIGKILL to a worker and all its processes", _kill_worker, "run", "silent", new_attempt=True),
     Kind(

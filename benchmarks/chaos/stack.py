@@ -17,7 +17,7 @@ from benchmarks.chaos.clock import Clock
 from benchmarks.chaos.disk import Disk
 from benchmarks.chaos.proxy import Proxy
 from benchmarks.chaos.recorder import Recorder
-from benchmarks.processes import free_port, kill, trainer_of, tree
+from benchmarks.processes import free_port, kill, nursery_of, trainer_of, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 Mode = Literal["embedded", "production"]
@@ -73,10 +73,14 @@ class Node:
         """The process that trains, or waits to."""
         return trainer_of(self._process.pid) if self._process is not None else None
 
+    def nursery(self) -> psutil.Process | None:
+        """The process that trainers are forked from."""
+        return nursery_of(self._process.pid) if self._process is not None else None
+
     def child(self) -> psutil.Process | None:
         """The process of Celery's pool in which the attempt is looked after."""
-        trainer = self.trainer()
-        return trainer.parent() if trainer is not None else None
+        nursery = self.nursery()
+        return nursery.parent() if nursery is not None else None
 
     def spool(self, run_id: str) -> Path | None:
         """The file of the attempt that is under way."""

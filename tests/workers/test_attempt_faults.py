@@ -157,7 +157,7 @@ class Place:
     def taken(self) -> bool:
         """Whether a trainer could be had; it is put back."""
         try:
-            self.slot.put_back(self.slot.take_trainer())
+            self.slot.give_back(self.slot.take_trainer())
         except UnfitError:
             return False
         return True

@@ -1,9 +1,8 @@
 """What a Celery task and its trainer process say to one another over pipes: length-prefixed MessagePack.
 
 task                             trainer process
-  | --- Job ------------------------> |      once; the process may have waited for it
+  | --- Job ------------------------> |      once
   | --- Control --------------------> |      whenever stop or watch change
-  | <-- Ready ----------------------- |      once, first: it has imported all that it needs
   | <-- MetricsReport, EventReport, CheckpointReport, FrameReport ---
   | <-- Ended ----------------------- |      once, last
 """
@@ -37,10 +36,6 @@ class Control(msgspec.Struct, frozen=True, tag="control"):
 
     stop: bool
     watch: str | None
-
-
-class Ready(msgspec.Struct, frozen=True, tag="ready"):
-    """The process is up and can take a job."""
 
 
 class MetricsReport(msgspec.Struct, frozen=True, tag="metrics"):
@@ -84,7 +79,7 @@ class Ended(msgspec.Struct, frozen=True, tag="ended"):
     error: str | None = None
 
 
-Report: TypeAlias = Ready | MetricsReport | EventReport | CheckpointReport | FrameReport | Ended
+Report: TypeAlias = MetricsReport | EventReport | CheckpointReport | FrameReport | Ended
 Order: TypeAlias = Job | Control
 
 

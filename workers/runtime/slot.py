@@ -15,6 +15,7 @@ from workers.runtime.client import ServerClient
 from workers.runtime.ending import DRAIN_SIGNAL
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
 from workers.runtime.machine import MachineWatch
+from workers.runtime.nursery import Nursery
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.sight import ServerSight
 from workers.runtime.trainer_handle import TrainerHandle
@@ -25,7 +26,7 @@ _TICK_SECONDS = 0.5
 _READY_POLL_SECONDS = 0.05
 # The server takes 10,000.
 _TROUBLE_CHARACTERS = 2_000
-# Between two trials to keep a trainer ready, where it dies on its own.
+# Between two trials to keep trainers at hand, where the process that they come from dies on its own.
 _FIRST_RETRY_SECONDS = 1.0
 _LAST_RETRY_SECONDS = 60.0
 # Imports take seconds; on a fresh checkout the simulation's kernels are compiled first, which takes a minute.
@@ -35,8 +36,8 @@ _TRAINER_PATIENCE_SECONDS = 300.0
 class Slot:
     """A place in which one training at a time runs. Its keeper thread lives as long as the process.
 
-    Importing PyTorch and numba takes seconds, more than a person wants to wait for the first point of a curve: so a trainer
-    process waits with all imports done while the slot is idle, and none does while the slot trains.
+    Importing PyTorch and numba takes seconds, more than a person wants to wait for the first point of a curve: so trainers
+    are forked from a process that has done it.
 
     Args:
         settings: of the worker.
@@ -56,7 +57,7 @@ class Slot:
         self._busy = False
         self._wanted = False
         self._closed = threading.Event()
-        self._spare: TrainerHandle | None = None
+        self._nursery: Nursery | None = None
         self._patience = _FIRST_RETRY_SECONDS
         self._no_trainer: str | None = None
         self._first = True
@@ -84,39 +85,40 @@ class Slot:
         return self._no_trainer or self._fitness.trouble
 
     def take_trainer(self) -> TrainerHandle:
-        """The trainer process that waits, once it is ready for a job; `put_back` or `give_back` must follow.
+        """A trainer process that waits for its job; `give_back` must follow.
 
         Raises:
             UnfitError: no run should be taken up here now: the disk is full, or no trainer starts.
         """
         self._fitness.look()
+        nursery = self._ready_nursery()
+        try:
+            trainer = nursery.trainer()
+        except OSError as error:
+            raise UnfitError(f"no trainer can be started: {error}") from error
+        self._busy = True
+        return trainer
+
+    def _ready_nursery(self) -> Nursery:
         deadline = time.monotonic() + _TRAINER_PATIENCE_SECONDS
         with self._condition:
             self._wanted, self._no_trainer = True, None
             self._condition.notify_all()
             try:
-                while self._spare is None or not (self._spare.alive and self._spare.ready):
+                while self._nursery is None or not (self._nursery.alive and self._nursery.ready):
                     if self._no_trainer is not None:
                         raise UnfitError(self._no_trainer)
                     if self.shutting_down() or time.monotonic() > deadline:
                         raise UnfitError("no trainer process was ready in time")
                     self._condition.wait(_READY_POLL_SECONDS)
-                spare, self._spare = self._spare, None
-                self._busy = True
-                return spare
+                return self._nursery
             finally:
                 self._wanted = False
 
-    def put_back(self, trainer: TrainerHandle) -> None:
-        """The trainer was not needed after all, and waits on."""
-        with self._condition:
-            self._busy, self._spare = False, trainer
-
-    def give_back(self) -> None:
-        """The training has ended: keep another process ready."""
-        with self._condition:
-            self._busy = False
-            self._condition.notify_all()
+    def give_back(self, trainer: TrainerHandle) -> None:
+        """The trainer has done its job, or was not needed after all."""
+        trainer.close()
+        self._busy = False
 
     def rest(self, fault: str) -> None:
         """Something here has failed: take no run for a while."""
@@ -127,45 +129,51 @@ class Slot:
         self._fitness.well()
 
     def close(self) -> None:
-        """The process ends: so does the trainer that waits, and there are no more heartbeats."""
+        """The process ends: so do its trainers, and there are no more heartbeats."""
         self._closed.set()
         with self._condition:
-            if self._spare is not None:
-                self._spare.close()
-                self._spare = None
+            self._close_nursery()
 
     def _keep(self) -> None:
-        """Linux ends a trainer with the thread that started it, so they are all started on this one."""
+        """Linux ends the nursery with the thread that started it, so it is always started on this one."""
         while not self._closed.is_set():
             with self._condition:
-                died = self._bury_spare()
-                if self._spare is not None and self._spare.ready:
+                died = self._bury_nursery()
+                if self._nursery is not None and self._nursery.ready:
                     self._no_trainer, self._patience = None, _FIRST_RETRY_SECONDS
-                if self._spare is None and (self._wanted or not (self._busy or died or self.shutting_down())):
-                    died = not self._start_spare()
+                if self._nursery is None and self._may_start(died=died):
+                    died = not self._start_nursery()
                 if self._alone() and not self._busy:
                     self._leave()
                 self._condition.wait(self._patience if died else _TICK_SECONDS)
 
-    def _start_spare(self) -> bool:
-        """Whether a trainer could be started: a machine may be out of processes, memory or files for a while."""
+    def _may_start(self, *, died: bool) -> bool:
+        return not self._closed.is_set() and (self._wanted or not (died or self.shutting_down()))
+
+    def _start_nursery(self) -> bool:
+        """Whether it could be started: a machine may be out of processes, memory or files for a while."""
         try:
-            self._spare = TrainerHandle()
+            self._nursery = Nursery()
         except OSError as error:
             self._be_patient(f"no trainer can be started: {error}")
             return False
         self._condition.notify_all()
         return True
 
-    def _bury_spare(self) -> bool:
-        """Whether the waiting trainer has died; another one is tried after a while that doubles each time."""
-        if self._spare is None or self._spare.alive:
+    def _bury_nursery(self) -> bool:
+        """Whether it has died; another one is tried after a while that doubles each time."""
+        if self._nursery is None or self._nursery.alive:
             return False
-        self._spare.close()
-        cause = self._spare.cause_of_death()
-        self._spare = None
+        self._nursery.close()
+        cause = self._nursery.cause_of_death()
+        self._nursery = None
         self._be_patient(f"no trainer is ready. {cause}")
         return True
+
+    def _close_nursery(self) -> None:
+        if self._nursery is not None:
+            self._nursery.close()
+            self._nursery = None
 
     def _be_patient(self, reason: str) -> None:
         if self.shutting_down():
@@ -181,8 +189,7 @@ class Slot:
         return os.getppid() != self._parent or (self._terminated and not self._worker_shutting_down())
 
     def _leave(self) -> None:
-        if self._spare is not None:
-            self._spare.close()
+        self._close_nursery()
         os._exit(1)
 
     def _beat(self) -> None:

@@ -89,19 +89,13 @@ def _train(run_id: str, attempt: int) -> None:
         return
     try:
         claim = _claim(_slot, run_id, attempt)
-    except BaseException:
-        _slot.put_back(trainer)
-        raise
-    if claim is None:
-        _slot.put_back(trainer)
-        return
-    try:
+        if claim is None:
+            return
         with process_is_about(claim.run_id or run_id):
             logger.info("run %s: attempt %d begins", claim.run_id or run_id, claim.attempt)
             fault = _see_through(_slot, claim.run_id or run_id, claim, trainer)
     finally:
-        trainer.close()
-        _slot.give_back()
+        _slot.give_back(trainer)
     if fault is None:
         _slot.well()
     else:

@@ -1,13 +1,10 @@
-"""`python -m workers.runtime.trainer_process FD PARENT`: trains one run and reports to the Celery task that started it.
+"""What a trainer's process does: waits for its one job, trains, and reports to the Celery task that began it.
 
-It imports everything slow first and then waits for its job on standard input, so that a worker can keep one ready. It
-reports on the inherited file descriptor FD; whatever libraries print goes to standard error, whose last lines explain a
-crash. It ends with the process that started it (PARENT), however that ends: standard input closes then.
+It is forked from the slot's nursery (`workers.runtime.nursery_process`). Whatever libraries print goes to the slot line by
+line, into the run's log; the last lines explain a crash.
 """
 
 import os
-import signal
-import sys
 import threading
 import time
 from collections import deque
@@ -19,7 +16,6 @@ from sim.errors import SimError
 from workers.config import TrainingConfig
 from workers.errors import ArchiveFormatError, ArchiveIntegrityError, LocalError, WorkerError
 from workers.frames import Frame
-from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 from workers.runtime.pipe import (
     CheckpointReport,
@@ -30,7 +26,6 @@ from workers.runtime.pipe import (
     Job,
     MetricsReport,
     Order,
-    Ready,
     Receiver,
     Report,
     Sender,
@@ -126,28 +121,24 @@ def _listen(incoming: Receiver[Order], reporter: PipeReporter) -> None:
     os._exit(1)  # nobody is left to report to
 
 
-def main(descriptor: int, parent: int) -> None:
-    """Wait for a job, train, report."""
-    die_with_parent(parent)
-    # Ctrl-C reaches the whole terminal, a batch system's SIGTERM all of a job; ending in order is the worker's decision.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+def train_as_told(orders_descriptor: int, reports_descriptor: int) -> None:
+    """Wait for a job, train, report.
 
-    # Seconds of imports and compiled code, the reason why a worker keeps a process ready.
+    Args:
+        orders_descriptor: to read `workers.runtime.pipe.Order` from; where it closes, this process ends.
+        reports_descriptor: to write reports to.
+    """
+    # With their seconds of imports: they are there already where the nursery has forked this process.
     from workers.live.viewer import LiveViewer
-    from workers.precompile import warm_up
     from workers.training.trainer import train
 
-    warm_up()
-
-    incoming = orders(sys.stdin.buffer)
-    with os.fdopen(descriptor, "wb") as stream:
-        sender = Sender(stream)
-        sender.send(Ready())
+    # Left open: the thread that listens would have to let go of it first.
+    incoming = orders(os.fdopen(orders_descriptor, "rb"))
+    with os.fdopen(reports_descriptor, "wb") as told:
         job = incoming.receive()
         if not isinstance(job, Job):
             return
-        reporter = PipeReporter(sender)
+        reporter = PipeReporter(Sender(told))
         threading.Thread(target=_listen, args=(incoming, reporter), name="orders", daemon=True).start()
         try:
             config = TrainingConfig.model_validate_json(job.training)
@@ -170,10 +161,3 @@ def main(descriptor: int, parent: int) -> None:
             reporter.end("failed", f"{type(error).__name__}: {error}")
         else:
             reporter.end(outcome)
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
-    sys.stderr.flush()
-    # Everything is said. The thread that listens holds standard input, over which an orderly exit would stumble.
-    os._exit(0)

@@ -12,6 +12,7 @@ import workers.training.evaluation  # noqa: F401 - each is needed by a job
 from sim.config import TaskConfig
 from sim.envs.vector import NavigationVectorEnv
 from sim.suites import run_suite, suite_for
+from workers import onnx_runtime
 
 
 def load_compiled_code() -> None:
@@ -21,4 +22,5 @@ def load_compiled_code() -> None:
     NavigationVectorEnv(task, 1, seed=0).reset()
 
 
+onnx_runtime.load()
 load_compiled_code()
