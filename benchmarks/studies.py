@@ -10,7 +10,8 @@ and the best of each search is trained anew with five fresh seeds. Told are the 
 early stops, so that equally many trials are equally many steps.
 
 Every training is a line of the results' file as soon as it is through, and is not done again: all of this is decided by
-seeds, so an interrupted benchmark goes on where it was. It takes hours: `--processes` trains several at once.
+seeds, so an interrupted benchmark goes on where it was. It takes hours: `--processes` trains several at once. Intervals are
+over the searches.
 """
 
 import json
@@ -34,7 +35,8 @@ from server.studies.space import RangedSetting, Space, Values
 from sim.config import ArenaConfig, ArenaName, TaskConfig
 from workers.config import EvaluationConfig, TrainingConfig
 from workers.reporting import EvaluationResult
-from workers.statistics.seeds import interquartile_mean, mean_interval
+from workers.statistics.differences import Rates, difference_of_rates
+from workers.statistics.seeds import interquartile_mean, success_rate
 
 STEPS: dict[ArenaName, int] = {"simple": 60_000, "complex": 200_000}
 """Few enough that settings matter."""
@@ -43,6 +45,8 @@ WITHIN = 30
 """Trials within which a search is to come among the best."""
 SHARE_OF_SEEDS = 0.9
 """Of the sampler's seeds, with which it is to."""
+_EPISODES = 200
+"""Of an evaluation, on the frozen suites of both arenas."""
 
 Key = tuple[str, int, str, int]
 """Of a training: arena, steps, its searched values as JSON, seed."""
@@ -189,14 +193,18 @@ def measure(trainings: Trainings, space: Space, seeds: Sequence[int], trials: in
     grid = sorted(trainings.scores(space, points, seeds), reverse=True)
     threshold = grid[max(1, round(BEST_SHARE * len(grid))) - 1]
     figures: dict[str, Any] = {"grid_points": len(grid), "grid_best": grid[0], "grid_best_5_percent_from": threshold}
+    judgements: dict[str, Rates] = {}
     for sampler in ("tpe", "random"):
         searches = [search(trainings, space, sampler, seed, seeds, trials) for seed in range(repetitions)]
         among = [one.among(threshold) for one in searches]
+        judges = fresh_seeds(seeds)
         judged = [
-            float(np.mean([one.success for one in trainings.of(space, [(each.best, seed) for seed in fresh_seeds(seeds)])]))
+            float(np.mean([one.success for one in trainings.of(space, [(each.best, seed) for seed in judges])]))
             for each in searches
         ]
-        fresh = mean_interval(judged)
+        episodes = [float(_EPISODES * len(judges))] * len(judged)
+        judgements[sampler] = Rates([rate * driven for rate, driven in zip(judged, episodes, strict=True)], episodes)
+        fresh = success_rate(judgements[sampler].arrivals, episodes)
         figures[sampler] = {
             "among_best_5_percent_with_trial": among,
             "share_within": sum(trial is not None and trial <= WITHIN for trial in among) / len(among),
@@ -205,6 +213,9 @@ def measure(trainings: Trainings, space: Space, seeds: Sequence[int], trials: in
             "mean_on_fresh_seeds": [round(one, 4) for one in (fresh.value, fresh.low, fresh.high)],
         }
         print(json.dumps({sampler: figures[sampler]}), flush=True)
+    if repetitions > 1:
+        apart = difference_of_rates(judgements["tpe"], judgements["random"])
+        figures["tpe_less_random_on_fresh_seeds"] = [round(one, 4) for one in (apart.value, apart.low, apart.high)]
     return figures
 
 

@@ -1,6 +1,6 @@
 """What the parts of the paper's observation are worth, each left out once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from benchmarks.untold_claims.trainings import Trainings
 from benchmarks.untold_claims.words import each, rate, rates, told
@@ -9,21 +9,25 @@ from workers.reproduction.rows import ROW_BY_ID
 from workers.statistics.differences import difference_of_rates
 
 # Of a scan, the robot's speeds, the target and the robot's own direction: what the paper's observation is made of.
-_PARTS_BY_TITLE = {
-    "the ranges": ("ranges",),
-    "the speeds": ("speeds",),
-    "the target's distance": ("distance",),
-    "the target's direction": ("direction",),
-    "its own heading": ("heading",),
-    "the heading's deviation from the target": ("deviation",),
+PARTS = {
+    "ranges": "the ranges",
+    "speeds": "the speeds",
+    "distance": "the target's distance",
+    "direction": "the target's direction",
+    "heading": "its own heading",
+    "deviation": "the heading's deviation from the target",
 }
-_PARTS = {name for names in _PARTS_BY_TITLE.values() for name in names}
 
 
-def observation(trainings: Trainings) -> Iterator[str]:
-    """What the paper's observation is worth, group by group, in the complex arena."""
+def observation(trainings: Trainings, without: Sequence[str] = tuple(PARTS)) -> Iterator[str]:
+    """What the paper's observation is worth, part by part, in the complex arena.
+
+    Args:
+        trainings: where they are kept.
+        without: names of the parts that are left out, each once.
+    """
     row = ROW_BY_ID["complex-basic-resblock-ppo"]
-    assert {part.name for part in row.training.task.observation.parts} == _PARTS
+    assert {part.name for part in row.training.task.observation.parts} == PARTS.keys()
     whole = trainings.trained(row.id, row.training)
     yield "## The comprehensive observation improves decisions"
     yield ""
@@ -33,9 +37,12 @@ def observation(trainings: Trainings) -> Iterator[str]:
     )
     yield from ("", "| without | success % | of each seed | the whole has |", "|---|---|---|---|")
     yield f"| nothing | {rate(whole)} | {each(whole)} | |"
-    for left_out, parts in _PARTS_BY_TITLE.items():
-        task = row.training.task.model_copy(update={"observation": row.training.task.observation.without(*parts)})
-        name = f"{row.id}-without-{'-'.join(parts)}"
+    for part in without:
+        task = row.training.task.model_copy(update={"observation": row.training.task.observation.without(part)})
+        name = f"{row.id}-without-{part}"
         results = trainings.trained(name, row.training.model_copy(update={"task": task}))
         difference = difference_of_rates(rates(whole), rates(results))
-        yield f"| {left_out} | {rate(results)} | {each(results)} | {told(SCALES['success'], difference, len(whole))} |"
+        yield f"| {PARTS[part]} | {rate(results)} | {each(results)} | {told(SCALES['success'], difference, len(whole))} |"
+    if missing := [PARTS[part] for part in PARTS if part not in without]:
+        yield ""
+        yield f"Not measured: {', '.join(missing)}."

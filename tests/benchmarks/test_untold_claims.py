@@ -89,4 +89,7 @@ def test_every_part_of_the_papers_observation_is_left_out_once_and_the_arena_cha
 
     written = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/*/result.json")}
     assert list(observation.observation(trainings)) == parts
+    assert list(observation.observation(trainings, ("ranges", "heading")))[-1] == (
+        "Not measured: the speeds, the target's distance, the target's direction, the heading's deviation from the target."
+    )
     assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/*/result.json")} == written
