@@ -7,6 +7,7 @@ BIN := .venv/bin
 # browsers on two cores wait longer than their tests do.
 PARTS := stack
 TESTS_stack := tests/benchmarks tests/browser tests/services
+SLOWEST := --durations=30 --durations-min=10
 .PHONY: help run test check format lock pages types sbom
 
 help:
@@ -70,9 +71,9 @@ ifdef ARGS
 else
 	@# In two halves side by side, one with whole services and a browser. AGAIN=5: up to so many that fail are tried once more, alone.
 	@logs=$$(mktemp -d) && trap 'rm -rf $$logs' EXIT; started=; \
-	$(foreach part,$(PARTS),$(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(part) $(TESTS_$(part)) >$$logs/$(part) 2>&1 & \
+	$(foreach part,$(PARTS),$(BIN)/python -m pytest $(SLOWEST) -o cache_dir=.pytest_cache/$(part) $(TESTS_$(part)) >$$logs/$(part) 2>&1 & \
 	started="$$started $(part)=$$!";) \
-	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/rest $(foreach part,$(PARTS),$(TESTS_$(part):%=--ignore=%)); worst=$$?; \
+	$(BIN)/python -m pytest $(SLOWEST) -o cache_dir=.pytest_cache/rest $(foreach part,$(PARTS),$(TESTS_$(part):%=--ignore=%)); worst=$$?; \
 	for part in $$started; do \
 	  wait $${part#*=}; ended=$$?; cat $$logs/$${part%=*}; [ $$ended -le $$worst ] || worst=$$ended; \
 	done; \

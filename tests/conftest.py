@@ -4,6 +4,7 @@ import gc
 import os
 import shutil
 import socket
+import subprocess
 import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -47,18 +48,25 @@ def require_service(name: str, host: str, port: int) -> None:
     try:
         socket.create_connection((host, port), timeout=2).close()
     except OSError as error:
-        message = f"{name} does not answer on {host}:{port}: {error}"
-        if os.environ.get("REQUIRE_SERVICES") == "1":
-            pytest.fail(message)
-        pytest.skip(message)
+        _lack(f"{name} does not answer on {host}:{port}: {error}")
 
 
 def require_program(name: str) -> None:
     """Skip the test where a program is not installed; with REQUIRE_SERVICES=1 that is an error: CI must have run it."""
     if shutil.which(name) is None:
-        if os.environ.get("REQUIRE_SERVICES") == "1":
-            pytest.fail(f"{name} is not installed")
-        pytest.skip(f"{name} is not installed")
+        _lack(f"{name} is not installed")
+
+
+def require_mounts() -> None:
+    """Skip the test where no namespace with mounts of its own is to be had; with REQUIRE_SERVICES=1 that is an error."""
+    if os.geteuid() != 0 or subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode:
+        _lack("mounting takes root")
+
+
+def _lack(message: str) -> None:
+    if os.environ.get("REQUIRE_SERVICES") == "1":
+        pytest.fail(message)
+    pytest.skip(message)
 
 
 def _postgres() -> "psycopg.Connection[tuple[object, ...]]":

@@ -167,9 +167,10 @@ def tree(pid: int) -> list[psutil.Process]:
 
 
 def trainers(pid: int) -> list[psutil.Process]:
-    """The trainer processes under a worker."""
+    """The trainer processes under a worker: those that its nurseries have forked."""
     members = [process for process in tree(pid) if process.status() != psutil.STATUS_ZOMBIE]
-    return [process for process in members if "workers.runtime.trainer_process" in process.cmdline()]
+    nurseries = {process.pid for process in members if "workers.runtime.nursery_process" in process.cmdline()}
+    return [process for process in members if process.ppid() in nurseries]
 
 
 def assert_one_unbroken_curve(service: Service, run_id: str) -> None:

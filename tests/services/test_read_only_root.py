@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
+from tests.conftest import require_mounts
 from tests.services.stack import ROLLOUT, ROOT, Service, until
 
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
@@ -45,10 +46,7 @@ def copied_kernels(into: Path) -> set[str]:
 
 @pytest.fixture
 def service(tmp_path: Path, redis_url: str) -> Iterator[Service]:
-    if os.geteuid() != 0 or subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode:
-        if os.environ.get("REQUIRE_SERVICES") == "1":
-            pytest.fail("mounting takes root")
-        pytest.skip("mounting takes root")
+    require_mounts()
     service = Service(tmp_path, MAPLESS_BROKER_URL=redis_url)
     service.start_server()
     yield service

@@ -6,17 +6,17 @@ from pathlib import Path
 
 from tests.services.stack import ROLLOUT, Service, trainers, until
 
-# Loaded by every Python process of the worker, as `sitecustomize` is: the trainer prints, as libraries do.
+# Loaded by every Python process of the worker, as `sitecustomize` is: trainers print, as libraries do.
 _PRINTS = """
-import sys, threading
-if any("trainer_process" in part for part in sys.orig_argv):
+import os, sys, threading
+if any("nursery_process" in part for part in sys.orig_argv):
     def tell():
         print("printed by the trainer", flush=True)
         print("complained by the trainer", file=sys.stderr, flush=True)
         again = threading.Timer(0.5, tell)
         again.daemon = True
         again.start()
-    tell()
+    os.register_at_fork(after_in_child=tell)
 """
 
 
