@@ -23,7 +23,11 @@ export const HEADS = {
     about:
       'What is to be learned, where, and for how long. Every setting has a value that works: only what matters to you needs a change.',
   },
-  ComparePage: { title: 'Compare' },
+  ComparePage: {
+    title: 'Compare',
+    about:
+      'Trainings side by side: how well they arrive, which is better and by how much, and their curves. Every figure has its interval.',
+  },
   PoliciesPage: {
     title: 'Policies',
     about: 'Trained policies that come with Mapless: to watch, to take away, to start from.',

@@ -1,5 +1,5 @@
 /** The typed client of the server's API: types generated from its OpenAPI, errors as classes, queries with defaults. */
-import { MutationCache, QueryCache, QueryClient } from '@tanstack/react-query'
+import { MutationCache, QueryCache, QueryClient, useQueryClient } from '@tanstack/react-query'
 import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
 import { useDeferredValue, useMemo } from 'react'
@@ -28,7 +28,7 @@ api.use({
   },
 })
 
-/** The hooks as they come: for what has to be told at once, whether a question is under way among it. */
+/** The hooks as they come: for what has to be told at once, whether a question is under way, or of what an answer is. */
 export const $now = createQueryHooks(api)
 
 /**
@@ -38,11 +38,21 @@ export const $now = createQueryHooks(api)
 export const $api: typeof $now = {
   ...$now,
   useQuery: ((...asked: Parameters<typeof $now.useQuery>) => {
+    useAskedAtOnce(asked)
     const result = $now.useQuery(...asked)
     const { data, error, status } = result
     // biome-ignore lint/correctness/useExhaustiveDependencies: the result is new each time, what it says is not.
     return useDeferredValue(useMemo(() => result, [data, error, status]))
   }) as typeof $now.useQuery,
+}
+
+/** Sends a new question while the page is drawn: React sends it once all is drawn, half a second later on a slow phone. */
+function useAskedAtOnce([method, path, init, options, given]: Parameters<typeof $now.useQuery>) {
+  const client = useQueryClient(given)
+  const query = $now.queryOptions(method, path, init as never, options as never)
+  if (query.enabled === false || client.getQueryState(query.queryKey)) return
+  // How it ends, whoever asked is told by the cache.
+  client.query(query).catch(() => {})
 }
 
 const statusKey = ['get', '/api/status'] as const

@@ -1,5 +1,5 @@
 /** Curves while runs go on, a run's own and a comparison's: after the first answer only what is new is asked for. */
-import { keepPreviousData, useQuery } from '@tanstack/react-query'
+import { keepPreviousData, queryOptions, useQuery } from '@tanstack/react-query'
 import { useDeferredValue } from 'react'
 import { api } from '../api/client'
 import type { paths } from '../api/schema'
@@ -45,11 +45,11 @@ export function newest(known: Metrics | undefined, points: number): number | und
   return steps.length > 0 ? Math.max(...steps) : undefined
 }
 
-/** All series of a run, each of some `points` points. */
-export function useCurves(runId: string, points: number) {
+/** The question for all series of a run, each of some `points` points. */
+export function curvesOf(runId: string, points: number) {
   const path = '/api/runs/{run_id}/metrics'
   const params = { path: { run_id: runId }, query: { points } }
-  return useQuery({
+  return queryOptions({
     // As the typed client's own, by which the stream of changes finds it.
     queryKey: ['get', path, { params }],
     queryFn: async ({ client, queryKey, signal }) => {
@@ -61,9 +61,12 @@ export function useCurves(runId: string, points: number) {
       const news = data as Metrics
       return known ? followed(known, news) : news
     },
-    placeholderData: keepPreviousData,
   })
 }
+
+/** The answer to it. */
+export const useCurves = (runId: string, points: number) =>
+  useQuery({ ...curvesOf(runId, points), placeholderData: keepPreviousData })
 
 type Experiment = Curves['experiments'][number]
 

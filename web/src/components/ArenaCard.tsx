@@ -10,8 +10,9 @@ import type { ArenaSummary, ArenaView } from '../api/types'
 import { arenaFacts, drawOn, trainOn } from '../lib/arenas'
 import classes from './ArenaCard.module.css'
 import { ArenaDrawing } from './ArenaDrawing'
+import { AddToSuite } from './evaluations/AddToSuite'
 import { evaluate, suiteInArena } from './evaluations/choices'
-import { IconPencil, IconRefresh, IconTrash } from './icons'
+import { IconPencil, IconPlus, IconRefresh, IconTrash } from './icons'
 
 interface ArenaCardProps {
   arena: ArenaSummary
@@ -48,6 +49,7 @@ function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
     { params: { path: { sha256: arena.key } } },
     { staleTime: 60_000 },
   )
+  const [adding, setAdding] = useState(false)
   return (
     <Card
       title={arena.title}
@@ -56,16 +58,29 @@ function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
       error={error}
       config={arena.config}
       action={
-        <Tooltip label={`Delete ${arena.title}`}>
-          <ActionIcon
-            variant="subtle"
-            color="gray"
-            aria-label={`Delete ${arena.title}`}
-            onClick={() => onDelete(arena)}
-          >
-            <IconTrash size={16} stroke={1.6} />
-          </ActionIcon>
-        </Tooltip>
+        <>
+          <Tooltip label="Add to a suite">
+            <ActionIcon
+              variant="subtle"
+              color="gray"
+              aria-label={`Add ${arena.title} to a suite`}
+              onClick={() => setAdding(true)}
+            >
+              <IconPlus size={16} stroke={1.6} />
+            </ActionIcon>
+          </Tooltip>
+          <Tooltip label={`Delete ${arena.title}`}>
+            <ActionIcon
+              variant="subtle"
+              color="gray"
+              aria-label={`Delete ${arena.title}`}
+              onClick={() => onDelete(arena)}
+            >
+              <IconTrash size={16} stroke={1.6} />
+            </ActionIcon>
+          </Tooltip>
+          {adding && <AddToSuite title={arena.title} sha256={arena.key} onClose={() => setAdding(false)} />}
+        </>
       }
     />
   )

@@ -1,5 +1,5 @@
 /** The episodes of an evaluation, failures first, each with its replay. */
-import { Button, Group, SegmentedControl, Skeleton, Table, Text, VisuallyHidden } from '@mantine/core'
+import { Button, Group, Skeleton, Table, Text, VisuallyHidden } from '@mantine/core'
 import { useState } from 'react'
 import { ApiError } from '../api/errors'
 import type { EpisodeResult, Outcome } from '../api/types'
@@ -7,6 +7,7 @@ import { byInterest, detour, OUTCOMES, tally } from '../lib/episodes'
 import { count } from '../lib/format'
 import table from './ExperimentTable.module.css'
 import { IconPlayerPlay } from './icons'
+import { Segments } from './Segments'
 import { Message, QueryError } from './ui'
 import ui from './ui.module.css'
 
@@ -25,12 +26,12 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
   return (
     <div data-testid="episodes">
       <Group px="md" pb="sm" gap="sm">
-        <SegmentedControl
+        <Segments
           size="xs"
           aria-label="Outcome"
           value={filter}
           onChange={(next) => {
-            setFilter(next as Outcome | 'all')
+            setFilter(next)
             setRows(ROWS)
           }}
           data={[

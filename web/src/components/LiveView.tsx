@@ -4,7 +4,6 @@ import {
   Button,
   Group,
   NumberInput,
-  SegmentedControl,
   Select,
   Text,
   Tooltip,
@@ -20,6 +19,7 @@ import { at } from '../lib/base'
 import { count } from '../lib/format'
 import { IconMaximize, IconMinimize, IconPlayerPlay } from './icons'
 import classes from './LiveView.module.css'
+import { Segments } from './Segments'
 
 const MAX_ROBOTS = 64
 /** In full screen nothing is seen that lies outside. */
@@ -349,19 +349,19 @@ function LiveControls({ live, change, driven, said }: LiveControlsProps) {
     <fieldset className={classes.controls} aria-label="Live view" disabled={off}>
       <Group gap="sm" align="flex-end">
         {!driven && (
-          <SegmentedControl
+          <Segments
             size="xs"
             aria-label="Show"
             disabled={off}
             value={mode}
-            onChange={(next) => change({ mode: next as LiveSettings['mode'] })}
+            onChange={(next) => change({ mode: next })}
             data={[
               { value: 'policy', label: 'Policy' },
               { value: 'training', label: 'Training' },
             ]}
           />
         )}
-        <SegmentedControl
+        <Segments
           size="xs"
           aria-label="Speed"
           disabled={off || mode === 'training'}

@@ -1,5 +1,4 @@
 /** The episodes of a shipped policy on one of its suites; which, and which is replayed, stand in the address. */
-import { SegmentedControl } from '@mantine/core'
 import { useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
@@ -7,6 +6,7 @@ import { byInterest } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
 import { EpisodesQuery } from './Episodes'
 import { Replay } from './replay/Replay'
+import { Segments } from './Segments'
 import { Panel } from './ui'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -30,12 +30,12 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
       flush
       actions={
         suites.length > 1 && (
-          <SegmentedControl
+          <Segments
             size="xs"
             aria-label="Suite"
             value={suite}
             onChange={(next) => setSearch({ suite: next }, { replace: true, preventScrollReset: true })}
-            data={suites}
+            data={suites.map((name) => ({ value: name, label: name }))}
           />
         )
       }

@@ -3,7 +3,7 @@ import { Group, Stack, Tabs, VisuallyHidden } from '@mantine/core'
 import { memo, useDeferredValue, useMemo } from 'react'
 import type { RunDetail, Series } from '../api/types'
 import { ACROSS, placed } from '../charts/across'
-import { useCurves } from '../charts/following'
+import { curvesOf, useCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
@@ -34,6 +34,9 @@ export interface RunCurves {
   /** What stands in place of a curve without points. */
   empty: string
 }
+
+/** What `useRunCurves` asks, for whoever knows the run before there is anything to draw. */
+export const runCurves = (runId: string) => curvesOf(runId, POINTS)
 
 export function useRunCurves(run: RunDetail): RunCurves {
   const metrics = useCurves(run.id, POINTS)

@@ -1,6 +1,7 @@
 /** One field of a form, as the control that fits its schema. */
-import { Anchor, Input, NumberInput, SegmentedControl, Select, Switch, Text, TextInput } from '@mantine/core'
+import { Anchor, Input, NumberInput, Select, Switch, Text, TextInput } from '@mantine/core'
 import { useState } from 'react'
+import { Segments } from '../components/Segments'
 import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
 import { ImportedArenaInput } from './ImportedArenaInput'
@@ -217,15 +218,7 @@ function Choice({ id, label, description, error, options, value, onChange }: Cho
           {only.label}
         </Text>
       ) : (
-        <SegmentedControl
-          id={id}
-          aria-label={label}
-          fullWidth
-          size="sm"
-          data={options}
-          value={value}
-          onChange={onChange}
-        />
+        <Segments id={id} aria-label={label} wide data={options} value={value} onChange={onChange} />
       )}
     </Input.Wrapper>
   )

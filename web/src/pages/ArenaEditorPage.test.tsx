@@ -175,6 +175,24 @@ test('the server looks it over once it rests, and what it finds is listed and ma
   expect(server.changes.at(-1)?.body).toMatchObject({ arena: { circles: [{ radius: 2 }] }, clearance: 0.2 })
 })
 
+test('what was found of an earlier drawing is not taken for what is drawn now', async () => {
+  const remarks = [{ refused: true, text: 'Mover 1 does not get past (0.00, 0.00).', x: 0, y: 0 }]
+  const refusing = { free_area: 3, free_share: 0.03, remarks }
+  const answers: (() => void)[] = []
+  const held = () => new Promise<object>((resolve) => answers.push(() => resolve(WELL)))
+  const server = start({ 'POST /api/arenas/reviews': refusing })
+  const { drag, tool } = await draw()
+  await screen.findByText(/does not get past/)
+  server.routes['POST /api/arenas/reviews'] = held
+  await tool('Disc')
+  drag([1, 1], [1, 3])
+  await waitFor(() => expect(answers).toHaveLength(1))
+  expect(screen.getByTestId('review')).toHaveAttribute('data-current', 'false')
+  answers[0]?.()
+  await screen.findByText(/All is well/)
+  expect(screen.getByTestId('review')).toHaveAttribute('data-current', 'true')
+})
+
 test('it is saved as an arena of ours, and trained on', async () => {
   const server = start({ 'POST /api/arenas/imported': { title: 'Drawn', config: CONFIG } })
   const { drag, tool, user, router } = await draw()

@@ -4,7 +4,7 @@ import { useDebouncedValue, useLocalStorage } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useEffect, useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
-import { $api } from '../api/client'
+import { $now } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaConfig } from '../api/types'
 import { Canvas } from '../components/arena-editor/Canvas'
@@ -172,7 +172,7 @@ function useFrom({ change }: Draft): string | null {
 function useReview({ arena }: Draft, clearance: number) {
   const [drawn] = useDebouncedValue(arena, REST_MS)
   const body = { arena: { ...drawn, name: drawn.name.trim() || 'Drawing' }, clearance }
-  const { data, error, isPlaceholderData } = $api.useQuery(
+  const { data, error, isPlaceholderData } = $now.useQuery(
     'post',
     '/api/arenas/reviews',
     { body },

@@ -161,6 +161,39 @@ test('an arena is deleted after a question, and a refusal is told', async () => 
   expect(server.changes.at(-1)?.route).toBe(`DELETE /api/arenas/imported/${HASH}`)
 })
 
+test('an arena joins a suite of that name, or begins one', async () => {
+  const old = { id: 's1', name: 'Doors', created_at: 1, scenarios: [] }
+  const begun = { ...old, id: 's2', name: 'Corners' }
+  const scenario = { sha256: HASH, name: 'Lab' }
+  const server = start({
+    'GET /api/suites': [old],
+    'POST /api/suites': begun,
+    'POST /api/suites/s1/scenarios': refusal(409, 'Lab has no start: draw one first.'),
+    'POST /api/suites/s2/scenarios': { ...begun, scenarios: [scenario] },
+  })
+  const { user } = open('/arenas')
+  await user.click((await card('Lab')).getByRole('button', { name: 'Add Lab to a suite' }))
+  const dialog = within(await screen.findByRole('dialog'))
+  const name = dialog.getByRole('combobox', { name: 'Suite of your own' })
+  await user.type(name, 'Doors')
+  await user.click(dialog.getByRole('button', { name: 'Add' }))
+  expect(await dialog.findByText('Lab has no start: draw one first.')).toBeInTheDocument()
+
+  await user.clear(name)
+  await user.type(name, 'Corners')
+  await user.click(dialog.getByRole('button', { name: 'Add' }))
+  expect(await dialog.findByText('Corners has 1 scenario now.')).toBeInTheDocument()
+  expect(dialog.getByRole('link', { name: 'Evaluate on the suite' })).toHaveAttribute(
+    'href',
+    expect.stringContaining('s2'),
+  )
+  expect(server.changes.map(({ route, body }) => [route, body])).toEqual([
+    ['POST /api/suites/s1/scenarios', { sha256: HASH }],
+    ['POST /api/suites', { name: 'Corners' }],
+    ['POST /api/suites/s2/scenarios', { sha256: HASH }],
+  ])
+})
+
 test('facts are short', () => {
   expect(arenaFacts({ ...LAB, obstacles: 0 })).toBe(
     '8\u00a0×\u00a06\u00a0m\u00a0· no\u00a0obstacles\u00a0· 82\u00a0%\u00a0free',

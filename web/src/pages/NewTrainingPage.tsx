@@ -1,5 +1,5 @@
 /** The launch form, rendered from the schema that the server derives from its own configuration models. */
-import { Anchor, Button, Group, Input, SegmentedControl, Select, Skeleton, Stack, Text } from '@mantine/core'
+import { Anchor, Button, Group, Input, Select, Skeleton, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { useNavigate, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
@@ -13,6 +13,7 @@ import { TimeEstimate } from '../components/launch/TimeEstimate'
 import { ParallelRunsInput } from '../components/ParallelRuns'
 import { useLaunchProject } from '../components/people/useLaunchProject'
 import { withSettings } from '../components/recordings/reading'
+import { Segments } from '../components/Segments'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
 import { faultsOf } from '../form/faults'
@@ -292,7 +293,7 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
                 <Input.Label labelElement="div" id="preset-label" mb={2} display="block">
                   Settings
                 </Input.Label>
-                <SegmentedControl
+                <Segments
                   aria-labelledby="preset-label"
                   className={classes.presets}
                   data={[

@@ -60,6 +60,20 @@ const way = {
   total: 2,
 }
 
+test('curves and checkpoints are asked for beside the run, once, and not when it has come', async () => {
+  let answer: (run: object) => void = () => undefined
+  const server = startServer({
+    ...routes,
+    'GET /api/runs/run1': () => new Promise((come) => (answer = come)),
+  })
+  open('/runs/run1')
+  const first = ['/api/runs/run1/metrics?points=600', '/api/runs/run1/checkpoints?limit=25&offset=0']
+  await waitFor(() => expect(server.asked).toEqual(expect.arrayContaining(['/api/runs/run1', ...first])))
+  answer(runDetail)
+  await screen.findByRole('heading', { level: 1, name: /seed/ })
+  expect(server.asked.filter((path) => first.includes(path))).toHaveLength(2)
+})
+
 test('any checkpoint is watched: from its row, by the slider, by a link', async () => {
   startServer({
     ...routes,

@@ -1,6 +1,6 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
 import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
-import { keepPreviousData } from '@tanstack/react-query'
+import { keepPreviousData, usePrefetchQuery } from '@tanstack/react-query'
 import { useRef, useState } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
 import { useActions } from '../api/actions'
@@ -20,7 +20,7 @@ import { LearningSlider } from '../components/LearningSlider'
 import { RunLineage } from '../components/Lineage'
 import { RunLiveView } from '../components/LiveView'
 import { Pager } from '../components/Pager'
-import { AllCurves, MainCurves, useRunCurves } from '../components/RunCurves'
+import { AllCurves, MainCurves, runCurves, useRunCurves } from '../components/RunCurves'
 import { RunLog } from '../components/RunLog'
 import { LapseDialog } from '../components/replay/LapseDialog'
 import { canResume, canStop, isActive } from '../components/states'
@@ -36,8 +36,18 @@ import classes from './RunPage.module.css'
 
 const CHECKPOINTS_A_PAGE = 25
 
+const checkpointsOf = (runId: string, page: number) => ({
+  params: {
+    path: { run_id: runId },
+    query: { limit: CHECKPOINTS_A_PAGE, offset: (page - 1) * CHECKPOINTS_A_PAGE },
+  },
+})
+
 export function RunPage() {
   const { runId = '' } = useParams()
+  // Beside the run itself: what is drawn first is not asked for only when that has come.
+  usePrefetchQuery(runCurves(runId))
+  usePrefetchQuery($api.queryOptions('get', '/api/runs/{run_id}/checkpoints', checkpointsOf(runId, 1)))
   const { data, error, refetch } = $api.useQuery('get', '/api/runs/{run_id}', {
     params: { path: { run_id: runId } },
   })
@@ -68,17 +78,9 @@ function LoadedRun({ run }: { run: RunDetail }) {
   const curves = useRunCurves(run)
   const arena = useArenaTitle(run.training.task.arena)
   const [page, setPage] = useState(1)
-  const checkpoints = $api.useQuery(
-    'get',
-    '/api/runs/{run_id}/checkpoints',
-    {
-      params: {
-        ...init.params,
-        query: { limit: CHECKPOINTS_A_PAGE, offset: (page - 1) * CHECKPOINTS_A_PAGE },
-      },
-    },
-    { placeholderData: keepPreviousData },
-  )
+  const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', checkpointsOf(run.id, page), {
+    placeholderData: keepPreviousData,
+  })
   const [step, setStep] = useNumberInAddress('step')
   const [watched, setWatched] = useNumberInAddress('watch')
   const [lapse, setLapse] = useNumberInAddress('lapse')

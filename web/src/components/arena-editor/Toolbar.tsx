@@ -1,6 +1,7 @@
 /** Which tool draws, with what it takes to know; the grid, undo and redo. */
-import { ActionIcon, Button, Checkbox, NumberInput, SegmentedControl, Select, Tooltip } from '@mantine/core'
+import { ActionIcon, Button, Checkbox, NumberInput, Select, Tooltip } from '@mantine/core'
 import { IconArrowBackUp, IconArrowForwardUp } from '../icons'
+import { Segments } from '../Segments'
 import classes from './editor.module.css'
 import { TOOLS, type Tool, type ToolSettings } from './tools'
 import type { Draft } from './useDraft'
@@ -124,11 +125,11 @@ function Options({ tool, settings, setSettings }: Pick<ToolbarProps, 'tool' | 's
       )
     case 'way':
       return (
-        <SegmentedControl
+        <Segments
           size="xs"
           aria-label="Who goes this way"
           value={settings.kind}
-          onChange={(kind) => setSettings({ ...settings, kind: kind as ToolSettings['kind'] })}
+          onChange={(kind) => setSettings({ ...settings, kind })}
           data={[
             { value: 'pedestrian', label: 'Gives way' },
             { value: 'patrol', label: 'Waits and turns' },

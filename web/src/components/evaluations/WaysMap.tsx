@@ -1,5 +1,5 @@
 /** Where the robots drove: every way on one map, by outcome, and where it collides most. */
-import { Group, SegmentedControl, Select, Stack, Switch, Text } from '@mantine/core'
+import { Group, Select, Stack, Switch, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useMemo, useState } from 'react'
 import { $api } from '../../api/client'
@@ -8,6 +8,7 @@ import type { EvaluationWays, Outcome } from '../../api/types'
 import { OUTCOMES } from '../../lib/episodes'
 import { count, percent } from '../../lib/format'
 import { ArenaDrawing } from '../ArenaDrawing'
+import { Segments } from '../Segments'
 import { Message, QueryError } from '../ui'
 import { collisionCells } from './heat'
 import classes from './WaysMap.module.css'
@@ -68,11 +69,11 @@ function Ways({ ways: { places, arena, geometry, ways }, onArena, onReplay }: Wa
             }))}
           />
         )}
-        <SegmentedControl
+        <Segments
           size="xs"
           aria-label="Ways shown"
           value={outcome}
-          onChange={(next) => setOutcome(next as Outcome | 'all')}
+          onChange={setOutcome}
           data={[
             { value: 'all', label: `All ${count(ways.length)}` },
             ...counted.map(({ each, many }) => ({

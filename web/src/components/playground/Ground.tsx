@@ -1,9 +1,10 @@
 /** An open playground: the picture, what time does, what stands where, what the robot perceives and makes of it. */
-import { Button, Group, SegmentedControl, Text } from '@mantine/core'
+import { Button, Group, Text } from '@mantine/core'
 import { useRef } from 'react'
 import type { Playground } from '../../api/types'
 import { count, significant } from '../../lib/format'
 import { LiveFrame, useWatching, WholeScreen } from '../LiveView'
+import { Segments } from '../Segments'
 import { Notice, Panel } from '../ui'
 import classes from './Ground.module.css'
 import { KeepArena } from './KeepArena'
@@ -44,7 +45,7 @@ export function Ground({ ground }: { ground: Playground }) {
                 >
                   One step
                 </Button>
-                <SegmentedControl
+                <Segments
                   size="xs"
                   aria-label="Speed"
                   value={String(speed)}

@@ -9,16 +9,15 @@ import type { Playground } from '../../api/types'
 import { trainOn } from '../../lib/arenas'
 import { plural } from '../../lib/format'
 import { evaluate, suiteInArena, suiteOfOnesOwn } from '../evaluations/choices'
+import { useOwnSuite } from '../evaluations/useOwnSuite'
 import { Notice, Panel } from '../ui'
 
 export function KeepArena({ ground }: { ground: Playground }) {
   const client = useQueryClient()
   const [name, setName] = useState('')
   const [suite, setSuite] = useState('')
-  const suites = $api.useQuery('get', '/api/suites')
+  const suites = useOwnSuite()
   const arena = $api.useMutation('post', '/api/playgrounds/{playground_id}/arena')
-  const made = $api.useMutation('post', '/api/suites')
-  const added = $api.useMutation('post', '/api/suites/{suite_id}/scenarios')
   const keep = useMutation({
     networkMode: 'always',
     mutationFn: async () => {
@@ -27,11 +26,7 @@ export function KeepArena({ ground }: { ground: Playground }) {
         body: { name },
       })
       const wanted = suite.trim()
-      if (wanted === '') return { config, suite: null }
-      const known = suites.data?.find((each) => each.name === wanted)
-      const { id } = known ?? (await made.mutateAsync({ body: { name: wanted } }))
-      const path = { suite_id: id }
-      return { config, suite: await added.mutateAsync({ params: { path }, body: { sha256: config.sha256 } }) }
+      return { config, suite: wanted === '' ? null : await suites.add(wanted, config.sha256) }
     },
     onSettled: () =>
       Promise.all(
@@ -68,7 +63,7 @@ export function KeepArena({ ground }: { ground: Playground }) {
             maxLength={40}
             value={suite}
             onChange={setSuite}
-            data={(suites.data ?? []).map((each) => each.name)}
+            data={suites.names}
           />
           <Button
             type="submit"

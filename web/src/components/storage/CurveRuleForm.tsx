@@ -1,5 +1,5 @@
 /** Chooses how fine the curves of a training's runs stay; says what that frees before it is done. */
-import { Button, Group, NumberInput, SegmentedControl, Stack, Text } from '@mantine/core'
+import { Button, Group, NumberInput, Stack, Text } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
@@ -7,6 +7,7 @@ import { $api, $now } from '../../api/client'
 import type { CurveRule } from '../../api/types'
 import { dateTime, plural } from '../../lib/format'
 import { useChange } from '../people/useChange'
+import { Segments } from '../Segments'
 import type { RuleDialogProps } from './RuleDialog'
 import { thinningInWords } from './rules'
 
@@ -53,7 +54,7 @@ export function CurveRuleForm({ experiment, days, onClose }: RuleDialogProps) {
     apply.mutate({ params: { path }, body: { rule: next } }, { onSuccess: onClose })
   return (
     <Stack>
-      <SegmentedControl
+      <Segments
         aria-label="How fine curves stay"
         value={all ? 'all' : 'some'}
         onChange={(value) => setAll(value === 'all')}

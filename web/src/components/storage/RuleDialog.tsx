@@ -1,16 +1,5 @@
 /** Chooses which checkpoints of a training stay, and how fine its curves; says what that takes before it is done. */
-import {
-  Button,
-  Checkbox,
-  Group,
-  List,
-  Modal,
-  NumberInput,
-  SegmentedControl,
-  Stack,
-  Tabs,
-  Text,
-} from '@mantine/core'
+import { Button, Checkbox, Group, List, Modal, NumberInput, Stack, Tabs, Text } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useState } from 'react'
@@ -18,6 +7,7 @@ import { $api, $now } from '../../api/client'
 import type { KeepRule, StoredExperiment } from '../../api/types'
 import { count, fileSize, plural } from '../../lib/format'
 import { useChange } from '../people/useChange'
+import { Segments } from '../Segments'
 import { CurveRuleForm } from './CurveRuleForm'
 import { goingInWords } from './rules'
 
@@ -85,7 +75,7 @@ function CheckpointRuleForm({ experiment, days, onClose }: RuleDialogProps) {
     apply.mutate({ params: { path }, body: { rule: next } }, { onSuccess: onClose })
   return (
     <Stack>
-      <SegmentedControl
+      <Segments
         aria-label="What stays"
         value={all ? 'all' : 'some'}
         onChange={(value) => setAll(value === 'all')}
