@@ -86,3 +86,12 @@ def test_an_arena_is_drawn_with_the_mouse_kept_and_trained_on(context: BrowserCo
     run = context.request.get(f"/api/runs/{page.url.rsplit('/', 1)[1].split('?')[0]}").json()
     experiment = context.request.get(f"/api/experiments/{run['experiment_id']}").json()
     assert experiment["training"]["task"]["arena"]["sha256"] == arena["key"]
+
+    # And joins a suite of one's own, from the gallery.
+    page.goto("/arenas")
+    page.get_by_role("button", name="Add Drawn by hand to a suite").click()
+    page.get_by_role("combobox", name="Suite of your own").fill("What I drew")
+    page.get_by_role("button", name="Add", exact=True).click()
+    expect(page.get_by_role("status").filter(has_text="What I drew has 1 scenario now.")).to_be_visible(timeout=SOON)
+    (suite,) = (one for one in context.request.get("/api/suites").json() if one["name"] == "What I drew")
+    assert [scenario["sha256"] for scenario in suite["scenarios"]] == [arena["key"]]

@@ -144,7 +144,7 @@ def test_the_form_can_be_sent_as_it_comes(client: TestClient) -> None:
     form = client.get("/api/training/form").json()
 
     assert form["schema"]["title"] == "ExperimentCreate"
-    assert [preset["id"] for preset in form["presets"]] == ["default", "paper", "complex"]
+    assert [preset["id"] for preset in form["presets"]] == ["default", "paper", "complex", "new-places"]
     assert form["presets"][0]["training"] == form["defaults"]["training"]
     assert client.post("/api/experiments", json=form["defaults"]).status_code == 201
     paper = form["defaults"] | {"training": form["presets"][1]["training"]}

@@ -25,7 +25,7 @@ from tests.server.harness import BASE_URL, TOKEN, Reports
 from tests.server.test_serving import ROOT, environment, serving
 from workers.logs import JsonFormatter, about, configure, process_is_about
 from workers.protocol import Batch, ClaimRequest, Final, Orders
-from workers.runtime.trainer_handle import TrainerHandle
+from workers.runtime.nursery import Nursery
 
 
 def line(message: str = "hello %s", *arguments: object, error: BaseException | None = None) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def test_what_a_trainer_prints_is_an_object_a_line_too(
     root, handlers, level = logging.getLogger(), logging.getLogger().handlers[:], logging.getLogger().level
     try:
         configure("json")
-        trainer = TrainerHandle()
+        nursery = Nursery()
         try:
             with process_is_about("r0"):
                 deadline = time.monotonic() + 30.0
@@ -134,14 +134,14 @@ def test_what_a_trainer_prints_is_an_object_a_line_too(
                     time.sleep(0.05)
                     err += capfd.readouterr().err
         finally:
-            trainer.close()
+            nursery.close()
     finally:
         root.handlers[:], root.level = handlers, level
         logging.captureWarnings(False)
     said = [json.loads(line) for line in err.splitlines()]
     assert [one["message"] for one in said[:2]] == [
-        f'trainer {trainer.pid}: a "library" says',
-        f"trainer {trainer.pid}: something",
+        f'trainers\' nursery {nursery.pid}: a "library" says',
+        f"trainers' nursery {nursery.pid}: something",
     ]
     assert {one["run"] for one in said[:2]} == {"r0"}
 
