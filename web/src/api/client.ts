@@ -1,5 +1,11 @@
 /** The typed client of the server's API: types generated from its OpenAPI, errors as classes, queries with defaults. */
-import { MutationCache, QueryCache, QueryClient, useQueryClient } from '@tanstack/react-query'
+import {
+  MutationCache,
+  QueryCache,
+  QueryClient,
+  type QueryFunction,
+  useQueryClient,
+} from '@tanstack/react-query'
 import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
 import { useDeferredValue, useMemo } from 'react'
@@ -44,6 +50,10 @@ export const $api: typeof $now = {
     // biome-ignore lint/correctness/useExhaustiveDependencies: the result is new each time, what it says is not.
     return useDeferredValue(useMemo(() => result, [data, error, status]))
   }) as typeof $now.useQuery,
+  useInfiniteQuery: ((...asked: Parameters<typeof $now.useInfiniteQuery>) => {
+    useFirstPartAskedAtOnce(asked)
+    return $now.useInfiniteQuery(...asked)
+  }) as typeof $now.useInfiniteQuery,
 }
 
 /** Sends a new question while the page is drawn: React sends it once all is drawn, half a second later on a slow phone. */
@@ -53,6 +63,32 @@ function useAskedAtOnce([method, path, init, options, given]: Parameters<typeof 
   if (query.enabled === false || client.getQueryState(query.queryKey)) return
   // How it ends, whoever asked is told by the cache.
   client.query(query).catch(() => {})
+}
+
+/** The same for the first part of a list. */
+function useFirstPartAskedAtOnce([method, path, init, options, given]: Parameters<
+  typeof $now.useInfiniteQuery
+>) {
+  const client = useQueryClient(given)
+  const { queryKey, queryFn } = $now.queryOptions(method, path, init as never)
+  if (options.enabled === false || client.getQueryState(queryKey)) return
+  const { pageParamName = 'cursor', ...rest } = options
+  const asked = init as { params: { query: object } }
+  const part = (pageParam: unknown) => ({
+    ...asked,
+    params: { ...asked.params, query: { ...asked.params.query, [pageParamName]: pageParam } },
+  })
+  client
+    .infiniteQuery({
+      ...(rest as { initialPageParam: unknown; getNextPageParam: () => unknown }),
+      queryKey,
+      queryFn: ({ pageParam, ...context }) =>
+        (queryFn as unknown as QueryFunction)({
+          ...context,
+          queryKey: [method, path, part(pageParam)],
+        } as never),
+    })
+    .catch(() => {})
 }
 
 const statusKey = ['get', '/api/status'] as const

@@ -1,7 +1,8 @@
 /** A titled chart with its own smoothing and axis, in the manner of every curve on the pages. */
 import { Checkbox, Group, Slider, Title } from '@mantine/core'
-import { lazy, type ReactNode, Suspense, useMemo, useState } from 'react'
+import { type ReactNode, useMemo, useState } from 'react'
 import { compact } from '../lib/format'
+import { lazily } from '../lib/lazily'
 import { type Horizontal, STEPS } from './axis'
 import { ChartExport } from './ChartExport'
 import classes from './MetricChart.module.css'
@@ -13,7 +14,7 @@ const MOST_SMOOTHING = 0.99
 const LEGEND_PX = 24
 /** Asked for at once, but nothing waits for it: the page is there before its charts. */
 const code = import('./Chart')
-const Chart = lazy(async () => ({ default: (await code).Chart }))
+const Chart = lazily(async () => (await code).Chart)
 
 interface MetricChartProps {
   title: string
@@ -105,18 +106,17 @@ export function MetricChart({
           {empty}
         </div>
       ) : (
-        <Suspense fallback={<div style={{ height: height + LEGEND_PX }} />}>
-          <Chart
-            data={shown}
-            label={title}
-            logarithmic={log?.on ?? false}
-            logX={logX}
-            height={height}
-            format={format}
-            x={x}
-            {...rest}
-          />
-        </Suspense>
+        <Chart
+          meanwhile={<div style={{ height: height + LEGEND_PX }} />}
+          data={shown}
+          label={title}
+          logarithmic={log?.on ?? false}
+          logX={logX}
+          height={height}
+          format={format}
+          x={x}
+          {...rest}
+        />
       )}
       {foot && <p className={classes.foot}>{foot}</p>}
     </div>

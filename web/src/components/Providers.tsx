@@ -1,11 +1,12 @@
 /** Theme and notifications, for the pages and for their tests alike; `still` leaves out all motion. */
 import { MantineProvider } from '@mantine/core'
 import { notificationsStore } from '@mantine/notifications'
-import { lazy, type ReactNode, Suspense, useEffect, useSyncExternalStore } from 'react'
+import { type ReactNode, useEffect, useSyncExternalStore } from 'react'
+import { lazily } from '../lib/lazily'
 import { theme } from '../theme'
 
 const corner = () => import('./Notifications')
-const Notifications = lazy(async () => ({ default: (await corner()).Notifications }))
+const Notifications = lazily(async () => (await corner()).Notifications)
 /** The page comes first. Fetched before it is needed: what there is to say may be that the server is gone. */
 const AFTER_MS = 1_500
 
@@ -23,11 +24,7 @@ export function Providers({ children, still = false }: { children: ReactNode; st
       defaultColorScheme="auto"
       env={still ? 'test' : 'default'}
     >
-      {notified && (
-        <Suspense fallback={null}>
-          <Notifications />
-        </Suspense>
-      )}
+      {notified && <Notifications />}
       {children}
     </MantineProvider>
   )

@@ -1,7 +1,7 @@
 /** The frame around every page: navigation, the state of the service, colour scheme, version. */
 import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
-import { lazy, memo, Suspense } from 'react'
-import { Link, matchPath, NavLink, Outlet, useLocation } from 'react-router'
+import { memo, Suspense } from 'react'
+import { Link, NavLink, Outlet, useLocation } from 'react-router'
 import { useAlertNews } from '../alerts/useAlertNews'
 import { useAccount } from '../api/account'
 import { isUnauthorized } from '../api/errors'
@@ -9,16 +9,15 @@ import { useServerEvents } from '../api/events'
 import type { Status } from '../api/types'
 import { useStatus } from '../api/useStatus'
 import { BELL, MOON, NAVIGATION, SUN } from '../frame'
-import { headOf } from '../heads'
 import { at } from '../lib/base'
 import { plural } from '../lib/format'
-import { ROUTES } from '../routes'
+import { lazily } from '../lib/lazily'
 import { Boundary } from './Broken'
-import { Page } from './Page'
+import { Coming, pageAt } from './Coming'
 import classes from './Shell.module.css'
 
-const LoginPage = lazy(async () => ({ default: (await import('../pages/LoginPage')).LoginPage }))
-const AccountMenu = lazy(async () => ({ default: (await import('./AccountMenu')).AccountMenu }))
+const LoginPage = lazily(async () => (await import('../pages/LoginPage')).LoginPage)
+const AccountMenu = lazily(async () => (await import('./AccountMenu')).AccountMenu)
 
 export function Shell() {
   const { data: status, error, isError } = useStatus()
@@ -61,11 +60,7 @@ export function Shell() {
               <Icon paths={BELL} />
             </Link>
           )}
-          {!locked && account?.people && (
-            <Suspense fallback={null}>
-              <AccountMenu account={account} />
-            </Suspense>
-          )}
+          {!locked && account?.people && <AccountMenu account={account} />}
           <SchemeSwitch />
         </div>
       </header>
@@ -100,25 +95,16 @@ export function Shell() {
 const Content = memo(function Content({ at, login }: { at: string; login: boolean }) {
   return (
     <Boundary at={at}>
-      <Suspense fallback={<Coming at={at} login={login} />}>{login ? <LoginPage /> : <Outlet />}</Suspense>
+      {login ? (
+        <LoginPage />
+      ) : (
+        <Suspense fallback={<Coming page={pageAt(at)} />}>
+          <Outlet />
+        </Suspense>
+      )}
     </Boundary>
   )
 })
-
-/** Until a page's code has come its head stands there, as it stood in the HTML. */
-function Coming({ at, login }: { at: string; login: boolean }) {
-  const page = Object.entries(ROUTES).find(([path]) => matchPath(path, at))?.[1]
-  const head = login || !page ? undefined : headOf(page)
-  return (
-    <div aria-busy="true">
-      {head && (
-        <Page {...head}>
-          <span />
-        </Page>
-      )}
-    </div>
-  )
-}
 
 /** "4 workers, 2 running": whether anything can be trained, and whether anything is. */
 function ServiceState({ status, offline }: { status: Status | undefined; offline: boolean }) {

@@ -4,7 +4,7 @@ import { type RefObject, startTransition, useEffect, useState } from 'react'
 /** How far beyond the window is near. */
 const MARGIN = '600px'
 /** After the page's own beginning. */
-const FIRST_MS = 1_200
+const FIRST_MS = 150
 
 const waiting = new Set<() => void>()
 let coming = false

@@ -1,7 +1,7 @@
 /** Experiments side by side: curves, final figures with what stands behind them, and what differs in their settings. */
 import { Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { lazy, useState } from 'react'
+import { useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
@@ -22,11 +22,10 @@ import { settingText } from '../form/settingText'
 import { HEADS } from '../heads'
 import { count, percent, percentRange, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
+import { lazily } from '../lib/lazily'
 
 /** The list of trainings is larger than all else here, and most come with a choice made. */
-const Picker = lazy(async () => ({
-  default: (await import('../components/ComparisonPicker')).ComparisonPicker,
-}))
+const Picker = lazily(async () => (await import('../components/ComparisonPicker')).ComparisonPicker)
 
 /** Success rates that differ by less are equivalent, unless the address says otherwise. */
 const MARGIN = 0.02

@@ -2,13 +2,14 @@
 import { Button, Group, Stack, Text, Textarea } from '@mantine/core'
 import { notifications } from '@mantine/notifications'
 import { useQueryClient } from '@tanstack/react-query'
-import { lazy, Suspense, useState } from 'react'
+import { useState } from 'react'
 import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import { Panel } from '../components/ui'
+import { lazily } from '../lib/lazily'
 import { Tags } from './cells'
 
-const Markdown = lazy(() => import('./Markdown'))
+const Markdown = lazily(async () => (await import('./Markdown')).Markdown)
 const MAX_CHARACTERS = 20_000
 
 export function NotesPanel({ experimentId }: { experimentId: string }) {
@@ -60,9 +61,7 @@ export function NotesPanel({ experimentId }: { experimentId: string }) {
           </Group>
         </Stack>
       ) : data.notes ? (
-        <Suspense fallback={null}>
-          <Markdown text={data.notes} />
-        </Suspense>
+        <Markdown text={data.notes} />
       ) : (
         <Text size="sm" c="dimmed">
           Nothing yet: why it was launched, what came of it.

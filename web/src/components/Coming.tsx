@@ -1,0 +1,22 @@
+/** Until a page's code has come its head stands there, as it stood in the HTML. */
+import { matchPath } from 'react-router'
+import { headOf } from '../heads'
+import { ROUTES } from '../routes'
+import { Page } from './Page'
+
+/** The name of the page at an address. */
+export const pageAt = (at: string): string | undefined =>
+  Object.entries(ROUTES).find(([path]) => matchPath(path, at))?.[1]
+
+export function Coming({ page }: { page: string | undefined }) {
+  const head = page && headOf(page)
+  return (
+    <div aria-busy="true">
+      {head && (
+        <Page {...head}>
+          <span />
+        </Page>
+      )}
+    </div>
+  )
+}
