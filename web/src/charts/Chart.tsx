@@ -124,7 +124,11 @@ export function Chart({
         height,
         scales: {
           x: logX
-            ? { time: false, distr: LOGARITHMIC, range: (_, from, to) => [from, to] }
+            ? {
+                time: false,
+                distr: LOGARITHMIC,
+                range: (_, from, to) => (from < to ? [from, to] : fitted(from, to)),
+              }
             : { time: false, distr: LINEAR },
           y: logarithmic
             ? { distr: LOGARITHMIC, range: (_, least, most) => fitted(least ?? 1, most ?? 1) }
@@ -210,8 +214,10 @@ export function Chart({
     const chart = plot.current
     if (!chart || !linked) return
     const [from, to] = range ?? [all.x[0], all.x.at(-1)]
+    // Of a single point uPlot knows better: between x and itself there is room for marks without end.
+    if (from === undefined || to === undefined || from >= to) return
     const [shownFrom, shownTo] = rangeOf(chart)
-    if (from === undefined || to === undefined || (from === shownFrom && to === shownTo)) return
+    if (from === shownFrom && to === shownTo) return
     chart.setScale('x', { min: from, max: to })
   }, [near, range, structure, dark, logarithmic, logX])
 
