@@ -4,7 +4,7 @@ import { useEffect, useMemo, useRef, useState } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
-import { useNear } from '../lib/near'
+import { useInSight, useNear } from '../lib/near'
 import { factors, fitted, type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
@@ -187,6 +187,7 @@ export function Chart({
       element,
     )
     plot.current = made
+    drawnData.current = newest.current
     // What it was zoomed to has gone with the plot before it.
     setZoomed(false)
     const observer = new ResizeObserver(() => made.setSize({ width: element.clientWidth, height }))
@@ -201,12 +202,19 @@ export function Chart({
   const range = linked?.range ?? null
   const inside = useRef(false)
   inside.current = zoomed || range !== null
-  useEffect(() => {
-    // Newer values leave a reader where he has zoomed to.
+  const drawnData = useRef(columns)
+  const drawNewest = () => {
     const chart = plot.current
-    if (!chart) return
-    chart.setData(columns, !inside.current)
+    if (!chart || drawnData.current === newest.current) return
+    drawnData.current = newest.current
+    // Newer values leave a reader where he has zoomed to.
+    chart.setData(newest.current, !inside.current)
     if (inside.current) chart.redraw()
+  }
+  const inSight = useInSight(frame, drawNewest)
+  // biome-ignore lint/correctness/useExhaustiveDependencies: what is drawn anew is looked up, and only while one may see it.
+  useEffect(() => {
+    if (inSight.current) drawNewest()
   }, [columns])
 
   // biome-ignore lint/correctness/useExhaustiveDependencies: a plot that is made anew is shown what the others show.
@@ -231,6 +239,7 @@ export function Chart({
   zoomOut.current = () => {
     setZoomed(false)
     linked?.zoomTo(null)
+    drawnData.current = newest.current
     plot.current?.setData(newest.current)
   }
 

@@ -1,5 +1,5 @@
 /** What lies far below what is seen is made when one comes near; most of it also when the browser has nothing else to do, one by one. */
-import { type RefObject, startTransition, useEffect, useState } from 'react'
+import { type RefObject, startTransition, useEffect, useRef, useState } from 'react'
 
 /** How far beyond the window is near. */
 const MARGIN = '600px'
@@ -47,4 +47,33 @@ export function useNear(ref: RefObject<Element | null>, waits = false): boolean 
     }
   }, [near, ref, waits])
   return near
+}
+
+/** How far beyond the window something is drawn anew: so that it is new when it is scrolled to. */
+const DRAWN_MARGIN = '150px'
+
+/** Whether `ref` may be seen now, as long as it is there; `enter` is called when it comes into sight. */
+export function useInSight(ref: RefObject<Element | null>, enter: () => void): RefObject<boolean> {
+  const inSight = useRef(true)
+  const entered = useRef(enter)
+  entered.current = enter
+  useEffect(() => {
+    const element = ref.current
+    if (!element || !('IntersectionObserver' in window)) return
+    const observer = new IntersectionObserver(
+      (entries) => {
+        const seen = entries.at(-1)?.isIntersecting ?? true
+        const before = inSight.current
+        inSight.current = seen
+        if (seen && !before) entered.current()
+      },
+      { rootMargin: DRAWN_MARGIN },
+    )
+    observer.observe(element)
+    return () => {
+      observer.disconnect()
+      inSight.current = true
+    }
+  }, [ref])
+  return inSight
 }
