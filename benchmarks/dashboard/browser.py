@@ -30,7 +30,8 @@ const whenReady = () => {
   if (!window.__drawn && document.body && (READY)) { window.__drawn = performance.now() }
   if (!window.__drawn) requestAnimationFrame(whenReady)
 };
-requestAnimationFrame(whenReady);
+// The frames within a page, as the one of the robots in 3D, are never ready, and would have it drawn sixty times a second.
+if (window === top) requestAnimationFrame(whenReady);
 let last = '';
 const follow = () => {
   const steps = [...document.querySelectorAll('[data-testid=vitals] dt')].find((dt) => dt.textContent === 'Steps');
@@ -38,7 +39,7 @@ const follow = () => {
   const curve = Number(document.querySelector('[data-testid=chart]')?.dataset.step ?? 0);
   if (`${vitals} ${curve}` !== last) { last = `${vitals} ${curve}`; window.__seen.push([Date.now() / 1000, vitals, curve]) }
 };
-setInterval(follow, 50);
+if (window === top) setInterval(follow, 50);
 """
 
 

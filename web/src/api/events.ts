@@ -87,13 +87,15 @@ export function createInvalidator(client: QueryClient): { push: (change: Change)
       else if ((type === 'success' || type === 'error') && times?.answered === 0) times.answered = Date.now()
     }
   })
-  const isDue = (queryHash: string, urgent: boolean) => {
+  /** Milliseconds until a query may be asked again, 0 or more. */
+  const dueIn = (queryHash: string, urgent: boolean) => {
     const query = cache.get(queryHash)
-    if (query?.state.fetchStatus === 'fetching') return false
+    if (query?.state.fetchStatus === 'fetching') return TICK_MS
     const times = asked.get(queryHash)
-    if (!times) return true
+    if (!times) return 0
     const least = !urgent && SLOW_PATHS.includes(query?.queryKey[1]) ? SLOW_ROUND_MS : ROUND_MS
-    return Date.now() >= Math.max(times.at + least, times.answered + REST * (times.answered - times.at))
+    const due = Math.max(times.at + least, times.answered + REST * (times.answered - times.at))
+    return Math.max(0, due - Date.now())
   }
   const flush = () => {
     timer = undefined
@@ -104,9 +106,11 @@ export function createInvalidator(client: QueryClient): { push: (change: Change)
     }
     pending = []
     if (old.size === 0) return
-    const due = new Set([...old].filter(([hash, urgent]) => isDue(hash, urgent)).map(([hash]) => hash))
+    const waits = [...old].map(([hash, urgent]) => [hash, dueIn(hash, urgent)] as const)
+    const due = new Set(waits.filter(([, wait]) => wait === 0).map(([hash]) => hash))
     for (const hash of due) old.delete(hash)
-    timer = setTimeout(flush, TICK_MS)
+    // Changes that come meanwhile are looked at with the next of these.
+    timer = setTimeout(flush, Math.min(TICK_MS, ...waits.map(([, wait]) => wait || TICK_MS)))
     if (due.size > 0) {
       void client.invalidateQueries(
         { predicate: ({ queryHash }) => due.has(queryHash) },
