@@ -95,7 +95,8 @@ def _contender(
         with serving(folder / "ours") as server, tabs(server, patience) as opened:
             return _look(name, server, opened, _ours(experiments, run_ids))
     if name != "trackio":
-        samples = 0 if name.endswith("all points") else 1_000
+        # Not 0, which is said to mean all: its data server then keeps none.
+        samples = options.points if name.endswith("all points") else 1_000
         command = [sys.executable, "-m", "tensorboard.main", "--logdir", str(folder / "events")]
         command += ["--samples_per_plugin", f"scalars={samples}"]
         with _serving([*command, "--port"], patience) as server, tabs(server, patience) as opened:

@@ -32,6 +32,15 @@ test('each training with its state, what it trains, and its success with interva
   expect(document.title).toBe('Trainings – Mapless')
 })
 
+test('the list is asked for once, while it is drawn', async () => {
+  const server = startServer({ 'GET /api/experiments': two })
+  open('/')
+  await screen.findAllByTestId('experiment')
+  expect(server.asked.filter((path) => path.startsWith('/api/experiments'))).toEqual([
+    '/api/experiments?place=live&query=&sort=-created&limit=100',
+  ])
+})
+
 test('who has nothing yet is invited to launch the first', async () => {
   startServer({ 'GET /api/experiments': { items: [], total: 0, next: null } })
   open('/')
