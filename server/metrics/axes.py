@@ -1,5 +1,6 @@
 """Axes in SQL: steps and times of points, once for all series of a run that were reported together."""
 
+import functools
 from collections.abc import Iterable, Iterator
 from hashlib import blake2b
 from typing import Protocol, TypeVar, cast
@@ -81,11 +82,20 @@ class AxisRepository:
         for start in range(0, len(wanted), _AXES_A_QUERY):
             some = wanted[start : start + _AXES_A_QUERY]
             query = select(axis.run_id, axis.id, axis.data).where(tuple_(axis.run_id, axis.id).in_(some))
-            axes |= {(run_id, key): Axis.decode(data) for run_id, key, data in self._session.execute(query)}
+            axes |= {(run_id, key): _unpacked(data) for run_id, key, data in self._session.execute(query)}
         # An axis is called by what it is: what is remembered is true for as long as it is asked for.
         for key in wanted[: _MAX_REMEMBERED - len(self._decoded)]:
             self._decoded[key] = axes[key]
         return axes
+
+
+# As many as *Compare* asks for with each of its charts: two of each of fifty runs, and some.
+@functools.lru_cache(maxsize=128)
+def _unpacked(data: bytes) -> Axis:
+    """The axis, which others may have, too: nobody can change it."""
+    axis = Axis.decode(data)
+    axis.steps.flags.writeable = axis.times.flags.writeable = False
+    return axis
 
 
 def digest(points: Points) -> str:

@@ -160,6 +160,19 @@ def test_series_that_are_reported_together_share_their_steps_and_times(database:
     assert axes(database) == 0
 
 
+def test_where_points_lie_is_unpacked_once_and_nobody_changes_it(database: Database) -> None:
+    append(database, together(1, 300))
+    compact(database)
+    read = []
+    for name in ("a", "b"):
+        with database.read() as session:
+            read.append(MetricRepository(session).read("r")[name].steps)
+    assert read[0].base is not None
+    assert read[0].base is read[1].base
+    with pytest.raises(ValueError, match="read-only"):
+        read[0][0] = 7
+
+
 def test_points_of_a_database_from_before_axes_are_read_and_grown(database: Database) -> None:
     config = migration_config(database)
     append(database, together(1, 700))
