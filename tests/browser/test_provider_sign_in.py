@@ -45,7 +45,7 @@ def test_somebody_joins_by_a_link_and_comes_back_without_one(browser: Browser, t
             expect(page.get_by_role("button", name="Account of ada")).to_be_visible()
 
             page.get_by_role("button", name="Account of ada").click()
-            page.get_by_role("menuitem", name="Sign out").click()
+            page.get_by_role("menuitem", name="Sign out", exact=True).click()
             page.goto("/queue")
             page.get_by_role("button", name="Sign in with the university").click()
             expect(page.get_by_role("button", name="Account of ada")).to_be_visible()
