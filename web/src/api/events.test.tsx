@@ -116,6 +116,19 @@ describe('the stream', () => {
     expect(questions).toHaveLength(3)
   })
 
+  test('what may be asked again is asked that moment, whenever the change came', async () => {
+    const invalidator = createInvalidator(client)
+    const questions = await show(metricsKey)
+    invalidator.push(change('metrics'))
+    questions[1]?.answer('second')
+    await vi.advanceTimersByTimeAsync(330)
+    invalidator.push(change('metrics'))
+    await vi.advanceTimersByTimeAsync(ROUND_MS - 331)
+    expect(questions).toHaveLength(2)
+    await vi.advanceTimersByTimeAsync(1)
+    expect(questions).toHaveLength(3)
+  })
+
   test('an answer that is slower than the reports arrives, and what came meanwhile is asked for after it', async () => {
     const invalidator = createInvalidator(client)
     const questions = await show(metricsKey)
