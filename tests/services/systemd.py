@@ -141,7 +141,7 @@ def machine(folder: Path) -> Iterator[Machine]:
             pid = until(first, seconds=30)
             assert pid is not None
             started = Machine(pid)
-            until(lambda: started.is_active("multi-user.target") == "active", seconds=60)
+            until(lambda: started.is_active("multi-user.target") == "active", seconds=180)
             yield started
         finally:
             process.kill()
