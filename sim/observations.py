@@ -31,6 +31,7 @@ from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS
 from sim.kernels.room import MAX_FRAMES, MAX_PARTS
+from sim.kernels.trail import LONG_ROOM
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -191,16 +192,20 @@ def _ranges(part: RangesPart, task: TaskConfig) -> Iterator[ObservationNumber]:
 
 
 def _trail(part: TrailPart, task: TaskConfig) -> Iterator[ObservationNumber]:
-    crumbs, limit = "the crumbs in sight in this sector", task.lidar.range
-    kinds = (
+    crumbs, limit, is_long = "the crumbs in sight in this sector", task.lidar.range, part.memory == "long"
+    freshness = f"1 - ln(1 + m) / ln(1 + {LONG_ROOM})" if is_long else "10 / (10 + m)"
+    kinds = [
         ("trail nearness", f"1 - d / {limit:g} m, d = distance of the nearest of {crumbs}; 0 where there is none"),
         ("trail crumbs", f"n / (n + 5), n = number of {crumbs}"),
-        ("trail freshness", f"10 / (10 + m), m = crumbs dropped since the newest of {crumbs}; 0 where there is none"),
-    )
+        ("trail freshness", f"{freshness}, m = crumbs dropped since the newest of {crumbs}; 0 where there is none"),
+    ]
+    if is_long:
+        kinds.append(("trail first", f"{freshness}, m = crumbs dropped since the oldest of {crumbs}; 0 where there is none"))
     for name, formula in kinds:
         for k in range(part.sectors):
             yield ObservationNumber(f"{name} {k}", formula, 0.0, 1.0)
-    yield ObservationNumber("trail length", "n / (n + 40), n = crumbs dropped in this attempt", 0.0, 1.0)
+    half = 160 if is_long else 40
+    yield ObservationNumber("trail length", f"n / (n + {half}), n = crumbs dropped in this attempt", 0.0, 1.0)
 
 
 def pack_parts(task: TaskConfig) -> dict[str, object]:
@@ -242,5 +247,7 @@ def _option(part: ObservationPart) -> int:
             return int(part.scaling in ("saturating", "signed"))
         case BearingPart():
             return int(part.encoding == "sine_cosine")
+        case TrailPart():
+            return int(part.memory == "long")
         case _:
             return 0

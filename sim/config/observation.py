@@ -13,7 +13,7 @@ from sim.config.base import ADVANCED, Frozen
 from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ObservationPart as AddedPart
 from sim.extending.parts import check_numbers
-from sim.kernels.room import MAX_FRAMES, MAX_PARTS, TRAIL_KINDS
+from sim.kernels.room import LONG_TRAIL_KINDS, MAX_FRAMES, MAX_PARTS, SHORT_TRAIL_KINDS
 
 MAX_NUMBERS = 4_000
 """Numbers of one observation, at most: all rays of a full scanner at all moments, and some more."""
@@ -132,6 +132,13 @@ class TrailPart(Frozen):
         le=120,
         title="Sectors",
         description="Of the full turn around it, three numbers each: how near, how many, how fresh.",
+        json_schema_extra=ADVANCED,
+    )
+    memory: Literal["short", "long"] = Field(
+        "short",
+        title="Memory",
+        description="Short: the newest 256 crumbs, some 60 m. Long: 1,024, ages by their logarithms, and a fourth number of "
+        "each sector, the age of its oldest crumb.",
         json_schema_extra=ADVANCED,
     )
     frames: int = _frames()
@@ -274,7 +281,7 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
         case BearingPart(encoding="sine_cosine"):
             return 2
         case TrailPart():
-            return TRAIL_KINDS * part.sectors + 1
+            return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1
         case AddedObservationPart():
             return len(part.numbers())
         case _:

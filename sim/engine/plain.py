@@ -195,7 +195,7 @@ class PlainWorld:
             case DeviationPart():
                 return np.array([abs(bearing) / math.pi])
             case TrailPart():
-                return self._trail.seen(ranges, (*self.body.position, heading), part.sectors)
+                return self._trail.seen(ranges, (*self.body.position, heading), part)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

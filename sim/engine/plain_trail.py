@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.config import LidarConfig
-from sim.kernels.trail import SEEN_BEHIND, TRAIL_ROOM, TRAIL_SPACING
+from sim.config import LidarConfig, TrailPart
+from sim.kernels.trail import LONG_ROOM, SEEN_BEHIND, SHORT_ROOM, TRAIL_SPACING
 from sim.lidar import ray_angles
 
 
@@ -30,10 +30,14 @@ class PlainTrail:
         if not self._crumbs or math.dist(self._crumbs[-1], place) >= TRAIL_SPACING:
             self._crumbs.append((place[0], place[1]))
 
-    def seen(self, ranges: NDArray[np.float64], pose: Sequence[float], sectors: int) -> NDArray[np.float64]:
-        """What a robot at a pose sees of its trail (3 * sectors + 1,), given its scan, metres."""
-        nearness, count, freshness = np.zeros((3, sectors))
-        for age, (x, y) in enumerate(self._crumbs[: -TRAIL_ROOM - 1 : -1]):
+    def seen(self, ranges: NDArray[np.float64], pose: Sequence[float], part: TrailPart) -> NDArray[np.float64]:
+        """What a robot at a pose sees of its trail, given its scan, metres: a part's numbers.
+
+        They are (3 * sectors + 1,), and with a long memory (4 * sectors + 1,).
+        """
+        sectors, is_long = part.sectors, part.memory == "long"
+        nearness, count, freshness, first = np.zeros((4, sectors))
+        for age, (x, y) in enumerate(self._crumbs[: -(LONG_ROOM if is_long else SHORT_ROOM) - 1 : -1]):
             distance = math.dist((x, y), pose[:2])
             angle = _wrapped(math.atan2(y - pose[1], x - pose[0]) - pose[2])
             if not SEEN_BEHIND <= distance < self._range or self._meets(ranges, angle) < distance - SEEN_BEHIND:
@@ -41,9 +45,12 @@ class PlainTrail:
             k = min(int((angle + math.pi) / math.tau * sectors), sectors - 1)
             nearness[k] = max(nearness[k], 1.0 - distance / self._range)
             count[k] += 1.0
-            freshness[k] = max(freshness[k], 10.0 / (10.0 + age))
+            fresh = 1.0 - math.log(1.0 + age) / math.log(1.0 + LONG_ROOM) if is_long else 10.0 / (10.0 + age)
+            freshness[k], first[k] = max(freshness[k], fresh), fresh
         dropped = len(self._crumbs)
-        return np.concatenate([nearness, count / (count + 5.0), freshness, [dropped / (dropped + 40.0)]])
+        ages = [freshness, first] if is_long else [freshness]
+        length = dropped / (dropped + (160.0 if is_long else 40.0))
+        return np.concatenate([nearness, count / (count + 5.0), *ages, [length]])
 
     def _meets(self, ranges: NDArray[np.float64], angle: float) -> float:
         """What the ray nearest to an angle against the heading reads, metres; infinite where none points there."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import RandomisationConfig, TaskConfig
+from sim.config import RandomisationConfig, TaskConfig, TrailPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -42,7 +42,7 @@ from sim.kernels.records import (
 )
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
-from sim.kernels.trail import TRAIL_ROOM
+from sim.kernels.trail import LONG_ROOM, SHORT_ROOM
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.observations import observation_size
 from sim.streams import ENVIRONMENT, Stream
@@ -167,7 +167,8 @@ class World:
         self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, paths, robots)
         self.guidance = Guidance(task, paths, robots) if guides and paths else None
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
-        sees_trail = any(part.name == "trail" for part in task.observation.parts)
+        trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
+        sees_trail = bool(trails)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -189,7 +190,9 @@ class World:
             drift=np.zeros((robots if drifts else 0, 3)),
             pending=np.zeros((robots, longest_delay(task), action_size), dtype=np.float32),
             commands=np.zeros((robots if sees_actions else 0, action_size), dtype=np.float32),
-            trail=np.zeros((robots if sees_trail else 0, TRAIL_ROOM, 2), dtype=np.float32),
+            trail=np.zeros(
+                (robots if sees_trail else 0, LONG_ROOM if "long" in trails else SHORT_ROOM, 2), dtype=np.float32
+            ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),

@@ -9,5 +9,5 @@ MAX_FRAMES = 8
 MAX_TERMS = 16
 """Terms of one reward, at most."""
 
-TRAIL_KINDS = 3
-"""Numbers of each sector in which a trail is seen."""
+SHORT_TRAIL_KINDS, LONG_TRAIL_KINDS = 3, 4
+"""Numbers of each sector in which a trail is seen, by how much of it is remembered."""

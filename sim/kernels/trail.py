@@ -12,8 +12,8 @@ from sim.kernels.options import kernel
 from sim.kernels.records import TRAIL_PART
 from sim.kernels.sensing import FAST
 
-TRAIL_ROOM = 256
-"""Crumbs that a robot remembers, the newest ones."""
+SHORT_ROOM, LONG_ROOM = 256, 1024
+"""Crumbs that a robot remembers, the newest ones: on some 60 m and on some 250 m of its way."""
 
 TRAIL_SPACING = 0.24
 """Metres from the last crumb at which the next one is dropped; no multiple of what a robot usually drives in a step."""
@@ -29,22 +29,24 @@ _SPACING = np.float32(TRAIL_SPACING)
 _BEHIND = np.float32(SEEN_BEHIND)
 _SEVERAL = np.float32(5.0)
 _LATELY = np.float32(10.0)
-_LONG = np.float32(40.0)
+# Crumbs of which a trail that is told to be half its length has so many, by its memory.
+_HALF_WAY = (np.float32(40.0), np.float32(160.0))
 
 
 @kernel(fastmath=FAST)
 def _drop(i, x, y, robots):
     """Let robot i drop a crumb where the last one is far enough; returns how many it has dropped."""
     trail = robots.trail
+    room = trail.shape[1]
     dropped = robots.crumbs[i]
     if dropped > 0:
-        last = (dropped - 1) % TRAIL_ROOM
+        last = (dropped - 1) % room
         dx = x - trail[i, last, 0]
         dy = y - trail[i, last, 1]
         if dx * dx + dy * dy < _SPACING * _SPACING:
             return dropped
-    trail[i, dropped % TRAIL_ROOM, 0] = x
-    trail[i, dropped % TRAIL_ROOM, 1] = y
+    trail[i, dropped % room, 0] = x
+    trail[i, dropped % room, 1] = y
     robots.crumbs[i] = dropped + 1
     return dropped + 1
 
@@ -64,6 +66,14 @@ def _ray_towards(angle, angles, yaw):
 
 
 @kernel(fastmath=FAST)
+def _freshness(age, is_long):
+    """How fresh a crumb is after so many others, 1 to 0; by logarithms, two that are old can be told apart, too."""
+    if is_long:
+        return ONE - np.float32(math.log(ONE + age)) / np.float32(math.log(1.0 + LONG_ROOM))
+    return _LATELY / (_LATELY + age)
+
+
+@kernel(fastmath=FAST)
 def see_trail(i, x, y, heading, robots, geometry, p):
     """Drop a crumb and write what robot i sees of its trail, sector by sector from right to left, beginning behind it.
 
@@ -78,20 +88,24 @@ def see_trail(i, x, y, heading, robots, geometry, p):
     """
     dropped = _drop(i, x, y, robots)
     trail = robots.trail
+    room = trail.shape[1]
+    is_long = p.part_options[TRAIL_PART]
     out = robots.observations
     sectors = p.trail_sectors
     nearness = p.part_places[TRAIL_PART]
     count = nearness + sectors
     freshness = count + sectors
-    for k in range(nearness, freshness + sectors):
+    first = freshness + sectors
+    length = first + sectors if is_long else first
+    for k in range(nearness, length):
         out[i, k] = ZERO
-    out[i, freshness + sectors] = np.float32(dropped) / (np.float32(dropped) + _LONG)
+    out[i, length] = np.float32(dropped) / (np.float32(dropped) + _HALF_WAY[is_long])
     cos = np.float32(math.cos(heading))
     sin = np.float32(math.sin(heading))
     # The oldest first, so that the newest of a sector is the last to say how fresh it is.
-    for number in range(max(0, dropped - TRAIL_ROOM), dropped):
-        dx = trail[i, number % TRAIL_ROOM, 0] - x
-        dy = trail[i, number % TRAIL_ROOM, 1] - y
+    for number in range(max(0, dropped - room), dropped):
+        dx = trail[i, number % room, 0] - x
+        dy = trail[i, number % room, 1] - y
         squared = dx * dx + dy * dy
         if squared < _BEHIND * _BEHIND or squared >= p.range * p.range:
             continue
@@ -103,6 +117,8 @@ def see_trail(i, x, y, heading, robots, geometry, p):
         k = min(np.int64((angle + PI) / TWO_PI * np.float32(sectors)), sectors - 1)
         out[i, nearness + k] = max(out[i, nearness + k], ONE - distance / p.range)
         out[i, count + k] += ONE
-        out[i, freshness + k] = _LATELY / (_LATELY + np.float32(dropped - 1 - number))
+        out[i, freshness + k] = _freshness(np.float32(dropped - 1 - number), is_long)
+        if is_long and out[i, first + k] == ZERO:
+            out[i, first + k] = out[i, freshness + k]
     for k in range(count, freshness):
         out[i, k] = out[i, k] / (out[i, k] + _SEVERAL)

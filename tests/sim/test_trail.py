@@ -19,17 +19,16 @@ from sim.config import (
 from sim.engine.plain_trail import PlainTrail
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
-from sim.kernels.trail import TRAIL_ROOM
+from sim.kernels.trail import LONG_ROOM, SHORT_ROOM
 from sim.observations import observation_layout
 
 WALL = np.array([[0.0, 1.5, 1.0, 0.1, 0.0]])
 FULL = LidarConfig(rays=120, field_of_view=360.0)
 
 
-def seen(sectors: int = 4, lidar: LidarConfig = FULL, **task: object) -> TaskConfig:
-    return TaskConfig.model_validate(
-        {"lidar": lidar, "observation": ObservationConfig(parts=(TrailPart(sectors=sectors),)), **task}
-    )
+def seen(sectors: int = 4, lidar: LidarConfig = FULL, memory: str = "short", **task: object) -> TaskConfig:
+    part = TrailPart.model_validate({"sectors": sectors, "memory": memory})
+    return TaskConfig.model_validate({"lidar": lidar, "observation": ObservationConfig(parts=(part,)), **task})
 
 
 def world(task: TaskConfig, *boxes: np.ndarray) -> World:
@@ -69,10 +68,26 @@ def test_crumbs_behind_a_wall_are_out_of_sight() -> None:
     for place in trail.tolist():
         plain.drop(place)
     blocked = np.full(120, 0.6)
-    assert plain.seen(blocked, (0.0, 2.2, 0.0), 4)[:12].max() == 0.0
-    assert plain.seen(np.full(120, 3.5), (0.0, 2.2, 0.0), 4)[:12].max() > 0.0
+    assert plain.seen(blocked, (0.0, 2.2, 0.0), TrailPart(sectors=4))[:12].max() == 0.0
+    assert plain.seen(np.full(120, 3.5), (0.0, 2.2, 0.0), TrailPart(sectors=4))[:12].max() > 0.0
 
 
+def test_with_a_long_memory_old_crumbs_have_ages_that_differ() -> None:
+    made = world(seen(memory="long"))
+    made.reset(poses=(-3.0, 0.0, 0.0), targets=(4.0, 3.0))
+    assert made.robots.observations[0] == pytest.approx([0.0] * 16 + [1 / 161])
+    drive(made, 20)
+    drive(made, 1, 0.0, 0.5)
+    # As in the test above five crumbs, the newest underfoot: the others were followed by one, two, three and four.
+    nearness, count, freshness, first = made.robots.observations[0, :16].reshape(4, 4)
+    behind = nearness.argmax()
+    assert count[behind] == pytest.approx(4 / 9)
+    assert freshness[behind] == pytest.approx(1 - np.log(2) / np.log(1025), abs=1e-6)
+    assert first[behind] == pytest.approx(1 - np.log(5) / np.log(1025), abs=1e-6)
+    assert np.count_nonzero(first) == np.count_nonzero(nearness) == 1
+
+
+@pytest.mark.parametrize("memory", ["short", "long"])
 @pytest.mark.parametrize(
     "lidar",
     [
@@ -84,10 +99,11 @@ def test_crumbs_behind_a_wall_are_out_of_sight() -> None:
     ],
     ids=["full circle", "half", "three rays", "turned", "two"],
 )
-def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
+def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig, memory: str) -> None:
     task = seen(
         24,
         lidar,
+        memory,
         arena=ArenaConfig(name="complex"),
         odometry=OdometryConfig(distance_noise=0.05, heading_noise=0.05),
         step_limit=2000,
@@ -103,10 +119,12 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
             plain = PlainTrail(task.lidar)
         believed = (robots.poses[0] + robots.drift[0]).astype(float)
         plain.drop(believed[:2])
-        expected = plain.seen(robots.ranges[0].astype(float), believed, 24)
+        part = task.observation.parts[0]
+        assert isinstance(part, TrailPart)
+        expected = plain.seen(robots.ranges[0].astype(float), believed, part)
         # A crumb on the edge of a sector or of what a ray meets falls on either side: three numbers of two sectors.
-        assert np.count_nonzero(np.abs(robots.observations[0] - expected) > 1e-3) <= 6
-        compared += np.array_equal(np.abs(robots.observations[0] - expected) < 1e-3, np.ones(73, bool))
+        assert np.count_nonzero(np.abs(robots.observations[0] - expected) > 1e-3) <= 8
+        compared += bool((np.abs(robots.observations[0] - expected) < 1e-3).all())
         told += int(np.count_nonzero(expected[:24]))
         made.step(np.array([[random.uniform(0.3, 1.0), random.uniform(-1.0, 1.0)]], np.float32))
         if robots.outcomes[0]:
@@ -115,16 +133,18 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     assert told > 100
 
 
-def test_the_oldest_crumbs_are_forgotten() -> None:
-    made, plain = world(seen(step_limit=10_000)), PlainTrail(FULL)
+@pytest.mark.parametrize(("memory", "room", "steps"), [("short", SHORT_ROOM, 1500), ("long", LONG_ROOM, 5500)])
+def test_the_oldest_crumbs_are_forgotten(memory: str, room: int, steps: int) -> None:
+    made, plain = world(seen(memory=memory, step_limit=10_000)), PlainTrail(FULL)
     made.reset(poses=(0.0, 0.0, 0.0), targets=(4.5, 4.5))
     plain.drop(made.robots.poses[0, :2].tolist())
-    for _ in range(1500):  # round and round: 75 m
+    for _ in range(steps):  # round and round: 75 or 275 m
         made.step(np.array([[1.0, 0.5]], np.float32))
         plain.drop(made.robots.poses[0, :2].tolist())
-    assert made.robots.crumbs[0] > TRAIL_ROOM
+    assert made.robots.crumbs[0] > room
     pose = made.robots.poses[0].astype(float)
-    expected = plain.seen(made.robots.ranges[0].astype(float), pose, 4)
+    part = TrailPart.model_validate({"sectors": 4, "memory": memory})
+    expected = plain.seen(made.robots.ranges[0].astype(float), pose, part)
     assert made.robots.observations[0] == pytest.approx(expected, abs=0.02)
 
 

@@ -126,15 +126,16 @@ def _filled(example: str, specification: Specification) -> str:
         "ackermann": ("linear", "steering"),
     }[specification.drive]
     added = {
-        part.kind: "[trail.see(ranges[0], pose)]" if part.kind == "trail" else str([[0.0] * part.size])
+        part.kind: "[trail.see(ranges[0], pose)]" if part.is_trail else str([[0.0] * part.size])
         for part in _brought_parts(specification)
     }
     brought = ", ".join(f'"{kind}": {numbers}' for kind, numbers in added.items())
+    sees_trail = any(part.is_trail for part in specification.parts)
     return (
         example.replace("NAMES", ", ".join(names))
         .replace("ADDED", f", added={{{brought}}}" if added else "")
-        .replace("IMPORTS", "from mapless_navigator.trail import Trail\n" if "trail" in added else "")
-        .replace("TRAIL", _TRAIL if "trail" in added else "")
+        .replace("IMPORTS", "from mapless_navigator.trail import Trail\n" if sees_trail else "")
+        .replace("TRAIL", _TRAIL if sees_trail else "")
         .replace("FORMAT", ", ".join(f"{{{name}:.3f}} {units[name]}" for name in names))
         .replace("ZEROS", ", ".join(["0.0"] * len(names)))
         .replace("COUNT", str(len(names)))
@@ -199,7 +200,7 @@ def _at_first(part: Part) -> str:
     """What a robot that has not moved brings, as code."""
     if part.added:
         return f"np.zeros((1, {part.size}), np.float32)"
-    return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / 41"
+    return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / {161 if part.kind == 'long_trail' else 41}"
 
 
 def _maker(part: Part) -> str:

@@ -19,6 +19,7 @@ from sim.config import (
     OmnidirectionalDrive,
     RangesPart,
     TaskConfig,
+    TrailPart,
 )
 from sim.config.observation import part_size
 from sim.observations import near_distance, observation_layout
@@ -107,6 +108,8 @@ def _kind(part: ObservationPart) -> str:
             return "bearing_sine_cosine"
         case HeadingPart(scaling="turn"):
             return "heading_turn"
+        case TrailPart(memory="long"):
+            return "long_trail"
         case _:
             return part.name
 

@@ -73,6 +73,7 @@ TASKS = [
     ),
     TaskConfig(observation=ObservationConfig(parts=(SpeedsPart(), RangesPart()))),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(sectors=8, frames=2)))),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(sectors=8, memory="long")))),
 ]
 
 
@@ -92,6 +93,7 @@ TASKS = [
         "parts",
         "no target",
         "trail",
+        "long trail",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
@@ -183,8 +185,9 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
         ObservationConfig.preset("improved"),
         ObservationConfig.preset("improved", frames=4),
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart())),
+        ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(memory="long"))),
     ],
-    ids=["one moment", "four moments", "trail"],
+    ids=["one moment", "four moments", "trail", "long trail"],
 )
 def test_readme_examples_run_and_agree(
     make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, observation: ObservationConfig

@@ -84,8 +84,9 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
     assert starts > 1
 
 
-def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path]) -> None:
-    listed = (RangesPart(batches=30), BearingPart(), TrailPart())
+@pytest.mark.parametrize("part", [TrailPart(), TrailPart(memory="long")], ids=["short", "long"])
+def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path], part: TrailPart) -> None:
+    listed = (RangesPart(batches=30), BearingPart(), part)
     task = TaskConfig(arena=ArenaConfig(name="complex"), observation=ObservationConfig(parts=listed))
     exported = export_checkpoint(make_checkpoint(task=task))
     env = NavigationVectorEnv(task, 1, seed=5)
@@ -94,7 +95,7 @@ def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path]) -> None
     ways = unequal = 0
     for _ in range(300):
         known = env.ranges, env.poses, env.targets, np.zeros((1, 2))
-        seen = {"trail": trail.see(env.ranges[0], env.poses[0])[None]}
+        seen = {trail.kind: trail.see(env.ranges[0], env.poses[0])[None]}
         made = observe(exported.specification, *known, added=seen)
         # A crumb on the edge of a sector, or of what a ray meets, falls on either side.
         unequal += int(np.abs(made - observations).max() > 1e-4)

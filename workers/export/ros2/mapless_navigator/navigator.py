@@ -118,7 +118,7 @@ class Navigator:
 
     def __init__(self, policy: Policy, safety: Safety, make_added: MakeAdded | None = None) -> None:
         if make_added is None:
-            refuse_unknown(policy.specification, ("trail",))
+            refuse_unknown(policy.specification, ("trail", "long_trail"))
         self._policy, self._safety, self._make_added = policy, safety, make_added
         self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
         self._yaws = (safety.sensor_yaw, safety.second_sensor_yaw)[: len(self._scans)]
@@ -131,7 +131,7 @@ class Navigator:
         self._too_near = False
         self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
         self._frames = Frames(policy.specification)
-        sees_trail = any(part.kind == "trail" for part in policy.specification.parts)
+        sees_trail = any(part.is_trail for part in policy.specification.parts)
         self._trail = Trail(policy.specification) if sees_trail else None
         self._memory = policy.memory(1)
 
@@ -231,7 +231,7 @@ class Navigator:
         )
         added = dict(self._make_added(*known)) if self._make_added else {}
         if self._trail is not None:
-            added["trail"] = self._trail.see(ranges, pose)[None]
+            added[self._trail.kind] = self._trail.see(ranges, pose)[None]
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)
 

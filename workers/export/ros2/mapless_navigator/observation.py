@@ -14,7 +14,7 @@
 | `heading`              | heading / pi                                                               |
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
-| `trail`                | where it has been, see `trail.py`: whoever calls brings them along         |
+| `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
@@ -70,7 +70,7 @@ def observe(
         targets: (n, 2) x, y in metres, in the same frame.
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
-        added: the numbers (n, size) of each part that an extension makes, by its kind, and those of `trail` (`Trail.see`);
+        added: the numbers (n, size) of each part that an extension makes, by its kind, and those of the trail (`Trail.see`);
             `manifest.json` explains them.
 
     Returns:
@@ -118,9 +118,9 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
         PolicyFileError: there is such a part; says which.
     """
     for part in specification.parts:
-        if part.kind == "trail" and part.kind not in known:
+        if part.is_trail and part.kind not in known:
             raise PolicyFileError(
-                "this policy sees its trail: give what Trail.see tells to observe(added={'trail': [numbers]})"
+                f"this policy sees its trail: give what Trail.see tells to observe(added={{{part.kind!r}: [numbers]}})"
             )
         if part.added and part.kind not in known:
             raise PolicyFileError(

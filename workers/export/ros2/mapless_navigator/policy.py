@@ -40,6 +40,7 @@ KINDS = (
     "heading_turn",
     "deviation",
     "trail",
+    "long_trail",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
@@ -68,9 +69,14 @@ class Part:
         return "." in self.kind
 
     @property
+    def is_trail(self) -> bool:
+        """Whether it tells where the robot has been, see `trail.py`."""
+        return self.kind in ("trail", "long_trail")
+
+    @property
     def brought(self) -> bool:
         """Whether its numbers are no function of scan, pose, target and commands of one moment: whoever asks brings them."""
-        return self.added or self.kind == "trail"
+        return self.added or self.is_trail
 
 
 @dataclass(frozen=True)
