@@ -14,7 +14,7 @@ from sim.suites import Suite, SuiteRules, load_suite, suite_in, suite_places
 from workers.shipped.field import Part
 
 FAMILIES: tuple[FamilyName, ...] = tuple(
-    name for name in get_args(FamilyName) if name not in ("mixed", "varied", *BENCHMARKS)
+    name for name in get_args(FamilyName) if name not in ("mixed", "varied", "intricate", *BENCHMARKS)
 )
 FROZEN: dict[Part, tuple[str, ...]] = {"barn": ("barn-jackal-300",), "people": ("people-500", "heedless-500")}
 

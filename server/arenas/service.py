@@ -37,6 +37,7 @@ _FAMILIES: tuple[tuple[str, FamilyName], ...] = (
     ("Thicket of pillars", "thicket"),
     ("Clutter and thickets", "mixed"),
     ("Another family on every map", "varied"),
+    ("Another one, more mazes and thickets", "intricate"),
     ("Fields as BARN's", "barn"),
     ("Scenes among people", "people"),
 )

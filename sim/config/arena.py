@@ -13,7 +13,18 @@ from sim.extending.parts import ArenaFamily
 
 ArenaName = Literal["simple", "complex"]
 FamilyName = Literal[
-    "clutter", "corridors", "rooms", "warehouse", "maze", "passages", "thicket", "mixed", "varied", "barn", "people"
+    "clutter",
+    "corridors",
+    "rooms",
+    "warehouse",
+    "maze",
+    "passages",
+    "thicket",
+    "mixed",
+    "varied",
+    "intricate",
+    "barn",
+    "people",
 ]
 
 

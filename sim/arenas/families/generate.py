@@ -19,7 +19,7 @@ from sim.arenas.families.mixed import mixed
 from sim.arenas.families.partition import corridors, rooms
 from sim.arenas.families.passages import passages
 from sim.arenas.families.thicket import thicket
-from sim.arenas.families.varied import varied
+from sim.arenas.families.varied import intricate, varied
 from sim.arenas.families.warehouse import warehouse
 from sim.arenas.geometry import Arena
 from sim.arenas.scenes import training_scene
@@ -38,6 +38,7 @@ FAMILIES: Final[dict[FamilyName, Callable[[Plan], None]]] = {
     "thicket": thicket,
     "mixed": mixed,
     "varied": varied,
+    "intricate": intricate,
 }
 
 BENCHMARKS: Final[dict[FamilyName, Callable[[float, int], Arena]]] = {"barn": training_world, "people": training_scene}

@@ -6638,7 +6638,7 @@ export interface components {
              * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. Or as in a benchmark, whatever the robot's size: fields of pillars as BARN's, scenes among people. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "barn" | "clutter" | "corridors" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
+            name: "barn" | "clutter" | "corridors" | "intricate" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -6675,7 +6675,7 @@ export interface components {
              * @description Drawn from a seed, 10 x 10 m, with a way to every target: random clutter, corridors, rooms with doors, warehouse aisles, a maze, narrow passages, a thicket of thin pillars, clutter and thickets mixed, or all of them. Or as in a benchmark, whatever the robot's size: fields of pillars as BARN's, scenes among people. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
-            name: "barn" | "clutter" | "corridors" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
+            name: "barn" | "clutter" | "corridors" | "intricate" | "maze" | "mixed" | "passages" | "people" | "rooms" | "thicket" | "varied" | "warehouse";
             /**
              * Maps of its own for each seed
              * @description Results over seeds then tell what other maps would give; else all seeds train on the same ones.
@@ -12814,6 +12814,13 @@ export interface components {
              */
             frames: number;
             /**
+             * Memory
+             * @description Short: the newest 256 crumbs, some 60 m. Long: 1,024, ages by their logarithms, and a fourth number of each sector, the age of its oldest crumb.
+             * @default short
+             * @enum {string}
+             */
+            memory: "short" | "long";
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -12836,6 +12843,13 @@ export interface components {
              * @default 1
              */
             frames: number;
+            /**
+             * Memory
+             * @description Short: the newest 256 crumbs, some 60 m. Long: 1,024, ages by their logarithms, and a fourth number of each sector, the age of its oldest crumb.
+             * @default short
+             * @enum {string}
+             */
+            memory: "short" | "long";
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
