@@ -65,6 +65,7 @@ from server.run_log import endpoints as run_log
 from server.runs import endpoints as runs
 from server.security import endpoints as login
 from server.security.access import AccessMiddleware
+from server.security.cookies import may_be_signed_in
 from server.security.declared import check_permissions
 from server.security.headers import SecurityHeadersMiddleware
 from server.security.proxies import ClientAddressMiddleware
@@ -190,7 +191,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.services = services
     app.state.readiness = ReadinessProbe(services)
     services.instruments.registry.register(StateCollector(services))
-    pages.mount_pages(app, services.settings.web_dist, services.settings.path_prefix)
+    is_known = functools.partial(may_be_signed_in, settings=services.settings)
+    pages.mount_pages(app, services.settings.web_dist, services.settings.path_prefix, is_known)
     app.router.middleware_stack = Switchboard(app.router)
     # The last one added meets a request first.
     app.add_middleware(AbandonedRequestsMiddleware)

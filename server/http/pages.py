@@ -10,9 +10,10 @@ import hashlib
 import json
 import mimetypes
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from fastapi import FastAPI
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -62,13 +63,28 @@ class _Kept:
             response.headers["Vary"] = "Accept-Encoding"
         return cls(body, tag, response.raw_headers)
 
-    async def send(self, scope: Scope, send: Send) -> None:
-        """To whoever has not got it."""
+    async def send(self, scope: Scope, send: Send, *more: tuple[bytes, bytes]) -> None:
+        """To whoever has not got it, with more headers."""
         tags = Headers(scope=scope).get("if-none-match")
         known = tags is not None and self.tag in tags
         headers = [each for each in self.headers if each[0] != b"content-length"] if known else list(self.headers)
-        await send({"type": "http.response.start", "status": 304 if known else 200, "headers": headers})
+        await send({"type": "http.response.start", "status": 304 if known else 200, "headers": [*headers, *more]})
         await send({"type": "http.response.body", "body": b"" if known or scope["method"] == "HEAD" else self.body})
+
+
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """One of the pages (`web/plugins/pages.ts`).
+
+    Attributes:
+        pattern: of its addresses.
+        file: its HTML.
+        asked: what it asks the API first, of which its address says all.
+    """
+
+    pattern: re.Pattern[str]
+    file: str
+    asked: tuple[str, ...]
 
 
 @functools.lru_cache(maxsize=64)
@@ -126,13 +142,15 @@ class _Pages:
     Args:
         dist: the built pages.
         prefix: what stands before every path in a browser's address.
+        is_known: whether somebody may be signed in who asks.
     """
 
-    def __init__(self, dist: Path, prefix: str) -> None:
+    def __init__(self, dist: Path, prefix: str, is_known: Callable[[Request], bool]) -> None:
         self._dist = dist
         self._prefix = prefix
+        self._is_known = is_known
         self._kept: dict[tuple[Path, bool], tuple[int, _Kept]] = {}
-        self._routes: tuple[int, list[tuple[re.Pattern[str], str]]] = (0, [])
+        self._pages: tuple[int, list[_Page]] = (0, [])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it.
@@ -146,7 +164,7 @@ class _Pages:
             raise NotFoundError(f"There is no route {request.url.path}.")
         # Every file of a build has an ending, and no address of a page.
         file = _file_within(self._dist, path) if "." in path else None
-        page = file or self._page_at(f"/{path}")
+        page, asked = (file, ()) if file else self._page_at(f"/{path}")
         written = _written(page)
         if written is None:
             await HTMLResponse(_MISSING, status_code=503)(scope, receive, send)
@@ -159,7 +177,8 @@ class _Pages:
                 return
             change = functools.partial(_below, self._prefix)
         compressed = "gzip" in _taken(request.headers.get("accept-encoding", ""))
-        await self._read(page, written, change, compressed=compressed).send(scope, send)
+        ahead = [(b"link", _ahead(self._prefix, asked))] if asked and self._is_known(request) else []
+        await self._read(page, written, change, compressed=compressed).send(scope, send, *ahead)
 
     def _read(self, file: Path, written: int, change: Callable[[bytes], bytes], *, compressed: bool) -> _Kept:
         since, kept = self._kept.get((file, compressed), (None, None))
@@ -172,36 +191,47 @@ class _Pages:
             self._kept[file, compressed] = (written, kept)
         return kept
 
-    def _page_at(self, address: str) -> Path:
-        """The HTML of the page at an address: it names all that the page needs (`web/plugins/pages.ts`)."""
+    def _page_at(self, address: str) -> tuple[Path, tuple[str, ...]]:
+        """The HTML of the page at an address, which names all that the page needs, and what the page asks first."""
         table = self._dist / "pages" / "routes.json"
         written = _written(table)
         if written is None:
-            return self._dist / "index.html"
-        since, routes = self._routes
+            return self._dist / "index.html", ()
+        since, pages = self._pages
         if since != written:
-            routes = [(re.compile(pattern), file) for pattern, file in json.loads(table.read_bytes())]
-            self._routes = (written, routes)
-        found = (file for pattern, file in routes if pattern.fullmatch(address))
-        return self._dist / "pages" / next(found, "NotFoundPage.html")
+            found_there = json.loads(table.read_bytes())
+            pages = [_Page(re.compile(pattern), file, tuple(asked)) for pattern, file, asked in found_there]
+            self._pages = (written, pages)
+        for page in pages:
+            if found := page.pattern.fullmatch(address):
+                names = {name: quote(value or "", safe="") for name, value in found.groupdict().items()}
+                return self._dist / "pages" / page.file, tuple(question.format_map(names) for question in page.asked)
+        return self._dist / "pages" / "NotFoundPage.html", ()
 
 
-def mount_pages(app: FastAPI, dist: Path, prefix: str = "") -> None:
+def mount_pages(app: FastAPI, dist: Path, prefix: str, is_known: Callable[[Request], bool]) -> None:
     """Serve `dist` beside the API; to be called last, since it answers every path that is left.
 
     Args:
         app: where.
         dist: the built pages.
         prefix: what stands before every path in a browser's address, as /mapless; whoever comes without it is led there.
+        is_known: whether somebody may be signed in who asks: only then a page's HTML says what the page will ask the API.
     """
     app.mount("/assets", _Assets(dist / "assets"), name="assets")
-    app.router.routes.append(Route("/{path:path}", _Pages(dist, prefix), methods=["GET", "HEAD"], include_in_schema=False))
+    pages = _Pages(dist, prefix, is_known)
+    app.router.routes.append(Route("/{path:path}", pages, methods=["GET", "HEAD"], include_in_schema=False))
+
+
+def _ahead(prefix: str, asked: Iterable[str]) -> bytes:
+    """The header that lets a browser ask the API while the page's code still comes."""
+    return ", ".join(f"<{prefix}{question}>; rel=preload; as=fetch; crossorigin" for question in asked).encode()
 
 
 def _below(prefix: str, html: bytes) -> bytes:
     """The HTML of a page whose addresses begin with a prefix; the application reads it there (`web/src/lib/base.ts`)."""
     text = html.decode().replace("<html ", f'<html data-base="{prefix}" ', 1)
-    return re.sub(r'((?:href|src|data-entry)=")/', rf"\g<1>{prefix}/", text).encode()
+    return re.sub(r'((?:href|src|data-entry|data-asks)=")/', rf"\g<1>{prefix}/", text).encode()
 
 
 def _written(file: Path) -> int | None:

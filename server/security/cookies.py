@@ -20,6 +20,12 @@ def session_cookie_name(settings: Settings) -> str:
     return _named("mapless-session", settings)
 
 
+def may_be_signed_in(request: HTTPConnection, settings: Settings) -> bool:
+    """Whether who asks brings a login along, be it a true one or not."""
+    logins = {cookie_name(settings), session_cookie_name(settings)}
+    return "authorization" in request.headers or not logins.isdisjoint(request.cookies)
+
+
 def session_cookie(request: HTTPConnection, settings: Settings, secret: str) -> str:
     """The header that keeps a session's secret in the browser, as `set_login_cookie` keeps the login."""
     response = Response()

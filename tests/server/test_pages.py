@@ -69,8 +69,8 @@ def test_every_route_of_the_application_is_its_one_page(dist: Path, client: Test
 )
 def test_a_route_has_the_html_of_its_page(dist: Path, client: TestClient, path: str, page: str) -> None:
     (dist / "pages").mkdir()
-    routes = (("/", "TrainingsPage.html"), ("/runs/[^/]+", "RunPage.html"), ("/board(/[^/]+)?", "BoardPage.html"))
-    (dist / "pages" / "routes.json").write_text(json.dumps(routes))
+    routes = {"/": "TrainingsPage.html", "/runs/[^/]+": "RunPage.html", "/board(/[^/]+)?": "BoardPage.html"}
+    (dist / "pages" / "routes.json").write_text(json.dumps([(pattern, file, []) for pattern, file in routes.items()]))
     for file in ("TrainingsPage.html", "RunPage.html", "BoardPage.html", "NotFoundPage.html"):
         (dist / "pages" / file).write_text(f"<!doctype html><title>{file}</title>")
 
@@ -78,6 +78,37 @@ def test_a_route_has_the_html_of_its_page(dist: Path, client: TestClient, path: 
 
     assert response.text == f"<!doctype html><title>{page}Page.html</title>"
     assert response.headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize(
+    ("path", "named"),
+    [
+        ("/runs/abc", "</api/status>; {ahead}, </api/runs/abc>; {ahead}"),
+        ("/runs/a%3E,%3Cb", "</api/runs/a%3E%2C%3Cb>"),
+        ("/runs/{secret}", "</api/runs/%7Bsecret%7D>"),
+        ("/elsewhere", None),
+    ],
+)
+def test_the_html_of_a_page_comes_with_what_the_page_asks_first(
+    dist: Path, client: TestClient, path: str, named: str | None
+) -> None:
+    (dist / "pages").mkdir()
+    routes = [("/runs/(?P<runId>[^/]+)", "RunPage.html", ["/api/status", "/api/runs/{runId}"])]
+    (dist / "pages" / "routes.json").write_text(json.dumps(routes))
+    for file in ("RunPage.html", "NotFoundPage.html"):
+        (dist / "pages" / file).write_text(f"<!doctype html><title>{file}</title>")
+
+    response = client.get(path)
+    again = client.get(path, headers={"If-None-Match": response.headers["etag"]})
+
+    for link in (response.headers.get("link"), again.headers.get("link")):
+        ahead = "rel=preload; as=fetch; crossorigin"
+        assert link is None if named is None else named.replace("{ahead}", ahead) in (link or "")
+    assert "set-cookie" not in response.headers
+    # Who is not signed in would be refused: nothing is asked for them.
+    client.headers.pop("Authorization", None)
+    client.cookies.clear()
+    assert "link" not in client.get(path).headers
 
 
 def test_assets_never_change(dist: Path, client: TestClient) -> None:

@@ -7,8 +7,8 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs'
 import { join } from 'node:path'
 import type { Plugin, Rolldown } from 'vite'
 import { frameHtml } from '../src/frame'
-import { headOf } from '../src/heads'
-import { ROUTES } from '../src/routes'
+import { headOf, nameOf } from '../src/heads'
+import { EVERYWHERE, FIRST_QUESTIONS, ROUTES } from '../src/routes'
 
 type Bundle = Rolldown.OutputBundle
 type Chunk = Rolldown.OutputChunk
@@ -44,9 +44,12 @@ export function pages(): Plugin {
       if (!dir) return
       const html = readFileSync(join(dir, 'index.html'), 'utf8')
       mkdirSync(join(dir, 'pages'), { recursive: true })
-      const routes: [pattern: string, file: string][] = []
+      const routes: [pattern: string, file: string, asked: string[]][] = []
       for (const [path, name] of Object.entries(ROUTES)) {
         const head = headOf(name)
+        const called = nameOf(name)
+        const questions = FIRST_QUESTIONS[name] ?? []
+        const named = called && questions[0] ? { name: called, question: questions[0] } : undefined
         const { code, styles } = partsOf(bundle, name)
         const links = (rel: string, files: Iterable<string>) =>
           [...files]
@@ -56,10 +59,11 @@ export function pages(): Plugin {
         const page = html
           .replace('</head>', `${links('modulepreload', code)}</head>`)
           .replace(ROOT, `${links('stylesheet', styles)}${ROOT}`)
-          .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, ''), head))
+          .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, ''), head, named))
           .replace('<title>Mapless', `<title>${head ? `${head.title} – ` : ''}Mapless`)
         writeFileSync(join(dir, 'pages', `${name}.html`), page)
-        if (path !== '*') routes.push([patternOf(path), `${name}.html`])
+        if (path === '*') continue
+        routes.push([patternOf(path), `${name}.html`, [...EVERYWHERE, ...questions]])
       }
       writeFileSync(join(dir, 'pages', 'routes.json'), JSON.stringify(routes))
     },
@@ -75,8 +79,9 @@ const smaller = (css: string) =>
     .replace(/\s+/g, ' ')
     .trim()
 
-/** "/runs/:runId" as a regular expression that the server's language reads too. */
-const patternOf = (path: string) => path.replace(/\/:\w+\?/g, '(/[^/]+)?').replace(/:\w+/g, '[^/]+')
+/** "/runs/:runId" as a regular expression of the server's language. */
+const patternOf = (path: string) =>
+  path.replace(/\/:(\w+)\?/g, '(/(?P<$1>[^/]+))?').replace(/:(\w+)/g, '(?P<$1>[^/]+)')
 
 /** The files that a page cannot be drawn without. */
 function partsOf(bundle: Bundle, name: string): { code: Set<string>; styles: Set<string> } {

@@ -25,6 +25,29 @@ document.addEventListener('click', ({ target }) => {
   }
 })
 
+// A page that is called what the API says is told its name at once; the application takes the same answer (src/lib/early.ts).
+document.addEventListener('DOMContentLoaded', async () => {
+  const heading = document.querySelector('#frame [data-asks]')
+  if (!heading) return
+  const question = heading.dataset.asks + location.pathname.split('/').pop()
+  const early = {
+    page: location.pathname,
+    question: new URL(question, location.href).href,
+    answer: fetch(question),
+    title: undefined,
+    about: undefined,
+  }
+  window.maplessEarly = early
+  const answer = await early.answer.catch(() => undefined)
+  if (!answer?.ok) return
+  const told = await answer.clone().json()
+  const [title, about] = [...document.querySelectorAll('#frame [data-told]')].map((element) => {
+    element.textContent = element.dataset.told.replace(/{(\w+)}/g, (_, name) => told[name])
+    return element.textContent
+  })
+  Object.assign(early, { title, about })
+})
+
 // The application starts when the page is read and the frame's first picture drawn, which a tab in the background never is.
 const { entry } = document.currentScript.dataset
 if (entry) {

@@ -1,5 +1,5 @@
 /** The header as the build writes it into every HTML (plugins/pages), and as the application draws it (components/Shell). */
-import { type Head, partsOf } from './heads'
+import { type Head, type Name, partsOf } from './heads'
 
 /** What the header leads to; where room is short, only what comes before the stroke is said. */
 export const NAVIGATION = [
@@ -31,23 +31,32 @@ const icon = (paths: readonly string[]) =>
 
 const escaped = (text: string) => text.replace(/&/g, '&amp;').replace(/</g, '&lt;')
 
-/** A page's title and introduction, as `components/ui` draws them. */
+const page = (html: string) =>
+  `<main class="frame-page"><div class="frame-top"><div class="frame-text">${html}</div></div></main>`
+
+/** A page's title and introduction, as `components/Page` draws them. */
 function headHtml({ title, about }: Head): string {
   const said = partsOf(about ?? '').map(({ text, to, code }) => {
     if (code) return `<code>${escaped(text)}</code>`
     return to ? `<a href="${to}">${escaped(text)}</a>` : escaped(text)
   })
-  return [
-    '<main class="frame-page"><div class="frame-top"><div class="frame-text">',
-    `<h1>${escaped(title)}</h1>${about ? `<p class="frame-about">${said.join('')}</p>` : ''}</div></div></main>`,
-  ].join('')
+  return page(`<h1>${escaped(title)}</h1>${about ? `<p class="frame-about">${said.join('')}</p>` : ''}`)
+}
+
+/** The place of a title that `question` is asked for, and what the page is one of. */
+function nameHtml({ title, about, within: [above, to] }: Name, question: string): string {
+  return page(
+    `<p class="frame-above"><a href="${to}">${above}</a></p>` +
+      `<h1 data-asks="${question.replace(/{.*/, '')}" data-told="${title}"></h1>` +
+      (about ? `<p class="frame-about" data-told="${about}"></p>` : ''),
+  )
 }
 
 /**
  * The header at the address `path`: its links lead, and its switch of the colour scheme works (public/frame.js). Below it
- * the head of the page, where that is known.
+ * the head of the page, where that is known, or where the page's name will stand.
  */
-export function frameHtml(path: string, head?: Head): string {
+export function frameHtml(path: string, head?: Head, named?: { name: Name; question: string }): string {
   const links = NAVIGATION.map(([to, label]) => {
     const [short, rest] = label.split('|')
     const current = to === path ? ' aria-current="page"' : ''
@@ -62,6 +71,6 @@ export function frameHtml(path: string, head?: Head): string {
     `<a href="/alerts" class="frame-icon" aria-label="Alerts" title="Alerts">${icon(BELL)}</a>`,
     `<button type="button" class="frame-icon" data-scheme="dark" aria-label="Dark colours">${icon(MOON)}</button>`,
     `<button type="button" class="frame-icon" data-scheme="light" aria-label="Light colours">${icon(SUN)}</button>`,
-    `</div></header>${head ? headHtml(head) : ''}</div>`,
+    `</div></header>${head ? headHtml(head) : named ? nameHtml(named.name, named.question) : ''}</div>`,
   ].join('')
 }

@@ -87,6 +87,24 @@ export interface Part {
 
 const MARKED = /`([^`]+)`|\[([^\]]+)\]\(([^)]+)\)/
 
+export interface Name {
+  /** Of the answer to what the page asks first (`FIRST_QUESTIONS`): "{experiment_name}, seed {seed}". */
+  title: string
+  /** Likewise: what it is. */
+  about?: string
+  /** What the page is one of, and where that is. */
+  within: readonly [title: string, to: string]
+}
+
+/** Pages that are called what the API says: public/frame.js asks, and writes it into their HTML. */
+export const NAMES: { readonly [page in PageName]?: Name } = {
+  ExperimentPage: { title: '{name}', within: ['Trainings', '/'] },
+  RunPage: { title: '{experiment_name}, seed {seed}', within: ['Trainings', '/'] },
+  PolicyPage: { title: '{title}', about: '{description}', within: ['Policies', '/policies'] },
+}
+
+export const nameOf = (page: string): Name | undefined => NAMES[page as PageName]
+
 /** An introduction as it is drawn: text, code and links. */
 export function partsOf(about: string): Part[] {
   const marked = MARKED.exec(about)

@@ -32,3 +32,19 @@ export const ROUTES = {
   '/reference': 'ApiPage',
   '*': 'NotFoundPage',
 } as const
+
+/**
+ * What pages ask the API first, of which their address says all. The HTML comes with it (server/http/pages.py), so that a
+ * browser asks while the page's code still comes.
+ */
+export const FIRST_QUESTIONS: { [page in (typeof ROUTES)[keyof typeof ROUTES]]?: readonly string[] } = {
+  ExperimentPage: ['/api/experiments/{experimentId}'],
+  RunPage: ['/api/runs/{runId}'],
+  PolicyPage: ['/api/policies/{name}'],
+  EvaluationPage: ['/api/evaluations/{evaluationId}'],
+  StudyPage: ['/api/studies/{studyId}'],
+  RecordingPage: ['/api/recordings/{recordingId}'],
+}
+
+/** What every page asks before. */
+export const EVERYWHERE = ['/api/status', '/api/account'] as const

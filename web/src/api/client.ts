@@ -10,23 +10,32 @@ import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
 import { useDeferredValue, useMemo } from 'react'
 import { BASE } from '../lib/base'
+import { earlyAnswer } from '../lib/early'
 import { ApiError, errorOf, isUnauthorized, OfflineError } from './errors'
 import type { paths } from './schema'
 
 export const api = createFetchClient<paths>({
   baseUrl: window.location.origin + BASE,
   // Looked up at each call, so that a test can stand in for the network.
-  fetch: (request) => globalThis.fetch(request),
+  fetch: (request) => earlyAnswer(request) ?? globalThis.fetch(request),
 })
 
 let firstPosition: string | undefined
 
-/** From when the first answer of this page is: whoever listens from there on misses no change to any of them. */
+/** From when the oldest of this page's answers is: whoever listens from there on misses no change to any of them. */
 export const positionOfFirstAnswer = () => firstPosition
+
+/** Answers come in another order than they were given in. Positions are "START-COUNT", of one start of the server counted up. */
+function older(one: string | undefined, other: string | undefined): string | undefined {
+  if (!one || !other) return one ?? other
+  const [start, count] = one.split('-')
+  const [otherStart, otherCount] = other.split('-')
+  return start === otherStart && Number(otherCount) < Number(count) ? other : one
+}
 
 api.use({
   async onResponse({ response }) {
-    firstPosition ??= response.headers.get('Mapless-Position') ?? undefined
+    firstPosition = older(firstPosition, response.headers.get('Mapless-Position') ?? undefined)
     if (!response.ok) throw await errorOf(response)
   },
   onError({ error }) {

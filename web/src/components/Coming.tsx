@@ -1,8 +1,9 @@
 /** Until a page's code has come its head stands there, as it stood in the HTML. */
 import { matchPath } from 'react-router'
-import { headOf } from '../heads'
+import { headOf, nameOf } from '../heads'
+import { earlyHead } from '../lib/early'
 import { ROUTES } from '../routes'
-import { Page } from './Page'
+import { Page, Within } from './Page'
 
 /** The name of the page at an address. */
 export const pageAt = (at: string): string | undefined =>
@@ -10,10 +11,16 @@ export const pageAt = (at: string): string | undefined =>
 
 export function Coming({ page }: { page: string | undefined }) {
   const head = page && headOf(page)
+  const name = page && nameOf(page)
   return (
     <div aria-busy="true">
       {head && (
         <Page {...head}>
+          <span />
+        </Page>
+      )}
+      {name && (
+        <Page title={earlyHead().title} about={earlyHead().about} above={<Within page={page} />}>
           <span />
         </Page>
       )}

@@ -1,7 +1,7 @@
 /** What every page stands in; of nothing but itself, since it is there before the pages' own code. */
 import type { ReactNode } from 'react'
 import { Link } from 'react-router'
-import { partsOf } from '../heads'
+import { nameOf, partsOf } from '../heads'
 import { at } from '../lib/base'
 
 /** A page's frame: its title on the left, what can be done on the right. */
@@ -15,7 +15,7 @@ export function Page({
 }: {
   title: ReactNode
   /** What it is for, as `heads` has it. */
-  about?: string
+  about?: string | undefined
   above?: ReactNode
   below?: ReactNode
   actions?: ReactNode
@@ -34,6 +34,17 @@ export function Page({
       </div>
       {children}
     </div>
+  )
+}
+
+/** What a page is one of, as its HTML has it (frame.ts), and what else leads to it. */
+export function Within({ page, children }: { page: string; children?: ReactNode }) {
+  const [above, to] = nameOf(page)?.within ?? []
+  return (
+    <p className="frame-above">
+      {to && <Link to={to}>{above}</Link>}
+      {children}
+    </p>
   )
 }
 

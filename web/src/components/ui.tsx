@@ -8,7 +8,7 @@ import { IconAlertCircle, IconAlertTriangle } from './icons'
 import { endsOf, STATES } from './states'
 import classes from './ui.module.css'
 
-export { Page } from './Page'
+export { Page, Within } from './Page'
 
 export function Panel({
   title,

@@ -1,28 +1,31 @@
 /** One configuration with all its seeds. */
-import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
+import { Anchor, Box, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
 import { Link, useNavigate, useParams } from 'react-router'
 import { useActions } from '../api/actions'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Experiment } from '../api/types'
 import { Below } from '../components/Below'
-import { Configuration } from '../components/Configuration'
-import { CurvePanels } from '../components/CurvePanels'
 import { ExperimentMenu } from '../components/ExperimentMenu'
 import { IconArrowsDiff, IconCopy, IconPlayerPlay, IconPlayerStop } from '../components/icons'
-import { ExperimentLineage } from '../components/Lineage'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { ParallelRuns } from '../components/ParallelRuns'
 import { RunTable } from '../components/RunTable'
 import { canResume, canStop } from '../components/states'
 import { UnreadableSettings } from '../components/UnreadableSettings'
-import { Page, Panel, QueryError, StateLabel } from '../components/ui'
+import { Page, Panel, QueryError, StateLabel, Within } from '../components/ui'
 import { useArenaTitle } from '../components/useArenaTitle'
+import { earlyHead } from '../lib/early'
 import { inShort, summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
-import { NotesPanel } from '../workbench/NotesPanel'
+import { lazily } from '../lib/lazily'
 import { SeedsButton } from '../workbench/SeedsButton'
+
+const ExperimentDetails = lazily(
+  async () => (await import('../components/ExperimentDetails')).ExperimentDetails,
+)
+const DETAILS_HEIGHT = 1_400
 
 export function ExperimentPage() {
   const { experimentId = '' } = useParams()
@@ -44,7 +47,10 @@ export function ExperimentPage() {
 
 function LoadingExperiment() {
   return (
-    <Page title={<Skeleton height={24} width={260} />} above={<Text size="xs">&nbsp;</Text>}>
+    <Page
+      title={earlyHead().title ?? <Skeleton height={24} width={260} />}
+      above={<Within page="ExperimentPage" />}
+    >
       <Stack>
         <Panel>
           <Skeleton height={120} />
@@ -66,11 +72,7 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
   return (
     <Page
       title={experiment.name}
-      above={
-        <Anchor component={Link} to="/" size="xs">
-          Trainings
-        </Anchor>
-      }
+      above={<Within page="ExperimentPage" />}
       below={
         <Group gap="md" mt={4}>
           <Text size="sm">
@@ -160,13 +162,8 @@ function LoadedExperiment({ experiment }: { experiment: Experiment }) {
         >
           <RunTable runs={experiment.runs} />
         </Panel>
-        <Below height={1_400}>
-          <ExperimentLineage experimentId={experiment.id} />
-          <CurvePanels experiments={[experiment.id]} />
-          <Panel title="Configuration">
-            <Configuration training={experiment.training} />
-          </Panel>
-          <NotesPanel experimentId={experiment.id} />
+        <Below height={DETAILS_HEIGHT}>
+          <ExperimentDetails experiment={experiment} meanwhile={<Box mih={DETAILS_HEIGHT} />} />
         </Below>
       </Stack>
     </Page>

@@ -1,6 +1,6 @@
 /** One of the policies that ship: its robots live, how it did and against what, every episode, and how it was made. */
-import { Anchor, Group, Skeleton, Stack, Text } from '@mantine/core'
-import { Link, useParams } from 'react-router'
+import { Group, Skeleton, Stack } from '@mantine/core'
+import { useParams } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
 import { Configuration } from '../components/Configuration'
@@ -8,7 +8,8 @@ import { PolicyLiveView } from '../components/LiveView'
 import { PolicyActions } from '../components/PolicyActions'
 import { PolicyEpisodes } from '../components/PolicyEpisodes'
 import { PolicyResults } from '../components/PolicyResults'
-import { Page, Panel, QueryError } from '../components/ui'
+import { Page, Panel, QueryError, Within } from '../components/ui'
+import { earlyHead } from '../lib/early'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count } from '../lib/format'
 import { useReplayInAddress, useTitle } from '../lib/hooks'
@@ -26,8 +27,9 @@ export function PolicyPage() {
   if (data) return <LoadedPolicy policy={data} />
   return (
     <Page
-      title={error ? 'Policy' : <Skeleton height={24} width={240} />}
-      above={<Text size="xs">&nbsp;</Text>}
+      title={error ? 'Policy' : (earlyHead().title ?? <Skeleton height={24} width={240} />)}
+      about={error ? undefined : earlyHead().about}
+      above={<Within page="PolicyPage" />}
     >
       <Panel>
         {error ? <QueryError error={error} what="policy" retry={refetch} /> : <Skeleton height={460} />}
@@ -41,16 +43,8 @@ function LoadedPolicy({ policy }: { policy: ShippedPolicy }) {
   return (
     <Page
       title={policy.title}
-      above={
-        <Anchor component={Link} to="/policies" size="xs">
-          Policies
-        </Anchor>
-      }
-      below={
-        <Text size="sm" c="dimmed" mt={4}>
-          {policy.description}
-        </Text>
-      }
+      above={<Within page="PolicyPage" />}
+      about={policy.description}
       actions={
         <Group gap="xs">
           <PolicyActions policy={policy} />

@@ -1,5 +1,5 @@
 /** One seed's training: how far it is, the robots live, its curves, its policies, what happened. */
-import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
+import { Button, Group, Skeleton, Stack, Text } from '@mantine/core'
 import { keepPreviousData, usePrefetchQuery } from '@tanstack/react-query'
 import { useRef, useState } from 'react'
 import { Link, useNavigate, useParams } from 'react-router'
@@ -26,9 +26,10 @@ import { LapseDialog } from '../components/replay/LapseDialog'
 import { canResume, canStop, isActive } from '../components/states'
 import { thinnedInWords } from '../components/storage/rules'
 import { UnreadableSettings } from '../components/UnreadableSettings'
-import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel } from '../components/ui'
+import { Notice, Page, Panel, ProgressBar, QueryError, StateLabel, Within } from '../components/ui'
 import { useArenaTitle } from '../components/useArenaTitle'
 import { at } from '../lib/base'
+import { earlyHead } from '../lib/early'
 import { inShort, summaryOf } from '../lib/experiments'
 import { count, duration, percent } from '../lib/format'
 import { useNumberInAddress, useReplayInAddress, useTitle } from '../lib/hooks'
@@ -63,7 +64,10 @@ export function RunPage() {
   }
   if (!data) {
     return (
-      <Page title={<Skeleton height={24} width={280} />} above={<Text size="xs">&nbsp;</Text>}>
+      <Page
+        title={earlyHead().title ?? <Skeleton height={24} width={280} />}
+        above={<Within page="RunPage" />}
+      >
         <Panel>
           <Skeleton height={460} />
         </Panel>
@@ -106,15 +110,10 @@ function LoadedRun({ run }: { run: RunDetail }) {
     <Page
       title={`${run.experiment_name}, seed ${run.seed}`}
       above={
-        <Text size="xs" c="dimmed">
-          <Anchor component={Link} to="/" inherit>
-            Trainings
-          </Anchor>
+        <Within page="RunPage">
           {' / '}
-          <Anchor component={Link} to={`/experiments/${run.experiment_id}`} inherit>
-            {run.experiment_name}
-          </Anchor>
-        </Text>
+          <Link to={`/experiments/${run.experiment_id}`}>{run.experiment_name}</Link>
+        </Within>
       }
       below={
         <Text size="sm" c="dimmed" mt={4}>
