@@ -30,8 +30,7 @@ from sim.config import (
 from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS
-from sim.kernels.room import MAX_FRAMES, MAX_PARTS
-from sim.kernels.trail import LONG_ROOM
+from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -193,7 +192,7 @@ def _ranges(part: RangesPart, task: TaskConfig) -> Iterator[ObservationNumber]:
 
 def _trail(part: TrailPart, task: TaskConfig) -> Iterator[ObservationNumber]:
     crumbs, limit, is_long = "the crumbs in sight in this sector", task.lidar.range, part.memory == "long"
-    freshness = f"1 - ln(1 + m) / ln(1 + {LONG_ROOM})" if is_long else "10 / (10 + m)"
+    freshness = f"1 - ln(1 + m) / ln(1 + {LONG_TRAIL_ROOM})" if is_long else "10 / (10 + m)"
     kinds = [
         ("trail nearness", f"1 - d / {limit:g} m, d = distance of the nearest of {crumbs}; 0 where there is none"),
         ("trail crumbs", f"n / (n + 5), n = number of {crumbs}"),

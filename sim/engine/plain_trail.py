@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.config import LidarConfig, TrailPart
-from sim.kernels.trail import LONG_ROOM, SEEN_BEHIND, SHORT_ROOM, TRAIL_SPACING
+from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
+from sim.kernels.trail import SEEN_BEHIND, TRAIL_SPACING
 from sim.lidar import ray_angles
 
 
@@ -37,7 +38,7 @@ class PlainTrail:
         """
         sectors, is_long = part.sectors, part.memory == "long"
         nearness, count, freshness, first = np.zeros((4, sectors))
-        for age, (x, y) in enumerate(self._crumbs[: -(LONG_ROOM if is_long else SHORT_ROOM) - 1 : -1]):
+        for age, (x, y) in enumerate(self._crumbs[: -(LONG_TRAIL_ROOM if is_long else SHORT_TRAIL_ROOM) - 1 : -1]):
             distance = math.dist((x, y), pose[:2])
             angle = _wrapped(math.atan2(y - pose[1], x - pose[0]) - pose[2])
             if not SEEN_BEHIND <= distance < self._range or self._meets(ranges, angle) < distance - SEEN_BEHIND:
@@ -45,7 +46,7 @@ class PlainTrail:
             k = min(int((angle + math.pi) / math.tau * sectors), sectors - 1)
             nearness[k] = max(nearness[k], 1.0 - distance / self._range)
             count[k] += 1.0
-            fresh = 1.0 - math.log(1.0 + age) / math.log(1.0 + LONG_ROOM) if is_long else 10.0 / (10.0 + age)
+            fresh = 1.0 - math.log(1.0 + age) / math.log(1.0 + LONG_TRAIL_ROOM) if is_long else 10.0 / (10.0 + age)
             freshness[k], first[k] = max(freshness[k], fresh), fresh
         dropped = len(self._crumbs)
         ages = [freshness, first] if is_long else [freshness]

@@ -40,9 +40,9 @@ from sim.kernels.records import (
     RATE,
     ROBOT,
 )
+from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
-from sim.kernels.trail import LONG_ROOM, SHORT_ROOM
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.observations import observation_size
 from sim.streams import ENVIRONMENT, Stream
@@ -191,7 +191,7 @@ class World:
             pending=np.zeros((robots, longest_delay(task), action_size), dtype=np.float32),
             commands=np.zeros((robots if sees_actions else 0, action_size), dtype=np.float32),
             trail=np.zeros(
-                (robots if sees_trail else 0, LONG_ROOM if "long" in trails else SHORT_ROOM, 2), dtype=np.float32
+                (robots if sees_trail else 0, LONG_TRAIL_ROOM if "long" in trails else SHORT_TRAIL_ROOM, 2), dtype=np.float32
             ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),

@@ -11,3 +11,6 @@ MAX_TERMS = 16
 
 SHORT_TRAIL_KINDS, LONG_TRAIL_KINDS = 3, 4
 """Numbers of each sector in which a trail is seen, by how much of it is remembered."""
+
+SHORT_TRAIL_ROOM, LONG_TRAIL_ROOM = 256, 1024
+"""Crumbs that a robot remembers, the newest ones: on some 60 m and on some 250 m of its way."""

@@ -10,10 +10,8 @@ import numpy as np
 
 from sim.kernels.options import kernel
 from sim.kernels.records import TRAIL_PART
+from sim.kernels.room import LONG_TRAIL_ROOM
 from sim.kernels.sensing import FAST
-
-SHORT_ROOM, LONG_ROOM = 256, 1024
-"""Crumbs that a robot remembers, the newest ones: on some 60 m and on some 250 m of its way."""
 
 TRAIL_SPACING = 0.24
 """Metres from the last crumb at which the next one is dropped; no multiple of what a robot usually drives in a step."""
@@ -69,7 +67,7 @@ def _ray_towards(angle, angles, yaw):
 def _freshness(age, is_long):
     """How fresh a crumb is after so many others, 1 to 0; by logarithms, two that are old can be told apart, too."""
     if is_long:
-        return ONE - np.float32(math.log(ONE + age)) / np.float32(math.log(1.0 + LONG_ROOM))
+        return ONE - np.float32(math.log(ONE + age)) / np.float32(math.log(1.0 + LONG_TRAIL_ROOM))
     return _LATELY / (_LATELY + age)
 
 

@@ -19,7 +19,7 @@ from sim.config import (
 from sim.engine.plain_trail import PlainTrail
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
-from sim.kernels.trail import LONG_ROOM, SHORT_ROOM
+from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
 from sim.observations import observation_layout
 
 WALL = np.array([[0.0, 1.5, 1.0, 0.1, 0.0]])
@@ -133,7 +133,7 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig, memory: str) ->
     assert told > 100
 
 
-@pytest.mark.parametrize(("memory", "room", "steps"), [("short", SHORT_ROOM, 1500), ("long", LONG_ROOM, 5500)])
+@pytest.mark.parametrize(("memory", "room", "steps"), [("short", SHORT_TRAIL_ROOM, 1500), ("long", LONG_TRAIL_ROOM, 5500)])
 def test_the_oldest_crumbs_are_forgotten(memory: str, room: int, steps: int) -> None:
     made, plain = world(seen(memory=memory, step_limit=10_000)), PlainTrail(FULL)
     made.reset(poses=(0.0, 0.0, 0.0), targets=(4.5, 4.5))
