@@ -28,10 +28,16 @@ test('an answer is taken by the request that asks the same, and once', async () 
   expect(earlyAnswer(new Request(question))).toBeUndefined()
 })
 
-test('what never came is asked for', async () => {
+test.each([
+  ['never came', () => Promise.reject(new TypeError('no network'))],
+  [
+    'was refused before somebody signed in',
+    async () => Response.json({ detail: 'Sign in.' }, { status: 401 }),
+  ],
+])('what %s is asked for', async (_, answer) => {
   const asked = vi.fn(async () => Response.json({ seed: 1 }))
   vi.stubGlobal('fetch', asked)
-  early(Promise.reject(new TypeError('no network')))
+  early(answer())
   expect(await (await earlyAnswer(new Request(question)))?.json()).toEqual({ seed: 1 })
   expect(asked).toHaveBeenCalledOnce()
 })

@@ -20,11 +20,15 @@ declare global {
 export const earlyHead = (): Partial<Pick<Early, 'title' | 'about'>> =>
   window.maplessEarly?.page === window.location.pathname ? window.maplessEarly : {}
 
-/** The answer to a request that was sent already; once, since it is of then. Where it never came, the request is sent. */
+/**
+ * The answer to a request that was sent already; once, since it is of then. Where it never came or was a refusal, as of who
+ * has signed in since, the request is sent.
+ */
 export function earlyAnswer(request: Request): Promise<Response> | undefined {
   const early = window.maplessEarly
   if (!early?.answer || request.method !== 'GET' || request.url !== early.question) return undefined
   const { answer } = early
   early.answer = undefined
-  return answer.catch(() => globalThis.fetch(request))
+  const ask = () => globalThis.fetch(request)
+  return answer.then((response) => (response.ok ? response : ask()), ask)
 }
