@@ -2,7 +2,7 @@
 
 import math
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import Literal, Self
 
@@ -50,6 +50,13 @@ class Frame:
     outcomes: NDArray[np.uint8]
     arena: int = 0
     movers: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 3), np.float32))
+
+    def of_first(self, robots: int) -> "Frame":
+        """The same moment with at most so many robots, the first ones."""
+        if len(self.poses) <= robots:
+            return self
+        names = ("poses", "targets", "ranges", "fields_of_view", "rewards", "outcomes")
+        return replace(self, **{name: getattr(self, name)[:robots] for name in names})
 
     def encode(self) -> bytes:
         """The frame as bytes: a fixed header, then the arrays one after another, little-endian."""

@@ -30,6 +30,18 @@ def test_adam_steps_as_torchs(path: str, monkeypatch: pytest.MonkeyPatch) -> Non
         assert torch.allclose(mine, other, rtol=0, atol=1e-6)
 
 
+def test_a_step_by_tensors_is_that_by_numbers() -> None:
+    """A recorded graph reads its rates from tensors."""
+    by_numbers, by_tensors = (FlatAdam(make_network(), learning_rate=1e-2) for _ in range(2))
+    for adam in (by_numbers, by_tensors):
+        adam.gradients.copy_(torch.linspace(-1.0, 1.0, len(adam.gradients)))
+    for _ in range(3):
+        by_numbers.step_by(*by_numbers.next_rates())
+        rate, epsilon = by_tensors.next_rates()
+        by_tensors.step_by(torch.tensor(rate), torch.tensor(epsilon))
+    assert torch.allclose(by_numbers.values, by_tensors.values, rtol=0, atol=1e-8)
+
+
 def test_values_and_gradients_are_the_modules_own() -> None:
     network = make_network()
     before = [parameter.clone() for parameter in network.parameters()]

@@ -4,6 +4,7 @@ Both round differently, and where a ReLU or the clip has a kink a last bit turns
 steps they part like two trainings on two processors. Small steps keep them together to a few millionths of what was learned.
 """
 
+import math
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,15 @@ def test_a_critic_that_is_told_the_way(task: TaskConfig, tmp_path: Path) -> None
     algorithm = PpoConfig(critic_sees="path", learning_rate_schedule="constant", **TWO_ROBOTS, **SMALL_STEPS)
     distance, _ = apart(task, algorithm, 2, tmp_path)
     assert distance < TOLERANCE
+
+
+@pytest.mark.parametrize("network", [MlpNetwork(), ConvNetwork()], ids=["compiled", "by autograd"])
+def test_exploration_that_is_to_end(network: Network, tmp_path: Path) -> None:
+    """Three updates, of which the last stands at two thirds: the limit has fallen by a third of the way, to 1.03."""
+    algorithm = PpoConfig(network=network, final_std=0.15, initial_std_linear=2.0, initial_std_angular=2.0, **SMALL_STEPS)
+    distance, diagnostics = apart(TaskConfig(), algorithm, 3, tmp_path)
+    assert distance < TOLERANCE
+    assert diagnostics["policy/std_linear"] == pytest.approx(math.exp(1 - (1 - math.log(0.15)) / 3))
 
 
 def test_the_defaults_hyperparameters_lead_to_the_same_place(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sim.engine.guidance import GUIDANCE_SIZE
 from tests.heads import head
 from workers.algorithms.gradients.ppo import AutogradPpo, WrittenPpo, entropy, log_prob
-from workers.algorithms.ppo import Ppo, build_ppo
+from workers.algorithms.ppo import Ppo, build_ppo, log_std_range
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import Samples, generalized_advantages
 from workers.config import MlpNetwork, Network, PpoConfig, ResBlockNetwork
@@ -33,6 +33,15 @@ def test_advantages_by_hand() -> None:
     # delta_0 = 1 + 0.5 * 2 - 1 = 1                  A_0 = 1 + 0.25 * 1.75 = 1.4375
     advantages = generalized_advantages(column(1, 2, 3), column(1, 2, 2, 4), np.zeros((3, 1), np.bool_), 0.5, 0.5)
     assert advantages[:, 0].tolist() == [1.4375, 1.75, 3.0]
+
+
+def test_the_limit_of_deviations_falls_over_the_second_half() -> None:
+    """From e of the action's unit to 0.05: half way between, in the logarithm, after three quarters."""
+    falls = PpoConfig(final_std=0.05)
+    assert log_std_range(falls, 0.5) == (-4.0, 1.0)
+    assert log_std_range(falls, 0.75)[1] == pytest.approx((1.0 + math.log(0.05)) / 2)
+    assert log_std_range(falls, 1.0)[1] == pytest.approx(math.log(0.05))
+    assert log_std_range(PpoConfig(), 1.0) == (-4.0, 1.0)
 
 
 def test_nothing_flows_over_the_end_of_an_episode() -> None:

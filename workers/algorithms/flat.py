@@ -75,31 +75,38 @@ class FlatAdam(FlatParameters):
         self._square = torch.zeros_like(self.values)
         self._compiled: Callable[[float, float], None] | None = None
         if self.values.device.type == "cpu":
-            vectors = (self.values, self.gradients, self._mean, self._square)
-            arrays = [vector.numpy() for vector in vectors]
+            arrays = [vector.numpy() for vector in self.vectors]
             self._compiled = partial(bound(adam_step, *arrays, 0.0, 0.0), *arrays)
 
     @torch.no_grad()
     def step(self) -> None:
         """One step against `gradients`."""
-        rate, epsilon = self._next()
+        rate, epsilon = self.next_rates()
         if self._compiled is not None:
             self._compiled(rate, epsilon)
         else:
-            self._step_in_tensors(rate, epsilon)
+            self.step_by(rate, epsilon)
 
-    def _step_in_tensors(self, rate: float, epsilon: float) -> None:
+    @torch.no_grad()
+    def step_by(self, rate: float | Tensor, epsilon: float | Tensor) -> None:
+        """One step against `gradients` by what `next_rates` gave; tensors () are read where the device is, and when."""
         self._mean.lerp_(self.gradients, 1.0 - BETA1)
         self._square.mul_(BETA2).addcmul_(self.gradients, self.gradients, value=1.0 - BETA2)
-        self.values.addcdiv_(self._mean, torch.sqrt(self._square).add_(epsilon), value=-rate)
+        self.values.sub_(self._mean.div(torch.sqrt(self._square).add_(epsilon)).mul_(rate))
 
     def next_steps(self, count: int, max_norm: float) -> AdamSteps:
         """What compiled code needs to take the next `count` steps, which count as taken; on a CPU."""
-        rates, epsilons = np.array([self._next() for _ in range(count)], np.float64).reshape(count, 2).T.copy()
+        rates, epsilons = np.array([self.next_rates() for _ in range(count)], np.float64).reshape(count, 2).T.copy()
         starts = np.array([0, *(module.stop for module in self._modules)], np.int64)
         return AdamSteps(self._mean.numpy(), self._square.numpy(), starts, rates, epsilons, max_norm)
 
-    def _next(self) -> tuple[float, float]:
+    @property
+    def vectors(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Parameters, gradients and both moments, all that a step changes."""
+        return self.values, self.gradients, self._mean, self._square
+
+    def next_rates(self) -> tuple[float, float]:
+        """Rate and epsilon of the next step, which counts as taken."""
         # Both bias corrections in one factor: m^ / (sqrt(v^) + eps) with v^ = v / c^2 is c m^ / (sqrt(v) + c eps).
         self._steps += 1
         correction = math.sqrt(1.0 - BETA2**self._steps)

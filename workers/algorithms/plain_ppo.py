@@ -18,7 +18,7 @@ from sim.actions import action_layout
 from sim.arenas import with_maps_of
 from sim.envs.vector import NavigationVectorEnv
 from sim.streams import EXPLORATION, stream_seed
-from workers.algorithms.ppo import LOG_STD_RANGE, build_actor_critic
+from workers.algorithms.ppo import build_actor_critic, log_std_range
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.config import PpoConfig, TrainingConfig
 from workers.networks.inputs import inputs_of
@@ -88,9 +88,10 @@ def train(config: TrainingConfig, seed: int) -> Learner:
 
     updates = math.ceil(config.steps / (ppo.rollout_steps * ppo.robots))
     for update in range(updates):
-        decay = 1.0 - update / updates if ppo.learning_rate_schedule == "linear" else 1.0
+        progress = update / updates
+        decay = 1.0 - progress if ppo.learning_rate_schedule == "linear" else 1.0
         learner.optimizer.param_groups[0]["lr"] = ppo.learning_rate * decay
-        learn(learner, collect(learner))
+        learn(learner, collect(learner), log_std_range(ppo, progress))
     return learner
 
 
@@ -154,8 +155,8 @@ def estimate_advantages(config: PpoConfig, rewards: Tensor, rollout: Rollout) ->
     return advantages
 
 
-def learn(learner: Learner, rollout: Rollout) -> None:
-    """Some epochs of minibatches over one rollout."""
+def learn(learner: Learner, rollout: Rollout, limits: tuple[float, float]) -> None:
+    """Some epochs of minibatches over one rollout; logarithms of deviations stay within the limits."""
     config, actor, critic = learner.config, learner.actor, learner.critic
     rewards = rollout.rewards
     if config.scale_returns:
@@ -184,4 +185,4 @@ def learn(learner: Learner, rollout: Rollout) -> None:
                 nn.utils.clip_grad_norm_(module.parameters(), config.max_grad_norm)
             learner.optimizer.step()
             with torch.no_grad():
-                actor.log_std.clamp_(*LOG_STD_RANGE)
+                actor.log_std.clamp_(*limits)

@@ -9,6 +9,7 @@ layers (14), orthogonal initialisation (2).
 Read `workers.algorithms.plain_ppo` first: the same on one page.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -23,6 +24,7 @@ from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
 from workers.algorithms.gradients.ppo import AutogradPpo, PpoGradients, WrittenPpo, entropy, log_prob
+from workers.algorithms.graphed import GraphedMinibatches
 from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import RolloutStorage, Samples, generalized_advantages
 from workers.config import PpoConfig, RecurrentNetworkConfig
@@ -52,6 +54,7 @@ class Ppo:
     Attributes:
         is_guided: whether the critic is told the shortest paths.
         guidance: which these are, where it is.
+        graphed: how minibatches are learned on a CUDA device; None: kernel by kernel, as on every other.
         threads: of an update; with 2 the actor learns beside the critic where compiled passes are known, bit for bit alike.
     """
 
@@ -71,6 +74,9 @@ class Ppo:
         self._optimizer = FlatAdam(actor, critic, learning_rate=config.learning_rate)
         self._gradients = gradients or fastest_gradients(config, actor, critic)
         self._logits, self._values = inference(actor.network, config.robots), inference(critic, config.robots)
+        self.graphed: GraphedMinibatches | None = None
+        if storage.device.type == "cuda" and all(isinstance(network, Described) for network in (actor.network, critic)):
+            self.graphed = GraphedMinibatches(self._gradients, self._optimizer, config.max_grad_norm)
         self._scaler = ReturnScaler(config.robots, config.gamma)
         self.threads = 1
         self.is_guided = config.critic_sees == "path"
@@ -116,9 +122,12 @@ class Ppo:
 
         minibatches = [minibatch for _ in range(config.epochs) for minibatch in self.minibatches()]
         if isinstance(self._gradients, WrittenPpo):
-            totals = self._learn_compiled(self._gradients, samples, minibatches)
+            totals = self._learn_compiled(self._gradients, samples, minibatches, log_std_range(config, progress))
+        elif self.graphed is not None:
+            limits = log_std_range(config, progress)
+            totals = self.graphed.learn(samples, minibatches, lambda: self.actor.log_std.clamp_(*limits))
         else:
-            totals = self._learn(samples, minibatches)
+            totals = self._learn(samples, minibatches, log_std_range(config, progress))
         storage.clear()
 
         policy_loss, value_loss, kl, clip_fraction = (totals / len(minibatches)).tolist()
@@ -134,25 +143,31 @@ class Ppo:
             "optim/learning_rate": self._optimizer.learning_rate,
         }
 
-    def _learn(self, samples: Samples, minibatches: Iterable[torch.Tensor]) -> torch.Tensor:
+    def _learn(self, samples: Samples, minibatches: Iterable[torch.Tensor], limits: tuple[float, float]) -> torch.Tensor:
         """One step of both networks for each minibatch; the sums (4,) of what `PpoGradients` returns."""
         totals = torch.zeros(4, dtype=torch.float64, device=self.storage.device)
         for minibatch in minibatches:
             totals += self._gradients(samples, minibatch)
             self._optimizer.clip_gradients(self.config.max_grad_norm)
             self._optimizer.step()
-            self.actor.log_std.clamp_(*LOG_STD_RANGE)
+            self.actor.log_std.clamp_(*limits)
         return totals
 
-    def _learn_compiled(self, gradients: WrittenPpo, samples: Samples, minibatches: Sequence[torch.Tensor]) -> torch.Tensor:
+    def _learn_compiled(
+        self,
+        gradients: WrittenPpo,
+        samples: Samples,
+        minibatches: Sequence[torch.Tensor],
+        limits: tuple[float, float],
+    ) -> torch.Tensor:
         """The same in one call; on two threads bit for bit alike, since neither network looks at the other."""
         steps = self._optimizer.next_steps(len(minibatches), self.config.max_grad_norm)
         if self.threads == 1:
-            return gradients.learn(BOTH, samples, minibatches, steps, LOG_STD_RANGE)
+            return gradients.learn(BOTH, samples, minibatches, steps, limits)
         # Made anew each time: a thread flushes denormal numbers as the one did that started it.
         with ThreadPoolExecutor(1, "critic") as another:
-            critic = another.submit(gradients.learn, CRITIC, samples, minibatches, steps, LOG_STD_RANGE)
-            return gradients.learn(ACTOR, samples, minibatches, steps, LOG_STD_RANGE) + critic.result()
+            critic = another.submit(gradients.learn, CRITIC, samples, minibatches, steps, limits)
+            return gradients.learn(ACTOR, samples, minibatches, steps, limits) + critic.result()
 
     def minibatches(self) -> Iterator[torch.Tensor]:
         """The rows of the rollout's samples once, in a new order."""
@@ -162,6 +177,9 @@ class Ppo:
 
     def values(self) -> torch.Tensor:
         """Values (steps + 1, robots) of what the critic saw in the rollout."""
+        if self.storage.device.type == "cuda":  # has room for all at once, and each launch costs
+            every: torch.Tensor = self.critic(self.storage.critic_observations.flatten(0, 1))
+            return every.view(self.storage.steps + 1, self.robots)
         # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
         return torch.stack([self._values(seen)[:, 0].clone() for seen in self.storage.critic_observations])
 
@@ -231,6 +249,18 @@ def fastest_gradients(config: PpoConfig, actor: GaussianActor, critic: nn.Module
     if is_compiled(actor.network, critic):
         return WrittenPpo(actor, critic, config.clip_range, config.entropy_coefficient)
     return AutogradPpo(actor, critic, config.clip_range, config.entropy_coefficient)
+
+
+def log_std_range(config: PpoConfig, progress: float) -> tuple[float, float]:
+    """Within which the logarithms of the deviations are kept after `progress` (0 to 1) of the training.
+
+    With a final deviation the upper end falls to it from half of the training on, evenly in the logarithm.
+    """
+    low, high = LOG_STD_RANGE
+    if config.final_std is None:
+        return low, high
+    fallen = max(0.0, 2.0 * progress - 1.0)
+    return low, high + fallen * (math.log(config.final_std) - high)
 
 
 def initial_deviations(config: PpoConfig, actions: ActionLayout) -> tuple[float, ...]:

@@ -12,6 +12,7 @@ from sim.arenas.document import to_document
 from sim.arrays import Floats
 from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
+from sim.engine.rewards import term_names
 from sim.engine.world import World
 from sim.suites import EpisodeTable, Observer, Suite, run_controller, run_suite, suite_for, suite_named, suite_of
 from workers.checkpoints import read_policy
@@ -102,14 +103,17 @@ class Measuring:
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
         self._ways: _Ways | None = None
+        self._returns: NDArray[np.float64] | None = None
 
     def observer(self, suite: Suite, task: TaskConfig) -> Observer:
         """Looks on; see `drive`."""
         ways = self._ways = _Ways(suite, task)
+        returns = self._returns = np.zeros((len(suite), len(task.reward.terms)))
         told = DrivenShare(suite, task, self._progress)
 
         def look(under_way: NDArray[np.int64], world: World, actions: Floats) -> None:
             ways.look(under_way, world)
+            returns[under_way] += world.robots.terms[under_way]
             told(under_way, world, actions)
 
         return look
@@ -117,6 +121,7 @@ class Measuring:
     def measurement(self, driven: Driven) -> Measurement:
         """What came of the drive that was looked on at."""
         assert self._ways is not None
+        assert self._returns is not None
         suite = driven.suite
         return Measurement(
             result=to_result(driven.table, suite),
@@ -126,6 +131,8 @@ class Measuring:
             targets=tuple((round(float(x), 3), round(float(y), 3)) for x, y in suite.targets),
             ways=tuple(self._ways.ways()),
             jerks=tuple(round(float(jerk), 4) for jerk in self._ways.jerks()),
+            terms=term_names(driven.task.reward),
+            returns=tuple(tuple(round(each, 4) for each in row) for row in self._returns.tolist()),
         )
 
 
