@@ -59,6 +59,14 @@ class PpoConfig(Frozen):
     initial_std_angular: float = Field(
         0.4, gt=0.01, le=2.0, title="Initial std, angular", description="Exploration noise.", json_schema_extra=ADVANCED
     )
+    final_std: float | None = Field(
+        None,
+        gt=0.02,
+        le=2.0,
+        title="Final std",
+        description="A limit of the exploration noise falls to it over the training's second half. Empty: no limit.",
+        json_schema_extra=ADVANCED,
+    )
     scale_returns: bool = Field(
         True,
         title="Scale returns",
@@ -293,7 +301,10 @@ class TrainingConfig(Frozen):
     )
     evaluation: EvaluationConfig = Field(default_factory=EvaluationConfig, title="Evaluation")
     device: Literal["auto", "cpu", "cuda"] = Field(
-        "cpu", title="Device", description="Small networks train fastest on a CPU core.", json_schema_extra=ADVANCED
+        "cpu",
+        title="Device",
+        description="CUDA pays for PPO with ResBlock, wide networks or hundreds of robots. Auto: where a worker has it.",
+        json_schema_extra=ADVANCED,
     )
     threads: Threads = Field(
         "auto",

@@ -68,6 +68,13 @@ class ArenaPool(Frozen):
         description="Results over seeds then tell what other maps would give; else all seeds train on the same ones.",
         json_schema_extra=ADVANCED,
     )
+    map_sampling: Literal["uniform", "learnability"] = Field(
+        "uniform",
+        title="Map sampling",
+        description="In which maps episodes begin. Uniform: in all as often. Learnability: half of them more often where "
+        "some attempts arrive and some do not, since there is most to learn.",
+        json_schema_extra=ADVANCED,
+    )
     seed: int = Field(
         0,
         ge=0,

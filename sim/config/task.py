@@ -116,6 +116,12 @@ class TaskConfig(Frozen):
             raise ValueError("together must be 1 where movers see robots: they give way to one robot, not to several")
         return self
 
+    @model_validator(mode="after")
+    def _who_is_together_stays_in_a_map(self) -> Self:
+        if self.together > 1 and getattr(self.arena, "map_sampling", "uniform") != "uniform":
+            raise ValueError("together must be 1 where maps are sampled by learnability: a group stays in its map")
+        return self
+
     @model_validator(mode="before")
     @classmethod
     def _first_observations_had_a_name(cls, data: Any) -> Any:

@@ -16,6 +16,7 @@ from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.guidance import Guidance
+from sim.engine.map_sampling import MapSampling, samples_by_learnability
 from sim.engine.movers import Movers
 from sim.engine.parameters import pack_parameters
 from sim.engine.paths import PathProgress, Paths
@@ -125,6 +126,9 @@ class World:
         if respawn and task.together > 1:
             replicas = task.together * -(-groups // len(self.arenas))
         origins = tile_origins(self.arenas, replicas)
+        self._sampling = (
+            MapSampling(len(self.arenas)) if respawn and samples_by_learnability(task, len(self.arenas)) else None
+        )
         nowhere = np.empty((0, 2), dtype=np.float32)
         spaces = [spawn_space(task, arena) if respawn else FreeSpace(nowhere, nowhere, 0.0) for arena in self.arenas]
         bounds, circles, boxes = shapes = pack_shapes(self.arenas)
@@ -152,6 +156,7 @@ class World:
             targets=np.concatenate([space.targets for space in spaces]),
             start_offsets=np.cumsum([0, *(len(space.starts) for space in spaces)], dtype=np.int32),
             target_offsets=np.cumsum([0, *(len(space.targets) for space in spaces)], dtype=np.int32),
+            chances=self._sampling.chances if self._sampling else np.empty(0),
             origins=origins,
             ray_angles=ray_angles(task.lidar),
             ray_x=ray_x,
@@ -199,7 +204,9 @@ class World:
         )
         # What extensions see of a step that ends an episode, and how far it was, has to be seen before the next one begins.
         # Who begins anew has to be clear of the others, wherever they have come to.
-        self._looks_back = bool(self._added_parts) or bool(self._path_progress) or guides or task.together > 1
+        # So has the map of an attempt that is over.
+        sees_ends = bool(self._added_parts) or bool(self._path_progress) or guides or self._sampling is not None
+        self._looks_back = sees_ends or task.together > 1
         starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         usual_drive = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
@@ -395,6 +402,8 @@ class World:
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
         self._path_progress.begin(robots, robots.outcomes == ARRIVAL)
+        if self._sampling is not None and len(over := np.flatnonzero(robots.outcomes)):
+            self._sampling.learn(robots.records["map"][over].tolist(), (robots.outcomes[over] == ARRIVAL).tolist())
         self._guide(robots.records["parked"] == 0)
         ended = robots.terminations | robots.truncations
         if not ended.any():
@@ -498,7 +507,7 @@ class World:
         arrays |= {"ray_cos": self.robots.ray_cos[:, :rays], "ray_sin": self.robots.ray_sin[:, :rays]}
         state |= {name: array for name, array in arrays.items() if array.size and name not in constant}
         state["bodies"] = self._space.state
-        return state | self.movers.state()
+        return state | self.movers.state() | (self._sampling.state() if self._sampling else {})
 
     def get_state(self) -> dict[str, NDArray[np.generic]]:
         """Everything that the future depends on, as plain arrays."""

@@ -19,6 +19,7 @@ class Geometry(NamedTuple):
         boxes: (M, B, 6), see `BOX_COLUMNS`.
         starts, targets: (cells, 2) lower left corners of the free cells of all arenas, one after another.
         start_offsets, target_offsets: (M + 1,) where each arena's cells begin.
+        chances: (M,) float64 that an episode begins in an arena or one before it; (0,) where all are as likely.
         origins: (tiles, 2) float64, centre of each tile in the Space.
         ray_angles: (rays,) float64 where the rays of a LiDAR point that the policy believes in, radians against its axis.
         ray_x, ray_y: (rays or some more, see `sim.lidar.padded`) scratch for those of one LiDAR's rays in its arena.
@@ -34,6 +35,7 @@ class Geometry(NamedTuple):
     targets: Floats
     start_offsets: Integers
     target_offsets: Integers
+    chances: Doubles
     origins: Doubles
     ray_angles: Doubles
     ray_x: Floats

@@ -84,7 +84,11 @@ def _draw_start(i, robots, geometry, p, state):
         return
     arenas = geometry.bounds.shape[0]
     if arenas > 1 and p.together == 1:
-        records[i].map = np.int32(uniform(records, i) * arenas)
+        drawn = uniform(records, i)
+        if geometry.chances.shape[0]:
+            records[i].map = np.int32(np.searchsorted(geometry.chances, drawn, side="right"))
+        else:
+            records[i].map = np.int32(drawn * arenas)
     index = records[i].map
     first = geometry.start_offsets[index]
     cells = geometry.start_offsets[index + 1] - first

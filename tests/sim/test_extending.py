@@ -183,7 +183,7 @@ def test_a_formula_reads_the_terms_own_numbers() -> None:
 
 def test_a_family_of_an_extension_is_a_pool_that_is_drawn_from_its_seed() -> None:
     pool: Any = complete(PostFamily, AddedArenaPool)
-    assert list(pool.model_fields) == ["name", "difficulty", "maps", "own_maps", "seed", "movers", "radius"]
+    assert list(pool.model_fields) == ["name", "difficulty", "maps", "own_maps", "map_sampling", "seed", "movers", "radius"]
     config = pool(radius=0.5)
     arena = generate_arena(config, 0.5, 3)
     assert arena.name == "lab.post-0.5-3"

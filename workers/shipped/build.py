@@ -20,8 +20,8 @@ from pydantic import BaseModel
 from sim.arrays import Floats
 from sim.baselines.named import TABLED, controller_of
 from sim.config import TaskConfig
+from sim.suite_rules import SuiteLidar
 from sim.suites import EpisodeTable, Situation, Suite, SuiteRules, load_suite, run_controller, suite_named, suite_names
-from sim.suites.rules import SuiteLidar
 from workers.checkpoints import copy_policy, read_policy
 from workers.frames import Frame
 from workers.policy import torch_policy
