@@ -1,9 +1,9 @@
 """Suites: frozen scenarios on which policies are compared, and driving them."""
 
 from sim.frozen import suite_names
+from sim.suite_rules import SuiteRules
 from sim.suites.driving import EpisodeTable, Observer, Situation, run_controller, run_suite
 from sim.suites.places import BarnPlace, GeneratedPlace, ScenePlace, build_places, content_hash, suite_places
-from sim.suites.rules import SuiteRules
 from sim.suites.suite import Suite, load_suite, suite_for, suite_in, suite_named, suite_of, suite_of_scenes
 
 __all__ = [

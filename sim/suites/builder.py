@@ -17,8 +17,8 @@ from sim.arenas.files import load_arena
 from sim.arenas.scenes import SCENES
 from sim.config import ArenaConfig, ArenaFile, JackalConfig, MoversConfig, RoundConfig, SingleMount
 from sim.errors import SuiteError
+from sim.suite_rules import SuiteLidar
 from sim.suites import BarnPlace, GeneratedPlace, ScenePlace, SuiteRules, build_places, content_hash, suite_places
-from sim.suites.rules import SuiteLidar
 from sim.suites.scenarios import COLUMNS, barn_scenarios, draw_scenarios, own_scenarios, scene_scenarios
 
 _FOLDER = Path(__file__).parent / "data"

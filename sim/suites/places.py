@@ -15,7 +15,7 @@ from sim.arenas.families import CLEARANCE, SUITE_SEEDS, generate_arena
 from sim.arenas.mover import Mover
 from sim.arenas.scenes import Scene, SceneName, generate_scene
 from sim.config import ArenaConfig, ArenaFile, FamilyName, Frozen, MoversConfig
-from sim.suites.rules import SuiteRules
+from sim.suite_rules import SuiteRules
 
 _DECIMALS = 6  # of the geometry that is hashed: micrometres, coarser than any rounding of a platform
 

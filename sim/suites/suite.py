@@ -21,8 +21,8 @@ from sim.arenas.families import SUITE_SEEDS
 from sim.config import AnyArenaConfig, ArenaConfig, ArenaFile, ArenaPool, ImportedArenaConfig, TaskConfig
 from sim.errors import PlacementError, SuiteError
 from sim.frozen import suite_names, suite_text
+from sim.suite_rules import SuiteRules
 from sim.suites.places import PLACES, GeneratedPlace, ScenePlace, build_places, content_hash
-from sim.suites.rules import SuiteRules
 from sim.suites.scenarios import draw_scenarios, own_scenarios, scene_scenarios
 
 # Maps and scenarios of a suite that is drawn for a task.

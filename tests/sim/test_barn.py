@@ -105,7 +105,7 @@ def test_the_suite_is_the_challenges() -> None:
     assert (suite.starts == [0.0, -4.0, 1.5708]).all()
     assert (suite.targets == [0.0, 6.0]).all()
     for other in (TaskConfig(), task.model_copy(update={"robot": JackalConfig()})):
-        with pytest.raises(SuiteError, match="is for robot"):
+        with pytest.raises(SuiteError, match="is for the robot"):
             run_suite(go_to_goal(other), other, suite)
     around = task.model_copy(update={"lidar": LidarConfig(field_of_view=360.0)})
     with pytest.raises(SuiteError, match="see 270 degrees, not 360"):

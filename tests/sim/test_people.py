@@ -203,7 +203,7 @@ def test_people_who_see_and_who_do_not_start_alike_on_the_same_ways() -> None:
 
 
 def test_a_suite_of_people_is_for_its_robot_only() -> None:
-    with pytest.raises(SuiteError, match="is for robot"):
+    with pytest.raises(SuiteError, match="is for the robot"):
         run_controller(lambda _: STAND, TaskConfig(), part(PEOPLE, 500))
 
 

@@ -1,14 +1,18 @@
-"""What a suite asks of a robot and its task beyond the arenas (pydantic only)."""
+"""What a suite asks of a robot and its task beyond the arenas (pydantic only: the server asks too)."""
 
+import json
 import math
+from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from sim.config import AnyRobotConfig, CentredMount, Frozen, LidarConfig, TaskConfig
 from sim.errors import SuiteError
+from sim.frozen import suite_text
 
 LEAST_STEPS = 500
 """Steps that every attempt has under `SuiteRules.patience`."""
@@ -72,17 +76,31 @@ class SuiteRules(Frozen):
         Raises:
             SuiteError: it is another robot, or sees more; the message says what differs.
         """
-        for name in ("robot", "arrival_distance", "collision_distance"):
-            asked, given = getattr(self, name), getattr(task, name)
-            if asked is not None and given != asked:
-                raise SuiteError(f"suite {suite!r} is for {name} {asked!r}, not {given!r}: measure this policy elsewhere")
+        if self.robot is not None and self.robot != task.robot:
+            asked, given = _title(self.robot), _title(task.robot)
+            if asked == given:
+                given = f"one that differs ({', '.join(_differences(self.robot, task.robot))})"
+            raise SuiteError(
+                f"suite {suite!r} is for the robot {asked}, and this policy drives {given}: "
+                "measure it on a suite for any robot, or a policy that was trained for that one here"
+            )
+        for name in ("arrival_distance", "collision_distance"):
+            wanted, own = getattr(self, name), getattr(task, name)
+            if wanted is not None and own != wanted:
+                raise SuiteError(
+                    f"suite {suite!r} has {name.replace('_', ' ')}s of {wanted:g} m, and this policy was trained with "
+                    f"{own:g} m: measure it on another suite"
+                )
         for name, unit in (("field_of_view", "degrees"), ("range", "m")):
             given = getattr(task.lidar, name)
             if self.lidar is not None and given > getattr(self.lidar, name):
                 raise SuiteError(f"suite {suite!r} lets a robot see {getattr(self.lidar, name):g} {unit}, not {given:g}")
 
         if self.lidar is not None and self.lidar.mount not in (CentredMount(), task.lidar.mount):
-            raise SuiteError(f"suite {suite!r} has its LiDAR at {self.lidar.mount!r}, not {task.lidar.mount!r}")
+            raise SuiteError(
+                f"suite {suite!r} has its LiDAR mounted {_places(self.lidar)}, and this policy's is {_places(task.lidar)}: "
+                "measure it on another suite"
+            )
 
     def step_limits(self, task: TaskConfig, shortest_paths: NDArray[np.float64]) -> NDArray[np.int64]:
         """(S,) steps that each attempt may take, from the shortest paths (S,), metres."""
@@ -92,3 +110,43 @@ class SuiteRules(Frozen):
             return np.full(len(shortest_paths), task.step_limit)
         quickest = shortest_paths / (task.robot.max_linear_speed * task.control_period)
         return np.maximum(LEAST_STEPS, np.ceil(self.patience * quickest)).astype(np.int64)
+
+
+@cache
+def frozen_rules(name: str) -> SuiteRules:
+    """Those of a frozen suite.
+
+    Raises:
+        OSError: there is none of this name.
+    """
+    return SuiteRules.model_validate(json.loads(suite_text(name)).get("rules", {}))
+
+
+def _title(robot: AnyRobotConfig) -> str:
+    return type(robot).model_fields["name"].title or robot.name
+
+
+def _differences(asked: BaseModel, given: BaseModel) -> Iterator[str]:
+    """As "linear acceleration 20, not 0", field by field, where they are of one kind."""
+    for name, field in type(asked).model_fields.items():
+        one, other = getattr(asked, name), getattr(given, name)
+        if one == other:
+            continue
+        if isinstance(one, BaseModel) and type(one) is type(other):
+            yield from _differences(one, other)
+        else:
+            yield f"{(field.title or name).lower()} {_word(one)}, not {_word(other)}"
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, BaseModel):
+        return str(getattr(value, "name", type(value).__name__))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _places(lidar: LidarConfig) -> str:
+    """As "at (0.055, 0) m", ahead and to the left of the middle."""
+    places = [
+        f"({x:g}, {y:g}) m" + (f" turned by {math.degrees(yaw):g}°" if yaw else "") for x, y, yaw in lidar.mount.places
+    ]
+    return f"at {' and '.join(places)}"
