@@ -44,7 +44,7 @@ def figures_of(found: tuple[FieldRow, ...]) -> tuple[dict[str, object], dict[str
     """The best mapless policy of each suite, and its target."""
     best: dict[str, object] = {}
     targets: dict[str, float] = {}
-    wanted = {**FAMILY_TARGETS, FROZEN["barn"][0]: BARN_TARGET, FROZEN["people"][0]: PEOPLE_TARGET}
+    wanted = {**FAMILY_TARGETS, **dict.fromkeys(FROZEN["barn"], BARN_TARGET), FROZEN["people"][0]: PEOPLE_TARGET}
     for suite in dict.fromkeys(row.suite for row in found if row.suite in wanted):
         own = [row for row in found if row.suite == suite and row.policy]
         values = [row.score if row.part == "barn" else round(100.0 * row.success, 1) for row in own]
@@ -98,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     measured = Field(command="python -m benchmarks.field", date=datetime.now(UTC).date().isoformat(), rows=found)
     if options.write:
         measured = measured.in_place_of(Field.model_validate_json(FIELD.read_bytes()))
-        FIELD.write_text(measured.model_dump_json(indent=1) + "\n")
+        FIELD.write_text(measured.model_dump_json(indent=1, exclude_defaults=True) + "\n")
         DOCS.write_text(written(DOCS.read_text(), measured))
     print(tables(measured))
     best, targets = figures_of(found)

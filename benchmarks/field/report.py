@@ -33,8 +33,13 @@ def tables(field: Field) -> str:
 
 
 def success(group: Group) -> str:
-    """Percent with the 95 % interval: over the episodes of one policy, or over training seeds."""
-    interval = success_rate([row.arrivals for row in group], [row.episodes for row in group])
+    """Percent with the 95 % interval: over one driver's episodes, or its worlds where it drives each again, or seeds."""
+    (first, *others) = group
+    if first.worlds and not others:
+        by_world = [arrivals for arrivals, worlds in enumerate(first.worlds) for _ in range(worlds)]
+        interval = success_rate(by_world, [first.episodes // len(by_world)] * len(by_world))
+    else:
+        interval = success_rate([row.arrivals for row in group], [row.episodes for row in group])
     return f"{100 * interval.value:.1f} [{100 * interval.low:.1f}, {100 * interval.high:.1f}]"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.field.candidates import Candidate
-from benchmarks.field.suites import Piece, rules_of, suite_of_piece
+from benchmarks.field.suites import STARTS, TEN_STARTS, Piece, rules_of, suite_of_piece
 from sim.config import Frozen
 from sim.suites import EpisodeTable, Suite, run_controller
 from sim.suites.people import run_among_people
@@ -158,7 +158,12 @@ def _row(key: FieldKey, found: list[PieceResult]) -> FieldRow:
         intrusion=mean("intrusion"),
         delay=mean("delay"),
         detour=mean("detour"),
+        worlds=_worlds(arrived) if key.suite == TEN_STARTS else None,
     )
+
+
+def _worlds(arrived: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(np.bincount(arrived.reshape(-1, STARTS).sum(axis=1), minlength=STARTS + 1).tolist())
 
 
 def _efficiencies(table: EpisodeTable, suite: Suite, arrival_distance: float) -> tuple[float, ...]:

@@ -3,14 +3,16 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.field.__main__ import main
 from benchmarks.field.candidates import baselines, knows_the_map, of_the_default_robot, policies
-from benchmarks.field.report import DOCS, tables, written
+from benchmarks.field.report import DOCS, success, tables, written
 from benchmarks.field.results import Kept, drive, key_of, rows
-from benchmarks.field.suites import FAMILIES, FROZEN, Piece, pieces, suite_of_piece
-from workers.shipped.field import field
+from benchmarks.field.suites import BARN, FAMILIES, STARTS, TEN_STARTS, Piece, pieces, suite_of_piece
+from sim.suites import load_suite
+from workers.shipped.field import FieldRow, field
 from workers.shipped.library import shipped_policies
 
 SIZE = 3
@@ -48,11 +50,35 @@ def test_what_is_measured_anew_takes_the_place_of_what_was_and_the_rest_stays() 
 
 def test_pieces_are_the_same_scenarios_whatever_the_size() -> None:
     assert [(each.first, each.count) for each in pieces("families", "maze", 250)] == [(0, 100), (100, 100), (200, 50)]
-    assert sum(each.count for each in pieces("barn", FROZEN["barn"][0], 1000)) == 300
+    assert sum(each.count for each in pieces("barn", BARN, 1000)) == 300
     # A part of the frozen suite mixes its scenes, and no scenario is driven twice.
     seen = [suite_of_piece(each).arena_indices.tolist() for each in pieces("people", "people-500", 500)]
     assert sorted(index for piece in seen for index in piece) == list(range(500))
     assert len({index // 50 for index in seen[0]}) == 10
+
+
+def test_ten_starts_are_beside_the_challenges_own_and_belong_to_their_worlds() -> None:
+    suite = load_suite(BARN)
+    found = [suite_of_piece(each) for each in pieces("barn", TEN_STARTS, 300)]
+    assert [len(each) for each in found] == [100] * 30
+    starts = np.concatenate([each.starts for each in found]).reshape(300, STARTS, 3)
+    worlds = np.concatenate([each.arena_indices for each in found]).reshape(300, STARTS)
+    assert (worlds == worlds[:, :1]).all()
+    assert sorted(worlds[:, 0].tolist()) == list(range(300))
+    aside = starts - suite.starts[0]
+    assert np.abs(aside[..., :2]).max() == pytest.approx(0.3, abs=0.001)
+    assert np.rad2deg(np.abs(aside[..., 2])).max() == pytest.approx(15.0, abs=0.05)
+    assert len(np.unique(starts.reshape(-1, 3), axis=0)) == 3000
+
+
+def test_of_ten_starts_the_world_is_what_is_independent() -> None:
+    """Half of 20 worlds always, the other half never: as sure as 20 attempts are, not as 200."""
+    key = {"part": "barn", "suite": TEN_STARTS, "driver": "a planner", "policy": None, "seed": None, "rays": 30}
+    attempts = {"episodes": 200, "arrivals": 100, "collisions": 100, "spl": 0.5, "worst_tenth_spl": 0.0, "seconds": 5.0}
+    row = FieldRow.model_validate({**key, **attempts, "field_of_view": 270.0, "worlds": [10, *[0] * 9, 10]})
+    low, high = (float(end) for end in success([row]).split("[")[1].strip("]").split(", "))
+    assert 25.0 < low < 28.0
+    assert 72.0 < high < 75.0
 
 
 def test_who_drives_where() -> None:

@@ -51,6 +51,7 @@ class FieldRow(FieldKey):
         intrusion: mean seconds near somebody; None where nobody walks.
         delay: mean seconds by which all people of a scenario are late; None where nobody walks.
         detour: mean metres more that they walk for a metre of their routes; None where nobody walks.
+        worlds: where each is driven ten times, how many of them saw 0, 1, ... and 10 arrivals; None elsewhere.
     """
 
     episodes: int
@@ -64,6 +65,7 @@ class FieldRow(FieldKey):
     intrusion: float | None = None
     delay: float | None = None
     detour: float | None = None
+    worlds: tuple[int, ...] | None = None
 
     @property
     def key(self) -> FieldKey:
