@@ -13,7 +13,8 @@ class FieldCell(Schema):
     worst_tenth_spl: float = Field(
         description="Success weighted by path length over the tenth of the episodes that did worst; a mean over seeds."
     )
-    evaluation: str | None = Field(description="Of which asked evaluation; null for what ships.")
+    evaluation: str | None = Field(description="Of which asked evaluation, that of the first seed; null for what ships.")
+    suite_hash: str | None = Field(None, description="Of the suite of what was asked for; null for what ships.")
 
 
 class FieldDriver(Schema):
@@ -39,7 +40,8 @@ class FieldMatrix(Schema):
     families: list[str] = Field(description="The hardest for the best shipped policy first.")
     sights: list[FieldSight] = Field(description="What was measured with the project, the narrowest sight first.")
     asked: list[FieldDriver] = Field(
-        description="What was asked for here at difficulty 1: 20 maps, 200 scenarios, attempts as long as the policy's own."
+        description="What was asked for here at difficulty 1: 20 maps, 200 scenarios, attempts as long as the policy's own. "
+        "A training's seeds are one driver. First what was measured in most families, of these the best."
     )
     command: str = Field(description="What measured that which ships.")
     date: str = Field(description="When, ISO 8601.")

@@ -1,12 +1,12 @@
 """What a person may ask of the matrix: all of it, with the evaluations that they may see."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from server.database import tables
 from server.estimates import success_estimate
-from server.evaluations.schemas import EvaluationFigures
 from server.field.schemas import FieldCell, FieldDriver, FieldMatrix, FieldSight
-from server.leaderboards.repository import LeaderboardRepository
+from server.leaderboards.asked import AskedTogether, together
+from server.leaderboards.repository import LeaderboardRepository, Seed
 from server.services import Services
 from workers.shipped.field import FieldRow, field
 
@@ -30,7 +30,9 @@ def matrix(services: Services, visible: Collection[str] | None) -> FieldMatrix:
     families = sorted(best, key=lambda family: (best[family], family))
     suites = {_ASKED.format(family=family): family for family in families}
     with services.database.read() as session:
-        asked = _asked(LeaderboardRepository(session, visible).evaluations_named(suites), suites, families)
+        repository = LeaderboardRepository(session, visible)
+        rows_asked = repository.evaluations_named(suites)
+        asked = _asked(rows_asked, repository.seeds_of(rows_asked), suites, families)
     return FieldMatrix(
         families=families,
         sights=[
@@ -69,20 +71,44 @@ def _cell(rows: list[FieldRow]) -> FieldCell:
     )
 
 
-def _asked(rows: list[tables.PolicyEvaluation], suites: dict[str, str], families: list[str]) -> list[FieldDriver]:
-    """The newest evaluation of each policy in each family; `rows` are the newest first."""
-    found: dict[tuple[str, bool], Cells] = {}
+def _asked(
+    rows: list[tables.PolicyEvaluation], seeds: Mapping[str, Seed], suites: dict[str, str], families: list[str]
+) -> list[FieldDriver]:
+    """The newest evaluations of each policy in each family, a training's seeds together; `rows` are the newest first."""
+    # By its hash, since scenarios of two versions are not counted together.
+    alike: dict[tuple[str, str | None], list[tables.PolicyEvaluation]] = {}
     for row in rows:
-        figures = EvaluationFigures.model_validate(row.figures)
-        cell = FieldCell(
-            success=figures.success,
-            collision=figures.collision,
-            worst_tenth_spl=figures.worst_tenth_spl,
-            evaluation=row.id,
+        alike.setdefault((row.suite or "", row.suite_hash), []).append(row)
+    found: dict[tuple[str, bool], dict[str, AskedTogether]] = {}
+    for (suite, _), some in alike.items():
+        for each in together(some, seeds):
+            key = each.training[0] if each.training else each.title, each.trained
+            found.setdefault(key, {}).setdefault(suites[suite], each)
+    drivers = [
+        _driver(
+            _title(list(own.values())), None, trained, {family: _measured(each) for family, each in own.items()}, families
         )
-        trained = row.policy["source"] != "baseline"
-        found.setdefault((row.title, trained), {}).setdefault(suites[row.suite or ""], cell)
-    return [_driver(title, None, trained, cells, families) for (title, trained), cells in found.items()]
+        for (_, trained), own in found.items()
+    ]
+    return sorted(drivers, key=lambda driver: (driver.cells.count(None), -_mean(driver)))
+
+
+def _title(measured: Sequence[AskedTogether]) -> str:
+    """A training's name, unless it is one and the same checkpoint everywhere."""
+    titles = {each.title for each in measured}
+    training = measured[0].training
+    return training[1] if training and len(titles) > 1 else titles.pop()
+
+
+def _measured(asked: AskedTogether) -> FieldCell:
+    figures = asked.figures
+    return FieldCell(
+        success=asked.success,
+        collision=sum(each.collision for each in figures) / len(figures),
+        worst_tenth_spl=sum(each.worst_tenth_spl for each in figures) / len(figures),
+        evaluation=asked.rows[0].id,
+        suite_hash=asked.rows[0].suite_hash,
+    )
 
 
 def _driver(title: str, policy: str | None, trained: bool, cells: Cells, families: list[str]) -> FieldDriver:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Float, and_, cast, func, or_, select
 from sqlalchemy.orm import Session
 
+from server.checkpoints.repository import CheckpointRepository
 from server.database import tables
+from server.experiments.stored import read_training
+from server.leaderboards.means import mean_of, spl_of
 
 MOST_ENTRIES = 200
 """Trainings, and evaluations, of a leaderboard; the best of each."""
@@ -21,6 +24,18 @@ class Trained:
     name: str
     arrivals: list[int]
     episodes: list[int]
+    spl: float | None
+    steps: float | None
+
+
+@dataclass(frozen=True)
+class Seed:
+    """The run that made a checkpoint."""
+
+    run_id: str
+    seed: int
+    experiment_id: str
+    experiment: str
 
 
 class LeaderboardRepository:
@@ -76,17 +91,44 @@ class LeaderboardRepository:
         )
         names = {row[0]: row[1] for row in self._session.execute(best)}
         runs = (
-            select(run.experiment_id, run.final_arrivals, run.final_episodes)
+            select(run.experiment_id, run.id, run.final_arrivals, run.final_episodes)
             .join(experiment)
             .where(run.experiment_id.in_(names), *on_it)
         )
-        seeds: dict[str, list[tuple[int, int]]] = defaultdict(list)
-        for experiment_id, arrivals, episodes in self._session.execute(runs.order_by(run.seed)):
-            seeds[experiment_id].append((arrivals or 0, episodes or 0))
+        seeds: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
+        for experiment_id, run_id, arrivals, episodes in self._session.execute(runs.order_by(run.seed)):
+            seeds[experiment_id].append((run_id, arrivals or 0, episodes or 0))
+        final = CheckpointRepository(self._session).final_evaluations(
+            [each[0] for own in seeds.values() for each in own], with_episodes=True
+        )
+        tasks = self._arrival_distances(names)
         return [
-            Trained(key, name, [each[0] for each in seeds[key]], [each[1] for each in seeds[key]])
+            Trained(
+                key,
+                name,
+                [each[1] for each in seeds[key]],
+                [each[2] for each in seeds[key]],
+                mean_of([spl_of(final[each[0]], tasks[key]) for each in seeds[key] if each[0] in final]),
+                mean_of([final[each[0]].steps_mean for each in seeds[key] if each[0] in final]),
+            )
             for key, name in names.items()
         ]
+
+    def seeds_of(self, rows: Collection[tables.PolicyEvaluation]) -> dict[str, Seed]:
+        """By the checkpoint that was measured, the run that made it; without those that are gone."""
+        run, experiment = tables.Run, tables.Experiment
+        query = (
+            select(tables.Checkpoint.id, run.id, run.seed, experiment.id, experiment.name)
+            .join(run, run.id == tables.Checkpoint.run_id)
+            .join(experiment, experiment.id == run.experiment_id)
+            .where(tables.Checkpoint.id.in_({row.checkpoint_id for row in rows if row.checkpoint_id}))
+        )
+        return {row[0]: Seed(row[1], row[2], row[3], row[4]) for row in self._session.execute(query)}
+
+    def _arrival_distances(self, experiment_ids: Collection[str]) -> dict[str, float]:
+        row = tables.Experiment
+        query = select(row.id, row.training).where(row.id.in_(experiment_ids))
+        return {found[0]: read_training(found[1]).training.task.arrival_distance for found in self._session.execute(query)}
 
     def evaluations(self, suite_hash: str) -> list[tables.PolicyEvaluation]:
         """Evaluations on a suite that people have asked for, the newest first."""

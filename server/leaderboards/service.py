@@ -1,25 +1,34 @@
 """What a person may ask of leaderboards: which there are, and one of them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from server.errors import NotFoundError
 from server.estimates import success_estimate
-from server.evaluations.schemas import EvaluationFigures
+from server.leaderboards.asked import AskedTogether, together
 from server.leaderboards.repository import LeaderboardRepository
-from server.leaderboards.schemas import Entry, EntryKind, Leaderboard, Leaderboards, ListedSuite
+from server.leaderboards.schemas import Entry, EntryKind, Leaderboard, Leaderboards, ListedSuite, ToldBy
 from server.services import Services
 from sim.frozen import MEANINGS, suite_names
 from workers.shipped.figures import Figures
 from workers.shipped.library import SuiteFigures, baselines, shipped_policies
-from workers.statistics.differences import LEAST_SEEDS, Rates, difference_of_rates, fisher_exact
+from workers.statistics.differences import LEAST_SEEDS, Rates, fisher_exact
+from workers.statistics.significance import holm, p_of_rates, p_of_seeds_and_policy
 
 _LEVEL = 0.05
+
+# By where a policy that was asked for comes from.
+_KINDS: dict[str, EntryKind] = {
+    "checkpoint": "evaluation",
+    "shipped": "shipped",
+    "baseline": "baseline",
+    "uploaded": "uploaded",
+}
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Something that was measured: arrivals and episodes of each of its seeds."""
+    """Something that was measured: arrivals and episodes of each of its seeds, of what has none those of the only policy."""
 
     kind: EntryKind
     id: str
@@ -28,6 +37,18 @@ class Candidate:
     episodes: list[int]
     spl: float | None = None
     steps: float | None = None
+    experiment_id: str | None = None
+    evaluations: tuple[str, ...] = ()
+
+    @property
+    def seeds(self) -> int:
+        """Of how many policies it is."""
+        return len(self.arrivals)
+
+    @property
+    def rates(self) -> Rates:
+        """Seed by seed."""
+        return Rates(self.arrivals, self.episodes)
 
     @property
     def rate(self) -> float:
@@ -69,19 +90,21 @@ def board(services: Services, suite_hash: str, visible: Collection[str] | None) 
     with services.database.read() as session:
         repository = LeaderboardRepository(session, visible)
         trainings, asked = repository.trainings(suite_hash), repository.evaluations(suite_hash)
+        seeds = repository.seeds_of(asked)
         names += [row.suite for row in asked if row.suite]
         if not names:
             names += [name for key, (name, _) in repository.suites().items() if key == suite_hash]
-    candidates += [Candidate("training", each.id, each.name, each.arrivals, each.episodes) for each in trainings]
+    candidates += [
+        Candidate("training", each.id, each.name, each.arrivals, each.episodes, each.spl, each.steps, each.id)
+        for each in trainings
+    ]
     here = {(each.kind, each.id) for each in candidates}
-    for row in asked:
-        figures = EvaluationFigures.model_validate(row.figures)
-        if (row.policy["source"], row.policy.get("name")) in here and row.policy.get("task") is None:
-            continue
-        arrivals = round(figures.success.value * figures.episodes)
-        candidates.append(
-            Candidate("evaluation", row.id, row.title, [arrivals], [figures.episodes], figures.spl, figures.steps)
-        )
+    asked = [
+        row
+        for row in asked
+        if (row.policy["source"], row.policy.get("name")) not in here or row.policy.get("task") is not None
+    ]
+    candidates += [_asked(each) for each in together(asked, seeds)]
     if not candidates or not names:
         raise NotFoundError("Nothing was measured on this suite.")
     return ranked(names[0], suite_hash, candidates)
@@ -98,40 +121,65 @@ def ranked(suite: str, suite_hash: str, candidates: list[Candidate]) -> Leaderbo
     order = sorted(candidates, key=lambda each: (-each.rate, each.steps or float("inf"), each.title))
     best = order[0]
     rates = [each.rate for each in order]
+    told: list[tuple[ToldBy, float | None]] = [("best", None), *_told(best, order[1:])]
     return Leaderboard(
         suite=suite,
         suite_hash=suite_hash,
         meaning=MEANINGS.get(suite),
-        entries=[_entry(each, rates.index(each.rate) + 1, best) for each in order],
-        comparisons=len(order) - 1,
+        entries=[_entry(each, rates.index(each.rate) + 1, *by) for each, by in zip(order, told, strict=True)],
+        comparisons=sum(p is not None for _, p in told),
     )
 
 
-def _entry(candidate: Candidate, rank: int, best: Candidate) -> Entry:
-    by_seeds = min(len(candidate.arrivals), len(best.arrivals)) >= LEAST_SEEDS
-    if candidate is best:
-        tied = True
-    elif by_seeds:
-        sides = [Rates(each.arrivals, each.episodes) for each in (best, candidate)]
-        tied = difference_of_rates(*sides).low <= 0.0
-    else:
-        tied = fisher_exact(_pooled(best), _pooled(candidate)) >= _LEVEL
+def _told(best: Candidate, others: Sequence[Candidate]) -> list[tuple[ToldBy, float | None]]:
+    """By what each is told from the best, and its p after all of these tests."""
+    tests = [_test(best, each) for each in others]
+    adjusted = iter(holm([p for _, p in tests if p is not None]))
+    return [(by, None if p is None else next(adjusted)) for by, p in tests]
+
+
+def _test(best: Candidate, other: Candidate) -> tuple[ToldBy, float | None]:
+    """Episodes of several seeds are not independent: only of one very policy are they what is counted."""
+    several = [each for each in (best, other) if each.seeds > 1]
+    if not several:
+        return "episodes", fisher_exact((best.arrivals[0], best.episodes[0]), (other.arrivals[0], other.episodes[0]))
+    if min(each.seeds for each in several) < LEAST_SEEDS:
+        return "nothing", None
+    if len(several) == 2:
+        return "seeds", p_of_rates(best.rates, other.rates)
+    (alone,) = [each for each in (best, other) if each.seeds == 1]
+    return "seeds", p_of_seeds_and_policy(several[0].rates, alone.arrivals[0], alone.episodes[0])
+
+
+def _entry(candidate: Candidate, rank: int, told_by: ToldBy, p: float | None) -> Entry:
     return Entry(
         rank=rank,
         kind=candidate.kind,
         id=candidate.id,
         title=candidate.title,
+        experiment_id=candidate.experiment_id,
+        evaluations=list(candidate.evaluations),
         success=success_estimate(candidate.arrivals, candidate.episodes, trained=candidate.kind != "baseline"),
         spl=candidate.spl,
         steps=candidate.steps,
-        tied=tied,
-        told_by="best" if candidate is best else "seeds" if by_seeds else "episodes",
+        tied=p is None or p >= _LEVEL,
+        told_by=told_by,
+        p=p,
     )
 
 
-def _pooled(candidate: Candidate) -> tuple[int, int]:
-    """Arrivals and episodes of all its seeds together."""
-    return sum(candidate.arrivals), sum(candidate.episodes)
+def _asked(found: AskedTogether) -> Candidate:
+    return Candidate(
+        _KINDS[found.rows[0].policy["source"]],
+        found.rows[0].id,
+        found.title,
+        found.arrivals,
+        found.episodes,
+        found.spl,
+        found.steps,
+        found.training[0] if found.training else None,
+        tuple(row.id for row in found.rows),
+    )
 
 
 def _shipped() -> list[SuiteFigures]:

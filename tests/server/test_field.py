@@ -64,3 +64,26 @@ def test_evaluations_at_difficulty_one_stand_below_for_who_may_see_them(
     del client.headers["Authorization"]
     assert len(client.get("/api/field", headers=lab.browser(member)).json()["asked"]) == 1
     assert client.get("/api/field", headers=lab.browser(stranger)).json()["asked"] == []
+
+
+def test_seeds_of_a_training_are_one_row_and_the_best_come_first(client: TestClient, reports: Reports) -> None:
+    def asked(policies: list[dict[str, str]]) -> list[dict[str, Any]]:
+        suites = [{"by": "arena", "arena": {"name": "maze", "difficulty": 1.0}}]
+        found: list[dict[str, Any]] = client.post("/api/evaluations", json={"policies": policies, "suites": suites}).json()
+        return found
+
+    experiment = reports.experiment("base", seeds=(0, 1, 2))
+    checkpoints = [reports.checkpoint(run, 1, Reports.evaluation(7)) for run in experiment["runs"]]
+    seeds = asked([{"source": "checkpoint", "id": each} for each in checkpoints])
+    for number, each in enumerate(seeds):
+        reports.measured(each, "maze-1-200", arrivals=5 + number)
+    (baseline,) = asked([{"source": "baseline", "name": "VFH+"}])
+    reports.measured(baseline, "maze-1-200", arrivals=3)
+    found = client.get("/api/field").json()
+    mine, untrained = found["asked"]
+    assert (mine["title"], mine["trained"]) == ("base", True)
+    assert (untrained["title"], untrained["trained"]) == ("VFH+", False)
+    cell = mine["cells"][found["families"].index("maze")]
+    assert cell["success"]["per_seed"] == [0.5, 0.6, 0.7]
+    assert (cell["success"]["unit"], cell["evaluation"]) == ("seeds", seeds[0]["id"])
+    assert cell["suite_hash"] == "hash-a"

@@ -19,6 +19,10 @@ def test_what_ships_is_on_the_boards_of_its_suites(client: TestClient) -> None:
     found = client.get(f"/api/leaderboards/{HASH}").json()
     assert found["suite"] == board["suite"] == CARD.results[0].suite
     assert len(found["entries"]) == board["entries"] == found["comparisons"] + 1
+    # A baseline has no seed that could have failed; a policy is one.
+    failed = {entry["kind"]: entry["success"]["failed"] for entry in found["entries"]}
+    assert failed["baseline"] is None
+    assert failed["shipped"]["seeds"] == 1
     rates = [entry["success"]["value"] for entry in found["entries"]]
     assert rates == sorted(rates, reverse=True)
     titles = {(entry["kind"], entry["title"]) for entry in found["entries"]}
@@ -50,6 +54,68 @@ def test_what_cannot_be_told_from_the_best_is_tied_with_it() -> None:
     assert fisher_exact((930, 1000), (900, 1000)) < 0.05
     # Equal rates share a rank.
     assert [entry.rank for entry in ranked("s", "h", [near, candidate("also", [184]), best]).entries] == [1, 2, 2]
+
+
+def test_episodes_of_several_seeds_are_never_counted_as_if_they_were_independent() -> None:
+    five = Candidate("training", "five", "five", [196, 192, 100, 190, 194], [200] * 5)
+    two = Candidate("training", "two", "two", [120, 130], [200] * 2)
+    baseline = Candidate("baseline", "VFH+", "VFH+", [160], [200])
+    weak = Candidate("baseline", "random", "random", [2], [200])
+    board = ranked("s", "h", [weak, five, two, baseline])
+    assert [(entry.title, entry.tied, entry.told_by) for entry in board.entries] == [
+        ("five", True, "best"),
+        ("VFH+", True, "seeds"),
+        ("two", True, "nothing"),
+        ("random", False, "seeds"),
+    ]
+    # 872 of 1,000 and 160 of 200 would be told apart, though one seed in five is worse than the baseline by far.
+    assert fisher_exact((872, 1000), (160, 200)) < 0.02
+    assert board.comparisons == 2
+    assert [entry.p is None for entry in board.entries] == [True, False, True, False]
+
+
+def test_of_many_comparisons_each_counts_for_less() -> None:
+    def candidate(name: str, arrivals: int) -> Candidate:
+        return Candidate("uploaded", name, name, [arrivals], [200])
+
+    # Alone 190 and 178 of 200 differ, as the first of five such pairs they do not (Holm 1979).
+    best, other = candidate("best", 190), candidate("0", 178)
+    assert not ranked("s", "h", [best, other]).entries[1].tied
+    many = ranked("s", "h", [best, *(candidate(str(number), 178) for number in range(5))])
+    assert [entry.tied for entry in many.entries] == [True] * 6
+    assert many.entries[1].p == min(1.0, 5 * fisher_exact((190, 200), (178, 200)))
+
+
+def test_the_seeds_of_a_training_are_one_entry(client: TestClient, reports: Reports) -> None:
+    experiment = reports.experiment("base", seeds=(0, 1, 2))
+    checkpoints = [
+        reports.checkpoint(run, step, Reports.evaluation(7 + run["seed"])) for run in experiment["runs"] for step in (1, 2)
+    ]
+    request = {"policies": [{"source": "checkpoint", "id": each} for each in checkpoints]}
+    asked = client.post("/api/evaluations", json=request).json()
+    for number, each in enumerate(asked):
+        reports.measured(each, arrivals=4 + number)
+    (entry,) = [each for each in client.get("/api/leaderboards/hash-a").json()["entries"] if each["kind"] == "evaluation"]
+    assert (entry["title"], entry["experiment_id"]) == ("base", experiment["id"])
+    # Of each run the checkpoint that was asked for last.
+    assert entry["evaluations"] == [asked[number]["id"] for number in (1, 3, 5)]
+    success = entry["success"]
+    assert success["per_seed"] == [0.5, 0.7, 0.9]
+    assert (success["unit"], success["seeds"], success["episodes"]) == ("seeds", 3, 30)
+    # SPL and steps are known of the training's own evaluations too.
+    (training,) = [each for each in client.get("/api/leaderboards/hash-a").json()["entries"] if each["kind"] == "training"]
+    assert 0.0 < training["spl"] <= training["success"]["value"]
+    assert training["steps"] == 80.0
+
+
+def test_what_was_asked_for_is_called_by_what_it_is(client: TestClient, reports: Reports) -> None:
+    (asked,) = client.post("/api/evaluations", json={"policies": [{"source": "baseline", "name": "VFH+"}]}).json()
+    reports.measured(asked)
+    (entry,) = client.get("/api/leaderboards/hash-a").json()["entries"]
+    assert (entry["kind"], entry["title"], entry["id"]) == ("baseline", "VFH+", asked["id"])
+    assert entry["evaluations"] == [asked["id"]]
+    # No seed of it could have failed.
+    assert entry["success"]["failed"] is None
 
 
 def test_trainings_and_evaluations_join_and_each_sees_their_own(

@@ -16,6 +16,7 @@ from workers.statistics.differences import (
     difference_of_rates,
     fisher_exact,
     rates_difference,
+    rates_less_policy,
 )
 from workers.statistics.improvement import performance_profile, probability_of_improvement
 from workers.statistics.intervals import exact_interval, student_t, upper_bound
@@ -27,7 +28,15 @@ from workers.statistics.seeds import (
     rates_band,
     success_rate,
 )
-from workers.statistics.significance import LEAST_P, holm, p_of_means, p_of_rates, paired_rates, paired_values
+from workers.statistics.significance import (
+    LEAST_P,
+    holm,
+    p_of_means,
+    p_of_rates,
+    p_of_seeds_and_policy,
+    paired_rates,
+    paired_values,
+)
 
 # --- of one policy ---
 
@@ -102,6 +111,33 @@ def test_what_few_seeds_leave_open() -> None:
 def test_a_hard_task_is_no_failure() -> None:
     """All seeds arrive in about 30 %: none is half as bad as the best."""
     assert failed_seeds([0.28, 0.31, 0.3]).failed == 0
+
+
+def test_half_of_what_is_useless_is_no_failure() -> None:
+    """1 and 2 %: half of the best, and yet neither is the odd one."""
+    useless = failed_seeds([0.01, 0.02])
+    assert (useless.failed, useless.told) == (0, False)
+    assert useless.sentence == "Even the best of 2 seeds arrives in 2 % only: which have failed can't be said."
+    assert not failed_seeds([0.19, 0.05, 0.0]).told
+    assert failed_seeds([0.2, 0.05, 0.2]).failed == 1
+
+
+def test_two_seeds_do_not_say_which_is_the_usual_one() -> None:
+    apart = failed_seeds([0.9, 0.3])
+    assert (apart.failed, apart.told) == (0, False)
+    assert apart.sentence.startswith("One of 2 seeds arrives at most half as often as the other")
+    assert failed_seeds([0.9, 0.8]).sentence == "None of 2 seeds failed: up to 78 % may (one-sided 95 %)."
+    # One that never arrives has failed whatever the other does; of three, the odd one is told.
+    assert failed_seeds([0.9, 0.0]).sentence.startswith("1 of 2 seeds failed")
+    assert failed_seeds([0.9, 0.3, 0.9]).failed == 1
+
+
+def test_an_interval_ends_where_the_measure_does() -> None:
+    """Two seeds of 21 and 126 steps: Student's t with one degree of freedom would go on to -594."""
+    samples = [np.array([21.0, 21.0]), np.array([126.0, 126.0])]
+    open_, cut = mean_over_seeds(samples), mean_over_seeds(samples, least=0.0)
+    assert open_.low == pytest.approx(73.5 - 12.706 * 52.5, abs=0.1)
+    assert (cut.value, cut.low, cut.high) == (open_.value, 0.0, open_.high)
 
 
 def test_mean_interval() -> None:
@@ -338,6 +374,19 @@ def test_p_is_where_the_interval_touches_zero() -> None:
     assert 0.0 < p < 0.05
     assert float(low[0]) == pytest.approx(0.0, abs=1e-4)
     assert difference_of_rates(better, worse).low > 0.0
+
+
+def test_seeds_against_a_policy_that_has_none() -> None:
+    """80 of 100 stand on their episodes alone; a seed that fails keeps the others from telling."""
+    steady, spread = Rates([980, 985, 990, 980, 985], [1_000] * 5), Rates([980, 985, 200, 980, 985], [1_000] * 5)
+    assert p_of_seeds_and_policy(steady, 80, 100) < 1e-4
+    assert p_of_seeds_and_policy(spread, 80, 100) > 0.5
+    # The fewer episodes the policy has, the less is known of it.
+    few = p_of_seeds_and_policy(steady, 8, 10)
+    assert 0.001 < few < 0.2
+    rates, driven = arrival_rates(steady)
+    _, low, _ = rates_less_policy(rates, driven, 8, 10, 1.0 - few)
+    assert float(low[0]) == pytest.approx(0.0, abs=1e-3)
 
 
 def test_holm_as_worked_in_his_paper() -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.statistics.intervals import CONFIDENCE, Floats, student_t
+from workers.statistics.intervals import CONFIDENCE, Floats, exact_interval, student_t
 from workers.statistics.seeds import Band, rates_band
 
 LEAST_SEEDS = 5
@@ -115,6 +115,31 @@ def rates_difference(
         value,
         np.minimum(welch_low, value - np.hypot(mean - low, other_high - other)),
         np.maximum(welch_high, value + np.hypot(high - mean, other - other_low)),
+    )
+
+
+def rates_less_policy(rates: Floats, episodes: Floats, arrivals: int, driven: int, confidence: float = CONFIDENCE) -> Band:
+    """Mean rate of the seeds less that of one very policy, which has none, with its interval at each point.
+
+    The wider, at either end, of Student's t on the seeds' rates and of what is made of the interval over seeds and the exact
+    one of the policy's episodes, as in `rates_difference`.
+
+    Args:
+        rates: (seeds, points), 0 to 1, of at least two seeds.
+        episodes: (seeds, points) behind each, or (seeds, 1).
+        arrivals: of the policy.
+        driven: its episodes.
+        confidence: of the interval.
+    """
+    mean, low, high = rates_band(rates, episodes, confidence)
+    policy_low, policy_high = exact_interval(arrivals, driven, confidence)
+    policy = arrivals / driven
+    value = mean - policy
+    reach = student_t(len(rates) - 1, confidence) * rates.std(axis=0, ddof=1) / len(rates) ** 0.5
+    return (
+        value,
+        np.minimum(value - reach, value - np.hypot(mean - low, policy_high - policy)),
+        np.maximum(value + reach, value + np.hypot(high - mean, policy - policy_low)),
     )
 
 

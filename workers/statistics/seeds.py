@@ -21,37 +21,52 @@ Band = tuple[Floats, Floats, Floats]
 """Mean, low and high, (points,) each."""
 
 
+USELESS = 0.2
+"""Where even the best seed arrives less often, half of it tells nothing: 1 % and 2 % have failed alike."""
+
+
 class FailedSeeds(Frozen):
     """What a few seeds leave open about those that were not trained.
 
-    A seed has failed if it arrives at most half as often as the best of them, or never.
+    A seed has failed if it arrives at most half as often as the best of them, or never. Where even the best hardly arrives
+    (`USELESS`), or the worse of two is that bad, half of the best tells nothing: which have failed is not said then.
 
     Attributes:
         failed: seeds that have.
         seeds: of so many.
         at_most: share of all seeds that may fail, one-sided 95 %, exact.
         sentence: the same in words.
+        told: whether these seeds can say at all which of them have failed; else `failed` counts those that never arrive.
     """
 
     failed: int
     seeds: int
     at_most: float
     sentence: str
+    told: bool = True
 
 
 def failed_seeds(rates: Sequence[float]) -> FailedSeeds:
     """What the success rates of at least one seed leave open."""
-    half = max(rates) / 2
-    failed, seeds = sum(rate <= half for rate in rates), len(rates)
+    best, seeds = max(rates), len(rates)
+    useless = seeds > 1 and 0.0 < best < USELESS
+    doubtful = seeds == 2 and not useless and 0.0 < min(rates) <= best / 2
+    told = not useless and not doubtful
+    failed = sum(rate <= (best / 2 if told else 0.0) for rate in rates)
     at_most = upper_bound(failed, seeds)
     if seeds == 1:
         sentence = f"One seed alone: of others up to {at_most:.0%} may fail (one-sided 95 %)."
     elif failed == seeds:
         sentence = f"All {seeds} seeds failed."
+    elif useless:
+        sentence = f"Even the best of {seeds} seeds arrives in {best:.0%} only: which have failed can't be said."
+    elif doubtful:
+        sentence = "One of 2 seeds arrives at most half as often as the other: which is the usual one two can't say."
     else:
         count = "None" if failed == 0 else str(failed)
         sentence = f"{count} of {seeds} seeds failed: up to {at_most:.0%} may (one-sided 95 %)."
-    return FailedSeeds(failed=failed, seeds=seeds, at_most=at_most, sentence=sentence.replace("%", " %").replace("  ", " "))
+    words = sentence.replace("%", " %").replace("  ", " ")
+    return FailedSeeds(failed=failed, seeds=seeds, at_most=at_most, sentence=words, told=told)
 
 
 def success_rate(arrivals: Sequence[float], episodes: Sequence[float], confidence: float = CONFIDENCE) -> Interval:
@@ -74,12 +89,13 @@ def success_rate(arrivals: Sequence[float], episodes: Sequence[float], confidenc
     return _first(rates_band((arrived / driven)[:, None], driven[:, None], confidence))
 
 
-def mean_over_seeds(episodes: Sequence[Floats], confidence: float = CONFIDENCE) -> Interval:
+def mean_over_seeds(episodes: Sequence[Floats], confidence: float = CONFIDENCE, least: float | None = None) -> Interval:
     """Mean over seeds of each seed's mean over its episodes, see `means_band`; of one seed Student's t over its episodes.
 
     Args:
         episodes: the values of each seed's episodes; seeds may have different numbers of them, none may have none.
         confidence: of the interval.
+        least: what the measure can't be below, where the interval ends; None where it has no such end.
 
     Raises:
         ValueError: no seeds, or a seed without episodes.
@@ -87,10 +103,10 @@ def mean_over_seeds(episodes: Sequence[Floats], confidence: float = CONFIDENCE) 
     if not episodes or any(values.size == 0 for values in episodes):
         raise ValueError("every seed needs at least one episode")
     if len(episodes) == 1:
-        return mean_interval(episodes[0].tolist(), confidence)
+        return _from(least, mean_interval(episodes[0].tolist(), confidence))
     means = np.array([[values.mean()] for values in episodes])
     errors = np.array([[values.std(ddof=1) / values.size**0.5 if values.size > 1 else 0.0] for values in episodes])
-    return _first(means_band(means, errors, confidence))
+    return _from(least, _first(means_band(means, errors, confidence)))
 
 
 def mean_interval(values: Sequence[float], confidence: float = CONFIDENCE) -> Interval:
@@ -181,6 +197,10 @@ def _spread(values: Floats) -> Band:
         mean = np.where(present, values, 0.0).sum(axis=0) / count
         squares = (np.where(present, values - mean, 0.0) ** 2).sum(axis=0)
         return count, np.where(count > 0, mean, np.nan), np.sqrt(squares / (count - 1) / count)
+
+
+def _from(least: float | None, interval: Interval) -> Interval:
+    return interval if least is None else Interval(interval.value, max(interval.low, least), interval.high)
 
 
 def _first(band: Band) -> Interval:

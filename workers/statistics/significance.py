@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workers.statistics.differences import Rates, arrival_rates, rates_difference, welch
+from workers.statistics.differences import Rates, arrival_rates, rates_difference, rates_less_policy, welch
 from workers.statistics.intervals import Floats
 
 LEAST_P = 1e-9
@@ -43,6 +43,18 @@ def p_of_rates(first: Rates, second: Rates) -> float:
     """Two-sided p of two mean success rates being one: at 1 - p the interval of `rates_difference` just touches zero."""
     (one, driven), (other, other_driven) = arrival_rates(first), arrival_rates(second)
     return _least_level(lambda confidence: rates_difference(one, driven, other, other_driven, confidence)[1:])
+
+
+def p_of_seeds_and_policy(seeds: Rates, arrivals: int, driven: int) -> float:
+    """Two-sided p of the mean success rate of seeds being that of one very policy, see `rates_less_policy`.
+
+    Args:
+        seeds: at least two.
+        arrivals: of the policy.
+        driven: its episodes.
+    """
+    rates, episodes = arrival_rates(seeds)
+    return _least_level(lambda confidence: rates_less_policy(rates, episodes, arrivals, driven, confidence)[1:])
 
 
 def p_of_means(first: Sequence[float], second: Sequence[float]) -> float:

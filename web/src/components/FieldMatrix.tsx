@@ -3,7 +3,8 @@ import { Anchor, Skeleton, Table, Text } from '@mantine/core'
 import { Link } from 'react-router'
 import { $api } from '../api/client'
 import type { FieldMatrix as Matrix } from '../api/types'
-import { percent, percentRange, words } from '../lib/format'
+import { count, percent, percentRange, words } from '../lib/format'
+import { endedSo } from '../lib/useArrangement'
 import experiments from './ExperimentTable.module.css'
 import classes from './FieldMatrix.module.css'
 import { Panel, QueryError } from './ui'
@@ -37,7 +38,10 @@ function Loaded({ matrix }: { matrix: Matrix }) {
         The family that is hardest for these policies comes first. An attempt lasts 500 steps, or four times
         as long as the shortest path takes.
       </Text>
-      <Table.ScrollContainer type="native" minWidth={860} tabIndex={0}>
+      <Text size="xs" c="dimmed" className={classes.more}>
+        {families.length} families: scroll the table to the right for the rest.
+      </Text>
+      <Table.ScrollContainer type="native" minWidth={860} tabIndex={0} className={classes.scroll}>
         <Table className={`${experiments.table} ${classes.matrix}`} aria-label="Success by family">
           <Table.Thead>
             <Table.Tr>
@@ -84,6 +88,7 @@ interface RowsProps {
 }
 
 function Rows({ title, drivers, columns, children }: RowsProps) {
+  const measured = drivers.filter(({ cells }) => cells.some((cell) => cell !== null))
   return (
     <Table.Tbody>
       <Table.Tr>
@@ -91,8 +96,11 @@ function Rows({ title, drivers, columns, children }: RowsProps) {
           {title}
         </Table.Th>
       </Table.Tr>
-      {drivers.map((driver) => (
-        <Table.Tr key={`${driver.trained} ${driver.title}`} data-testid="field-row">
+      {measured.map((driver) => (
+        <Table.Tr
+          key={`${driver.trained} ${driver.title} ${driver.cells.find(Boolean)?.evaluation}`}
+          data-testid="field-row"
+        >
           <Table.Th scope="row" className={`${classes.who} ${driver.trained ? classes.trained : ''}`}>
             {driver.policy ? (
               <Anchor component={Link} to={`/policies/${driver.policy}`} size="sm" fw={550}>
@@ -104,15 +112,15 @@ function Rows({ title, drivers, columns, children }: RowsProps) {
               words(driver.title)
             )}
           </Table.Th>
-          {driver.cells.map((cell, index) => (
+          {driver.cells.map((cell, family) => (
             // biome-ignore lint/suspicious/noArrayIndexKey: a column is a family, and stays where it is
-            <Table.Td key={index}>
+            <Table.Td key={family}>
               {cell ? <Measured cell={cell} /> : <span className={ui.quiet}>–</span>}
             </Table.Td>
           ))}
         </Table.Tr>
       ))}
-      {drivers.length === 0 && (
+      {measured.length === 0 && (
         <Table.Tr>
           <Table.Td colSpan={columns + 1}>{children}</Table.Td>
         </Table.Tr>
@@ -123,12 +131,17 @@ function Rows({ title, drivers, columns, children }: RowsProps) {
 
 function Measured({ cell }: { cell: Cell }) {
   const { value, low, high, seeds, episodes, failed } = cell.success
+  // Several seeds have an evaluation each: the board of the suite has them together.
+  const address =
+    seeds > 1 && cell.suite_hash
+      ? `/leaderboards/${cell.suite_hash}`
+      : `/evaluations/${cell.evaluation}${endedSo('arrival')}`
   const rate = <strong>{percent(value)}</strong>
-  const behind = `${seeds > 1 ? `${seeds} seeds, ` : ''}${episodes} episodes, ${percent(cell.collision)} collisions.`
+  const behind = `${seeds > 1 ? `${seeds} seeds, ` : ''}${count(episodes)} episodes, ${percent(cell.collision)} collisions.`
   return (
     <span className={`${ui.number} ${classes.cell}`} title={`${behind} ${failed?.sentence ?? ''}`.trim()}>
       {cell.evaluation ? (
-        <Anchor component={Link} to={`/evaluations/${cell.evaluation}`} size="sm">
+        <Anchor component={Link} to={address} size="sm">
           {rate}
         </Anchor>
       ) : (
@@ -136,7 +149,7 @@ function Measured({ cell }: { cell: Cell }) {
       )}
       <span className={ui.quiet}>{percentRange(low, high)}</span>
       <span className={ui.quiet}>
-        worst tenth {cell.worst_tenth_spl.toFixed(2)}, N = {episodes}
+        worst tenth {cell.worst_tenth_spl.toFixed(2)}, N = {count(episodes)}
       </span>
     </span>
   )

@@ -9,6 +9,7 @@ import { Page, Panel, QueryError } from '../components/ui'
 import ui from '../components/ui.module.css'
 import { plural, significant, words } from '../lib/format'
 import { useTitle } from '../lib/hooks'
+import { endedSo } from '../lib/useArrangement'
 
 type Entry = Leaderboard['entries'][number]
 
@@ -107,24 +108,46 @@ function Board({ hash }: { hash: string }) {
       <Text size="xs" c="dimmed">
         {plural(tied, 'entry').replace('entrys', 'entries')} can't be told from the best, itself included.{' '}
         {data.comparisons > 0 &&
-          `${plural(data.comparisons, 'comparison')} with it stand here: of so many, some differ by chance. `}
-        Entries of five seeds or more are told apart over seeds, all others over the episodes of these very
-        policies, which says nothing of another seed. Hash {data.suite_hash.slice(0, 12)}.
+          `${plural(data.comparisons, 'test')} against it stand here, adjusted for how many they are (Holm). `}
+        Entries of five seeds or more are told over their seeds; single policies by the episodes of these very
+        policies, which says nothing of another seed; of two to four seeds nothing is told. Hash{' '}
+        {data.suite_hash.slice(0, 12)}.
       </Text>
     </Stack>
   )
 }
 
-const KINDS: Record<Entry['kind'], { label: string; to: (id: string) => string | null }> = {
-  shipped: { label: 'Shipped', to: (id) => `/policies/${id}` },
-  training: { label: 'Training', to: (id) => `/experiments/${id}` },
-  evaluation: { label: 'Evaluation', to: (id) => `/evaluations/${id}` },
-  baseline: { label: 'Untrained', to: () => null },
+const KINDS: Record<Entry['kind'], string> = {
+  shipped: 'Shipped',
+  training: 'Training',
+  evaluation: 'Evaluation',
+  baseline: 'Untrained',
+  uploaded: 'Uploaded',
+}
+
+/** Where more is to be seen of an entry: of several seeds their training, else the evaluation, or what ships. */
+function addressOf({ kind, id, experiment_id, evaluations }: Entry): string | null {
+  if (experiment_id && evaluations?.length !== 1) return `/experiments/${experiment_id}`
+  if (evaluations?.[0]) return `/evaluations/${evaluations[0]}`
+  return kind === 'shipped' ? `/policies/${id}` : null
+}
+
+/** "Tied", or "Not told" where there is no test that could tell. */
+function wordOf({ tied, told_by }: Entry): string {
+  if (told_by === 'nothing') return 'Not told'
+  return tied ? 'Tied' : 'Below'
+}
+
+/** Why it is called so. */
+function reasonOf({ told_by, p }: Entry): string {
+  if (told_by === 'nothing') return 'Two to four seeds tell nothing'
+  const adjusted = p == null ? '' : `, p ${p < 0.001 ? '< 0.001' : `= ${p.toFixed(3)}`} after all tests here`
+  return `Told by ${told_by}${adjusted}`
 }
 
 function Row({ entry }: { entry: Entry }) {
-  const { label, to } = KINDS[entry.kind]
-  const address = to(entry.id)
+  const address = addressOf(entry)
+  const only = entry.evaluations?.length === 1 ? entry.evaluations[0] : undefined
   const title = entry.kind === 'baseline' ? words(entry.title) : entry.title
   return (
     <Table.Tr data-testid="entry" data-tied={entry.tied || undefined}>
@@ -140,11 +163,23 @@ function Row({ entry }: { entry: Entry }) {
           title
         )}
         <Text size="xs" c="dimmed">
-          {label}
+          {KINDS[entry.kind]}
         </Text>
       </Table.Td>
       <Table.Td>
-        <SuccessEstimate estimate={entry.success} />
+        {only !== undefined ? (
+          <Anchor
+            component={Link}
+            to={`/evaluations/${only}${endedSo('arrival')}`}
+            c="inherit"
+            size="sm"
+            title="Its episodes"
+          >
+            <SuccessEstimate estimate={entry.success} />
+          </Anchor>
+        ) : (
+          <SuccessEstimate estimate={entry.success} />
+        )}
       </Table.Td>
       <Table.Td visibleFrom="sm">
         {entry.told_by === 'best' ? (
@@ -152,8 +187,8 @@ function Row({ entry }: { entry: Entry }) {
             Best
           </Badge>
         ) : (
-          <Text size="sm" c={entry.tied ? 'inherit' : 'dimmed'} title={`Told by ${entry.told_by}`}>
-            {entry.tied ? 'Tied' : 'Below'}
+          <Text size="sm" c={entry.tied ? 'inherit' : 'dimmed'} title={reasonOf(entry)}>
+            {wordOf(entry)}
           </Text>
         )}
       </Table.Td>

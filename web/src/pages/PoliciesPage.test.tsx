@@ -65,7 +65,28 @@ test('every family stands there, the hardest first, beside baselines that see as
   )
   expect(baseline).toHaveTextContent(/Dynamic window18\.0\s%.*–$/)
   expect(mine).toHaveTextContent(/Mine, step 200–93\.0\s%/)
-  expect(within(mine as HTMLElement).getByRole('link')).toHaveAttribute('href', '/evaluations/ev1')
+  expect(within(mine as HTMLElement).getByRole('link')).toHaveAttribute(
+    'href',
+    '/evaluations/ev1?outcome=arrival',
+  )
+})
+
+test('seeds of a training lead to the board that has them together, and what was never measured is left out', async () => {
+  const seen = field.asked[0]?.cells[1]
+  if (!seen) throw new Error('no cell')
+  const seeds = { ...seen, success: { ...seen.success, seeds: 3, episodes: 1500 } }
+  const base = { title: 'base', policy: null, trained: true }
+  const asked = [
+    { ...base, cells: [null, seeds] },
+    { ...base, title: 'Nowhere', cells: [null, null] },
+  ]
+  startServer({ ...routes, 'GET /api/field': { ...field, asked } })
+  open('/policies')
+  const row = (await screen.findByText('base')).closest('tr') as HTMLElement
+  expect(within(row).getByRole('link')).toHaveAttribute('href', '/leaderboards/abc')
+  expect(row).toHaveTextContent(/N = 1\s500/)
+  expect(screen.queryByText('Nowhere')).not.toBeInTheDocument()
+  expect(screen.getByText(/scroll the table to the right/)).toBeInTheDocument()
 })
 
 test('where nothing was asked for, it says how', async () => {

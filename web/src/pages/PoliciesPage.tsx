@@ -1,6 +1,7 @@
 /** The policies that ship with Mapless: a good robot to watch before training one. */
 import { Button, Skeleton, Text } from '@mantine/core'
-import { Link } from 'react-router'
+import { useEffect, useRef } from 'react'
+import { Link, useLocation } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
 import { ArenaPicture } from '../components/ArenaPicture'
@@ -27,6 +28,11 @@ export function PoliciesPage() {
   const { data, error, refetch } = $api.useQuery('get', '/api/policies', undefined, {
     staleTime: Number.POSITIVE_INFINITY,
   })
+  const { hash } = useLocation()
+  const families = useRef<HTMLDivElement>(null)
+  useEffect(() => {
+    if (hash === '#families') families.current?.scrollIntoView?.()
+  }, [hash])
   return (
     <Page {...HEADS.PoliciesPage}>
       {error && !data ? (
@@ -44,7 +50,7 @@ export function PoliciesPage() {
             : [0, 1, 2, 3].map((key) => <Skeleton key={key} height={CARD_HEIGHT} />)}
         </ul>
       )}
-      <div className={classes.matrix}>
+      <div className={classes.matrix} id="families" ref={families}>
         <Below height={500}>
           <FieldMatrix />
         </Below>
