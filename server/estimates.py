@@ -7,9 +7,10 @@ import numpy as np
 
 from server.schemas import Estimate, SeedMean
 from workers.statistics.intervals import Floats, Interval
-from workers.statistics.seeds import FailedSeeds, failed_seeds, mean_over_seeds, means_band, rates_band, success_rate
+from workers.statistics.seeds import Band, FailedSeeds, failed_seeds, mean_over_seeds, means_band, rates_band, success_rate
 
 _RATE, _LEARNING_RATE = "_rate", "learning_rate"
+_STEPS = "/steps"
 # Lists ask for the same ones again and again.
 _REMEMBERED = 8_192
 
@@ -32,22 +33,37 @@ def _success(arrivals: tuple[int, ...], episodes: tuple[int, ...], trained: bool
     return _estimate(success_rate(arrivals, episodes), rates, sum(episodes), failed)
 
 
-def mean_estimate(samples: Sequence[Floats]) -> Estimate | None:
+def mean_estimate(samples: Sequence[Floats], *, least: float | None = None) -> Estimate | None:
     """Mean over the seeds that have any episode to show; None where none has.
 
     Args:
         samples: the values of each seed's episodes.
+        least: what the measure can't be below; None where there is nothing of the kind.
     """
     shown = [values for values in samples if values.size]
     if not shown:
         return None
     means = [float(values.mean()) for values in shown]
-    return _estimate(mean_over_seeds(shown), means, sum(values.size for values in shown), None)
+    return _estimate(mean_over_seeds(shown, least=least), means, sum(values.size for values in shown), None)
 
 
 def is_rate(name: str) -> bool:
     """Whether a metric is a share, 0 to 1, whose interval ends there."""
     return name.endswith(_RATE) and not name.endswith(_LEARNING_RATE)
+
+
+def metric_band(name: str, values: Floats, episodes: Floats | None = None) -> Band:
+    """A metric's mean over runs with its interval at each point, which ends where the metric does.
+
+    Args:
+        name: of the metric.
+        values: (runs, points); nan where a run has none.
+        episodes: (runs, points) behind each, or (runs, 1), of a rate; None where they are not known.
+    """
+    if is_rate(name):
+        return rates_band(values, episodes)
+    mean, low, high = means_band(values)
+    return mean, np.maximum(low, 0.0) if name.endswith(_STEPS) else low, high
 
 
 def last_values(name: str, values: Floats) -> list[SeedMean | None]:
@@ -62,7 +78,7 @@ def last_values(name: str, values: Floats) -> list[SeedMean | None]:
     """
     if values.size == 0:
         return [None] * values.shape[1]
-    mean, low, high = rates_band(values) if is_rate(name) else means_band(values)
+    mean, low, high = metric_band(name, values)
     runs = np.isfinite(values).sum(axis=0)
     return [
         _seed_mean(*figures) if figures[-1] else None

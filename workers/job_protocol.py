@@ -22,6 +22,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from sim.config import AnyArenaConfig, ArenaFile, Frozen, TaskConfig
+from sim.kernels.room import MAX_TERMS
 from workers.bags.results import TopicChoice
 from workers.film_protocol import Film
 from workers.play_protocol import PlayOrders
@@ -224,6 +225,15 @@ JobSpec = Annotated[ViewJob | PlayJob | ReplayJob | FilmJob | BagJob | ExportJob
 JOB_SPEC: TypeAdapter[ViewJob | PlayJob | ReplayJob | FilmJob | BagJob | ExportJob | EvaluateJob] = TypeAdapter(JobSpec)
 
 
+SLOW_BASELINES: frozenset[str] = frozenset({"MPPI", "mapping, A* and dynamic window"})
+"""They plan anew at every step: minutes for what takes others seconds."""
+
+
+def is_long(spec: JobSpec) -> bool:
+    """Whether a job goes on for minutes: it keeps no place that what takes seconds could have."""
+    return isinstance(spec, EvaluateJob) and isinstance(spec.policy, BaselineName) and spec.policy.name in SLOW_BASELINES
+
+
 class Measurement(Frozen):
     """What comes out of an evaluation that was asked for.
 
@@ -235,6 +245,8 @@ class Measurement(Frozen):
         targets: (S,) x and y of each, metres.
         ways: (S,) where each robot drove: up to `MAX_WAY_POINTS` points x, y from its start to its end, metres.
         jerks: (S,) mean size of the jerk along each robot's heading, m/s3; 0 for episodes of fewer than three steps.
+        terms: names of the reward's terms; none from workers of before they were told apart.
+        returns: (S, terms) each term summed over each episode; empty where no term is named.
     """
 
     result: EvaluationResult
@@ -244,6 +256,8 @@ class Measurement(Frozen):
     targets: tuple[Point, ...]
     ways: tuple[tuple[Point, ...], ...]
     jerks: tuple[Figure, ...]
+    terms: tuple[Annotated[str, Field(min_length=1, max_length=200)], ...] = Field((), max_length=MAX_TERMS)
+    returns: tuple[tuple[Figure, ...], ...] = ()
 
     @model_validator(mode="after")
     def _one_each(self) -> Self:
@@ -254,6 +268,10 @@ class Measurement(Frozen):
             raise ValueError("an episode's arena is not among the arenas")
         if any(len(way) > MAX_WAY_POINTS for way in self.ways):
             raise ValueError(f"a way has at most {MAX_WAY_POINTS} points")
+        if len(self.returns) != (len(self.result.episodes) if self.terms else 0):
+            raise ValueError("every episode has its returns by term where terms are named")
+        if any(len(row) != len(self.terms) for row in self.returns):
+            raise ValueError("every term has its return in every episode")
         return self
 
 
@@ -265,6 +283,7 @@ class JobClaimRequest(Frozen):
         claim_id: chosen by the worker, new for each job that it takes up: asked again under the same id, because the answer
             got lost, the server grants the same attempt once more.
         kinds: that this place takes.
+        long: whether it takes what goes on for minutes (`is_long`).
         extensions: that the worker has.
         wait_seconds: for a job to come.
     """
@@ -272,6 +291,7 @@ class JobClaimRequest(Frozen):
     worker: WorkerName
     claim_id: str = Field(pattern="^[0-9a-f]{32}$")
     kinds: tuple[JobKind, ...] = Field(min_length=1, max_length=len(KINDS))
+    long: bool = True
     extensions: Extensions = ()
     wait_seconds: float = Field(10.0, ge=0.0, le=30.0)
 

@@ -13,7 +13,7 @@ from sim.arrays import Floats
 from sim.config import TaskConfig
 from sim.observations import observation_layout
 from workers.errors import ForeignPolicyError
-from workers.export.graph import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
+from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
 from workers.onnx_runtime import session
 
 MAX_MEMORY = 65_536

@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from server.evaluations import service
+from server.evaluations.export import MEDIA, ExportFormat
 from server.evaluations.repository import Wanted
 from server.evaluations.schemas import (
     AskedEpisodes,
@@ -15,12 +16,20 @@ from server.evaluations.schemas import (
 )
 from server.http.conditional import NOT_MODIFIED, KeptDep
 from server.http.paging import WindowDep
-from server.http.problems import CONFLICT, NOT_FOUND
+from server.http.problems import CONFLICT, NOT_FOUND, Responses
 from server.security.permissions import LAUNCH, SIGNED_IN, edit, view
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 
 router = APIRouter(prefix="/api/evaluations", tags=["evaluations"])
+
+_FILES: Responses = {
+    200: {
+        "content": {
+            media: {"schema": {"type": "object" if media == MEDIA["json"] else "string"}} for media in MEDIA.values()
+        }
+    }
+}
 
 
 @router.post("", status_code=202, responses=NOT_FOUND, dependencies=[LAUNCH])
@@ -52,6 +61,32 @@ def list_evaluation_episodes(evaluation_id: str, services: ServicesDep, kept: Ke
     """Every episode behind its figures, in the suite's order."""
     kept.unless(evaluation_id, service.measured_on(services, evaluation_id))
     return service.episodes(services, evaluation_id)
+
+
+@router.get(
+    "/{evaluation_id}/export",
+    response_class=Response,
+    responses=NOT_FOUND | NOT_MODIFIED | _FILES,
+    dependencies=[view("evaluation_id")],
+)
+def export_evaluation(
+    evaluation_id: str,
+    services: ServicesDep,
+    kept: KeptDep,
+    wanted: Annotated[
+        ExportFormat,
+        Query(
+            alias="format",
+            description="csv: an episode in a row, with its return by the reward's terms where these were kept. "
+            "json: the same with the figures. latex (booktabs), markdown: the figures with N and 95 % intervals.",
+        ),
+    ] = "csv",
+) -> Response:
+    """An evaluation as a file."""
+    headers = kept.unless(evaluation_id, wanted, service.measured_on(services, evaluation_id))
+    file = service.export(services, evaluation_id, wanted)
+    headers = {**headers, "Content-Disposition": f'attachment; filename="{file.name}"'}
+    return Response(file.content, media_type=MEDIA[wanted], headers=headers)
 
 
 @router.get("/{evaluation_id}/ways", responses=NOT_FOUND, dependencies=[view("evaluation_id")])

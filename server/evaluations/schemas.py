@@ -15,6 +15,9 @@ from workers.reporting import EpisodeResult, Outcome
 MAX_AT_ONCE = 100
 """Evaluations that one request may ask for."""
 
+MAX_BEHIND = 20
+"""Of the evaluations before one that waits, so many are named."""
+
 
 class TrainingPolicies(Schema):
     """The best checkpoint of each run of a training."""
@@ -39,6 +42,13 @@ class EvaluationRequest(Schema):
         return self
 
 
+class TermReturn(Schema):
+    """What a term of the reward comes to."""
+
+    name: str = Field(description="As curves and settings have it.")
+    value: float = Field(description="Mean of the episodes' sums.")
+
+
 class EvaluationFigures(Schema):
     """How a policy did; rates are shares of the episodes, 0 to 1."""
 
@@ -54,6 +64,9 @@ class EvaluationFigures(Schema):
     min_clearance: float = Field(description="Mean of the episodes' smallest distance to anything else, metres.")
     jerk: float = Field(description="Mean size of the jerk along the heading, m/s3.")
     reward: float = Field(description="By the policy's own reward, mean of the episodes' sums.")
+    terms: list[TermReturn] | None = Field(
+        None, description="The same by the reward's terms, in its order; null where it was measured before these were kept."
+    )
 
 
 class AskedEvaluation(Schema):
@@ -71,6 +84,8 @@ class AskedEvaluation(Schema):
     seconds_left: float | None = Field(description="Null where that is not known yet, and once it has ended.")
     error: str | None
     waits_for: list[UsedExtension] = Field(description=WAITS_FOR)
+    behind: list[str] = Field([], description="While it waits: evaluations under way, then those that go before it.")
+    starts_in: float | None = Field(None, description="Seconds, about; null where others go first, or it is not known yet.")
     suite: str | None = Field(description="Its name; null until it is measured.")
     suite_hash: str | None
     figures: EvaluationFigures | None = Field(description="Null until it is measured.")
@@ -86,6 +101,36 @@ class AskedEpisodes(Schema):
     suite: str | None
     suite_hash: str | None
     episodes: tuple[EpisodeResult, ...]
+    maps: tuple[str, ...] = Field((), description="The arena of each, by name; empty where they took too much room to keep.")
+    spl: tuple[float, ...] = Field((), description="Of each: shortest path over the driven one, 0 where it did not arrive.")
+
+
+class ExportedEpisode(Schema):
+    """An episode as it leaves; what was not kept is null."""
+
+    scenario: int = Field(description="Its place in the suite, from 1, as pages count.")
+    map: str | None
+    outcome: Outcome
+    steps: int
+    seconds: float
+    path_length: float
+    shortest_path: float
+    spl: float = Field(description="Shortest path over the driven one, 0 where it did not arrive.")
+    clearance: float
+    jerk: float | None
+    reward: float = Field(description="Its sum: the return.")
+    terms: dict[str, float] | None = Field(description="The return by the reward's terms.")
+
+
+class ExportedEvaluation(Schema):
+    """An evaluation as it leaves."""
+
+    id: str
+    title: str
+    suite: str
+    suite_hash: str
+    figures: EvaluationFigures
+    episodes: list[ExportedEpisode]
 
 
 class Way(Schema):

@@ -1,16 +1,21 @@
 """What a person may do with evaluations: ask for some, look at them, call them off, delete them."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from server.database import tables
 from server.errors import ConflictError, InvalidRequestError, NotFoundError, UnusableArenaError
+from server.evaluations.export import EvaluationFile, ExportFormat, exported
+from server.evaluations.figures import merits
+from server.evaluations.pairings import refuse_impossible
 from server.evaluations.repository import PolicyEvaluationRepository, Wanted, episodes_of
 from server.evaluations.schemas import (
     MAX_AT_ONCE,
+    MAX_BEHIND,
     AskedEpisodes,
     AskedEvaluation,
     AskedEvaluationPage,
@@ -18,13 +23,14 @@ from server.evaluations.schemas import (
     EvaluationRequest,
     EvaluationWays,
 )
-from server.evaluations.subjects import Measured, measured, wanted_policies
-from server.evaluations.ways import ways_in
+from server.evaluations.subjects import Measured, measured, suite_title, wanted_policies
+from server.evaluations.ways import unpacked, ways_in
 from server.http.paging import Window
 from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.repository import OPEN, JobRepository
 from server.jobs.service import JobService, queue
+from server.jobs.turns import Turn
 from server.jobs.views import seconds_left
 from server.replays.simulator import simulator
 from server.replays.subject import Subject
@@ -54,7 +60,7 @@ def ask(services: Services, request: EvaluationRequest, principal: Principal) ->
     Raises:
         NotFoundError: there is no such policy, or it may not be seen; or no such suite.
         UnusableArenaError: the imported arena is not here.
-        InvalidRequestError: these are too many at once, or a suite has no scenario.
+        InvalidRequestError: these are too many at once, a suite has no scenario, or is for another robot than a policy's.
         BusyError: as many jobs wait as may.
     """
     choices = [_with_scenarios(services, _with_stored_arena(services, suite)) for suite in request.suites]
@@ -66,14 +72,15 @@ def ask(services: Services, request: EvaluationRequest, principal: Principal) ->
                 f"These are {len(policies) * len(choices)} evaluations, one for each run of a training: "
                 f"ask for at most {MAX_AT_ONCE} at once."
             )
+        refuse_impossible([subject for _, subject in policies], choices)
         for policy, subject in policies:
             for choice in choices:
                 evaluation = _queued(session, subject, EvaluateJob(policy=policy, suite=choice))
                 job = session.get(tables.Job, evaluation.job_id)
                 asked.append((evaluation, job, PolicyEvaluationRepository(session).run_of(evaluation)))
     services.board.ring()
-    lacking = JobService(services).lacking_each(job for _, job, _ in asked if job is not None)
-    return [_view(services, *each, lacking) for each in asked]
+    waiting = _waiting(services, [job for _, job, _ in asked if job is not None])
+    return [_view(services, *each, waiting) for each in asked]
 
 
 def _queued(session: Session, subject: Measured, spec: EvaluateJob) -> tables.PolicyEvaluation:
@@ -82,7 +89,7 @@ def _queued(session: Session, subject: Measured, spec: EvaluateJob) -> tables.Po
     if evaluation is None:
         evaluation = tables.PolicyEvaluation(
             id=new_id(),
-            job_id=queue(session, Asked(spec, key, subject.title, subject.sha256)),
+            job_id=queue(session, Asked(spec, key, f"{subject.title} on {suite_title(spec.suite)}", subject.sha256)),
             key=key,
             title=subject.title[:200],
             policy=spec.policy.model_dump(mode="json"),
@@ -100,9 +107,9 @@ def some(services: Services, window: Window, wanted: Wanted) -> AskedEvaluationP
     with services.database.read() as session:
         rows, total = PolicyEvaluationRepository(session).page(window, wanted)
         jobs = JobRepository(session).several([row.job_id for row, _ in rows])
-    lacking = JobService(services).lacking_each(jobs.values())
+    waiting = _waiting(services, list(jobs.values()))
     return AskedEvaluationPage(
-        items=[_view(services, row, jobs.get(row.job_id), run_id, lacking) for row, run_id in rows], total=total
+        items=[_view(services, row, jobs.get(row.job_id), run_id, waiting) for row, run_id in rows], total=total
     )
 
 
@@ -116,8 +123,7 @@ def one(services: Services, evaluation_id: str) -> AskedEvaluation:
         repository = PolicyEvaluationRepository(session)
         evaluation = repository.get(evaluation_id)
         job, run_id = session.get(tables.Job, evaluation.job_id), repository.run_of(evaluation)
-    lacking = JobService(services).lacking_each([job] if job is not None else [])
-    return _view(services, evaluation, job, run_id, lacking)
+    return _view(services, evaluation, job, run_id, _waiting(services, [job] if job is not None else []))
 
 
 def measured_on(services: Services, evaluation_id: str) -> str | None:
@@ -137,7 +143,24 @@ def episodes(services: Services, evaluation_id: str) -> AskedEpisodes:
         NotFoundError: there is no such evaluation.
     """
     evaluation = _whole(services, evaluation_id)
-    return AskedEpisodes(suite=evaluation.suite, suite_hash=evaluation.suite_hash, episodes=episodes_of(evaluation))
+    found = episodes_of(evaluation)
+    kept = unpacked(evaluation.ways) if evaluation.ways else None
+    return AskedEpisodes(
+        suite=evaluation.suite,
+        suite_hash=evaluation.suite_hash,
+        episodes=found,
+        maps=tuple(kept.arenas[index].name for index in kept.arena_indices) if kept else (),
+        spl=tuple(merits(found, TaskConfig.model_validate(evaluation.task))) if evaluation.task else (),
+    )
+
+
+def export(services: Services, evaluation_id: str, wanted: ExportFormat) -> EvaluationFile:
+    """One of its files.
+
+    Raises:
+        NotFoundError: there is no such evaluation, or it is not measured.
+    """
+    return exported(_whole(services, evaluation_id), wanted)
 
 
 def ways(services: Services, evaluation_id: str, arena: int | None) -> EvaluationWays:
@@ -209,13 +232,27 @@ def _whole(services: Services, evaluation_id: str) -> tables.PolicyEvaluation:
         return PolicyEvaluationRepository(session).get(evaluation_id, whole=True)
 
 
+@dataclass(frozen=True)
+class _Waiting:
+    """Why jobs wait, by their ids: for extensions, and behind others."""
+
+    lacking: Mapping[str, tuple[UsedExtension, ...]]
+    turns: Mapping[str, Turn]
+
+
+def _waiting(services: Services, jobs: Sequence[tables.Job]) -> _Waiting:
+    service = JobService(services)
+    return _Waiting(service.lacking_each(jobs), service.turns(jobs))
+
+
 def _view(
     services: Services,
     evaluation: tables.PolicyEvaluation,
     job: tables.Job | None,
     run_id: str | None,
-    lacking: Mapping[str, tuple[UsedExtension, ...]],
+    waiting: _Waiting,
 ) -> AskedEvaluation:
+    turn = waiting.turns.get(evaluation.job_id)
     ended: tables.JobState = "done" if evaluation.suite is not None else "failed"
     is_open = job is not None and job.state in OPEN
     return AskedEvaluation(
@@ -230,7 +267,9 @@ def _view(
         progress=services.board.progress(evaluation.job_id) if is_open else float(evaluation.suite is not None),
         seconds_left=seconds_left(job, services.board.progress(evaluation.job_id)) if job is not None else None,
         error=evaluation.error,
-        waits_for=list(lacking.get(evaluation.job_id, ())),
+        waits_for=list(waiting.lacking.get(evaluation.job_id, ())),
+        behind=list(turn.behind[:MAX_BEHIND]) if turn else [],
+        starts_in=turn.starts_in if turn else None,
         suite=evaluation.suite,
         suite_hash=evaluation.suite_hash,
         figures=None if evaluation.figures is None else EvaluationFigures.model_validate(evaluation.figures),

@@ -14,12 +14,15 @@ MAX_BYTES = 4 * 2**20
 
 
 class KeptWays(Frozen):
-    """What is kept; see `Measurement`."""
+    """What is kept; see `Measurement`. What came later is empty in those of before."""
 
     arenas: tuple[ArenaFile, ...]
     arena_indices: tuple[int, ...]
     targets: tuple[Point, ...]
     ways: tuple[tuple[Point, ...], ...]
+    jerks: tuple[float, ...] = ()
+    terms: tuple[str, ...] = ()
+    returns: tuple[tuple[float, ...], ...] = ()
 
 
 def packed(measurement: Measurement) -> bytes | None:
@@ -29,9 +32,17 @@ def packed(measurement: Measurement) -> bytes | None:
         arena_indices=measurement.arena_indices,
         targets=measurement.targets,
         ways=measurement.ways,
+        jerks=measurement.jerks,
+        terms=measurement.terms,
+        returns=measurement.returns,
     )
     data = zlib.compress(kept.model_dump_json().encode())
     return data if len(data) <= MAX_BYTES else None
+
+
+def unpacked(data: bytes) -> KeptWays:
+    """What `packed` has packed."""
+    return KeptWays.model_validate_json(zlib.decompress(data))
 
 
 def ways_in(data: bytes, episodes: tuple[EpisodeResult, ...], arena: int | None) -> EvaluationWays:
@@ -45,7 +56,7 @@ def ways_in(data: bytes, episodes: tuple[EpisodeResult, ...], arena: int | None)
     Raises:
         NotFoundError: there is no such arena.
     """
-    kept = KeptWays.model_validate_json(zlib.decompress(data))
+    kept = unpacked(data)
     places = _places(kept, episodes)
     arena = places[0].arena if arena is None else arena
     if not 0 <= arena < len(kept.arenas):

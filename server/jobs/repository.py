@@ -8,10 +8,15 @@ from sqlalchemy.orm import Session
 from server.database import tables
 from server.errors import NotFoundError
 from server.http.paging import Window
-from workers.job_protocol import JobKind
+from workers.job_protocol import KINDS, JobKind
 
 OPEN: frozenset[tables.JobState] = frozenset({"queued", "running"})
 """States of jobs that are yet to end."""
+
+_EVALUATE: tuple[JobKind, ...] = ("evaluate",)
+
+LONG = len(KINDS)
+"""Priority of what goes on for minutes: behind everything else."""
 
 
 class JobRepository:
@@ -48,9 +53,11 @@ class JobRepository:
         query = select(tables.Job).where(tables.Job.id == job_id, tables.Job.state == "queued")
         return self._session.scalar(query.with_for_update(skip_locked=True).execution_options(populate_existing=True))
 
-    def queued(self, kinds: Collection[JobKind], limit: int) -> Sequence[tables.Job]:
-        """The first jobs of these kinds that wait."""
+    def queued(self, kinds: Collection[JobKind], limit: int, *, long: bool = True) -> Sequence[tables.Job]:
+        """The first jobs of these kinds that wait; without those that go on for minutes where `long` is not set."""
         query = select(tables.Job).where(tables.Job.state == "queued", tables.Job.kind.in_(kinds))
+        if not long:
+            query = query.where(tables.Job.priority < LONG)
         return self._session.scalars(query.order_by(tables.Job.priority, tables.Job.created_at).limit(limit)).all()
 
     def running(self, *, for_update: bool = False, ids: Collection[str] | None = None) -> Sequence[tables.Job]:
@@ -59,6 +66,12 @@ class JobRepository:
         if ids is not None:
             query = query.where(tables.Job.id.in_(ids))
         return self._session.scalars(query.with_for_update() if for_update else query).all()
+
+    def evaluations(self, limit: int) -> tuple[Sequence[tables.Job], Sequence[tables.Job]]:
+        """Evaluations that workers have, and the first that wait, in the order of their turn."""
+        row = tables.Job
+        query = select(row).where(row.kind == "evaluate", row.state == "running").order_by(row.started_at).limit(limit)
+        return self._session.scalars(query).all(), self.queued(_EVALUATE, limit)
 
     def open_of_kind(self, kind: JobKind) -> Sequence[tables.Job]:
         """Those of a kind that are yet to end."""

@@ -15,7 +15,7 @@ class Job(Schema):
 
     id: str
     kind: JobKind
-    title: str = Field(description="Whose: a policy's name.")
+    title: str = Field(description="Whose: a policy's name; of an evaluation with the suite.")
     state: JobState
     worker: str | None
     attempt: int

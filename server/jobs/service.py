@@ -19,8 +19,9 @@ from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.names import result_name
 from server.jobs.needed import needed_by, needed_by_each
-from server.jobs.repository import OPEN, JobRepository
+from server.jobs.repository import LONG, OPEN, JobRepository
 from server.jobs.schemas import JobPage
+from server.jobs.turns import Turn, turns_of
 from server.jobs.views import job_view
 from server.policies.service import find
 from server.services import Services
@@ -47,6 +48,7 @@ from workers.job_protocol import (
     ReplayJob,
     ScenarioSuite,
     UploadedPolicy,
+    is_long,
 )
 
 logger = logging.getLogger(__name__)
@@ -112,6 +114,14 @@ class JobService:
             job.id: needed for job, needed in zip(queued, each, strict=True) if needed and not self.board.workers(needed)
         }
 
+    def turns(self, jobs: Iterable[tables.Job]) -> dict[str, Turn]:
+        """What each of the evaluations that wait stands behind, by its id, in two queries; none where none waits."""
+        if not any(job.state == "queued" for job in jobs):
+            return {}
+        with self._services.database.read() as session:
+            running, queued = JobRepository(session).evaluations(MAX_QUEUED)
+            return turns_of(running, queued, self.board)
+
     def current(self, job_id: str, attempt: int) -> tables.Job:
         """The job, where this attempt has it.
 
@@ -148,7 +158,7 @@ class JobService:
         """Give the next job to a worker; None where none waits that it may have."""
         with self._services.database.read() as session:
             repository = JobRepository(session)
-            if not repository.claimed_under(request.claim_id) and not repository.queued(request.kinds, 1):
+            if not repository.claimed_under(request.claim_id) and not repository.queued(request.kinds, 1, long=request.long):
                 return None
         ended: list[str] = []
         with self._services.database.write() as session:
@@ -167,7 +177,7 @@ class JobService:
             return self._granted(job)
         others = [name for name in self.board.workers() if name != request.worker]
         there = {one.name: one.version for one in request.extensions}
-        for waiting in repository.queued(request.kinds, MAX_QUEUED):
+        for waiting in repository.queued(request.kinds, MAX_QUEUED, long=request.long):
             if exhausted(waiting, request.worker) and hopeful(waiting, others):
                 continue
             if missing(needed_by(session, waiting.spec), there):
@@ -347,7 +357,7 @@ def queue(session: Session, asked: Asked) -> str:
         title=asked.title[:200],
         spec=asked.spec.model_dump(mode="json"),
         sha256=asked.sha256,
-        priority=KINDS.index(asked.spec.kind),
+        priority=LONG if is_long(asked.spec) else KINDS.index(asked.spec.kind),
     )
     session.add(job)
     session.flush()

@@ -14,6 +14,7 @@ from server.ids import new_id
 from server.projects.repository import ProjectRepository
 from server.security.principal import Principal
 from server.services import Services
+from server.uploads.look import problem_of
 from server.uploads.repository import UploadRepository
 from server.uploads.schemas import MAX_FILE_BYTES, PolicyUpload, UploadedPolicy, UploadedPolicyPage
 from sim.config import TaskConfig
@@ -28,14 +29,15 @@ _ZIP = b"PK\x03\x04"
 
 
 def upload(services: Services, wanted: PolicyUpload, principal: Principal) -> UploadedPolicy:
-    """Keep a policy; whether it runs is found out by the worker that measures it.
+    """Keep a policy that ONNX Runtime takes and whose shapes are its task's; what else it does, the worker finds out.
 
     Raises:
-        RefusedFieldError: the file is not what it should be, or its task is missing.
+        RefusedFieldError: the file is not what it should be, or its task is missing or another one's.
         TooLargeError: it is too large.
         ConflictError: there are too many already.
         ForbiddenError: the project is not one's own to change.
         NotFoundError: there is no such project.
+        BusyError: others are looked at.
     """
     principal.require("editor", wanted.project_id)
     try:
@@ -50,6 +52,10 @@ def upload(services: Services, wanted: PolicyUpload, principal: Principal) -> Up
         raise RefusedFieldError(_CONTENT, "The file is empty.")
     if len(graph) > MAX_FILE_BYTES:
         raise TooLargeError(f"The policy is larger than {MAX_FILE_BYTES // 2**20} MiB.")
+    with services.database.read() as session:
+        ProjectRepository(session).get(wanted.project_id)
+    if problem := problem_of(graph, task):
+        raise RefusedFieldError(_CONTENT, f"The policy can't be used: {problem}.")
     row = tables.UploadedPolicy(
         id=new_id(),
         project_id=wanted.project_id,

@@ -91,5 +91,5 @@ def test_an_uploaded_onnx_policy_is_measured_in_an_imported_arena(context: Brows
     expect(row).to_have_attribute("data-state", "done", timeout=MEASURED)
     expect(row).to_contain_text("Another wall-200")
     # It learned to go round walls: onnxruntime drives as well as torch did.
-    page.get_by_role("link", name="elsewhere").click()
+    page.get_by_role("link", name="elsewhere", exact=True).click()
     expect(page.get_by_text(re.compile("^Arrivals (1[5-9]|20)[0-9]"))).not_to_have_count(0)

@@ -13,7 +13,7 @@ from server.services import Services
 from tests.server.harness import WORKER_TOKEN
 from workers.job_protocol import JobKind
 from workers.runtime.fitness import Fitness
-from workers.runtime.jobs.__main__ import kinds_of_places
+from workers.runtime.jobs.__main__ import Takes, places
 from workers.runtime.jobs.client import JobClient
 from workers.runtime.jobs.place import Place, forkserver
 from workers.runtime.sight import ServerSight
@@ -47,10 +47,11 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
     """Does jobs for as long as the block lasts, of these kinds where any are given."""
     work_dir.mkdir(exist_ok=True)
     ending = threading.Event()
-    places = [
+    at_work = [
         Place(
             f"w@host/jobs{index}",
-            takes,
+            takes.kinds,
+            takes.long,
             DirectClient(client),
             work_dir,
             Fitness(work_dir, 0),
@@ -58,9 +59,9 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
             forkserver(),
             ending,
         )
-        for index, takes in enumerate([kinds] if kinds else kinds_of_places(2)[:2])
+        for index, takes in enumerate([Takes(kinds, long=True)] if kinds else places(2)[:2])
     ]
-    threads = [threading.Thread(target=place.run) for place in places]
+    threads = [threading.Thread(target=place.run) for place in at_work]
     for thread in threads:
         thread.start()
     try:

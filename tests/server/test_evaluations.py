@@ -1,7 +1,10 @@
 """Any policy on any suite: asked for over the API, done by a worker, kept with every episode."""
 
+import csv
+import json
 import math
 import time
+import zlib
 from itertools import pairwise
 from typing import Any
 
@@ -9,6 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 from pydantic import ValidationError
 
+from server.database import tables
 from server.evaluations.figures import figures_of
 from server.services import Services
 from sim.config import ArenaFile, TaskConfig
@@ -50,12 +54,18 @@ def test_a_policy_on_a_suite_does_as_it_did(client: TestClient, job_worker: None
     episodes = client.get(f"/api/evaluations/{done['id']}/episodes").json()["episodes"]
     then = [(episode.outcome, episode.steps) for episode in RECORDED.episodes]
     assert [(episode["outcome"], episode["steps"]) for episode in episodes] == then
+    # What its reward's terms came to is its return.
+    names = [term.name for term in POLICY.card.training.task.reward.terms]
+    assert [term["name"] for term in done["figures"]["terms"]] == names
+    assert sum(term["value"] for term in done["figures"]["terms"]) == pytest.approx(done["figures"]["reward"], rel=1e-3)
+    for row in client.get(f"/api/evaluations/{done['id']}/export?format=json").json()["episodes"]:
+        assert sum(row["terms"].values()) == pytest.approx(row["reward"], rel=1e-3, abs=0.01)
     # Asked again, it is there; the job is to be seen in the queue.
     assert (
         ask(client, {"source": "shipped", "name": "simple"}, suite={"by": "name", "name": "simple-200"})["id"] == done["id"]
     )
     (job,) = client.get("/api/jobs").json()["items"]
-    assert (job["kind"], job["state"], job["title"]) == ("evaluate", "done", POLICY.card.title)
+    assert (job["kind"], job["state"], job["title"]) == ("evaluate", "done", f"{POLICY.card.title} on simple-200")
     assert client.delete(f"/api/evaluations/{done['id']}").status_code == 204
     assert client.get("/api/evaluations").json() == {"items": [], "total": 0}
 
@@ -83,6 +93,30 @@ def test_what_cannot_be_done_says_why(client: TestClient, job_worker: None) -> N
     # It may be asked for once more.
     again = ask(client, {"source": "shipped", "name": "simple"}, suite={"by": "name", "name": "nowhere-9"})
     assert again["id"] != failed["id"]
+
+
+def test_a_policy_on_a_suite_for_another_robot_is_refused_at_once_in_words(client: TestClient, reports: Reports) -> None:
+    def refused(policies: list[dict[str, Any]], *suites: str) -> str:
+        wanted = {"policies": policies, "suites": [{"by": "name", "name": name} for name in suites]}
+        answer = client.post("/api/evaluations", json=wanted)
+        assert answer.status_code == 400
+        assert "Config(" not in answer.text
+        detail: str = answer.json()["detail"]
+        return detail
+
+    run = reports.experiment("Mine", seeds=(3,))["runs"][0]
+    burger = {"source": "checkpoint", "id": reports.checkpoint(run, 1, Reports.evaluation(8))}
+    assert refused([burger], "barn-jackal-300") == (
+        "Mine, seed 3, step 1: suite 'barn-jackal-300' is for the robot Jackal-like, and this policy drives TurtleBot3 "
+        "Burger: measure it on a suite for any robot, or a policy that was trained for that one here."
+    )
+    # All or none, and how many more there are.
+    simple = {"source": "shipped", "name": "simple"}
+    assert refused([burger, simple], "simple-200", "people-500").endswith("1 more of these pairs can't be measured either.")
+    assert client.get("/api/evaluations").json()["total"] == 0
+    # A baseline takes the robot that the suite asks for, and any robot may drive where none is asked for.
+    ask(client, {"source": "baseline", "name": "VFH+"}, suite={"by": "name", "name": "barn-jackal-300"})
+    ask(client, burger, suite={"by": "name", "name": "barn-20"})
 
 
 def test_what_takes_for_ever_is_ended(client: TestClient, job_worker: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,6 +246,58 @@ def test_figures_by_hand() -> None:
     assert (found.jerk, found.reward, found.collision) == (1.0, 2.0, 0.1)
     with pytest.raises(ValidationError, match="one arena, one target"):
         Measurement.model_validate(measurement.model_dump() | {"jerks": (1.0,)})
+
+
+def test_an_evaluation_leaves_as_data_and_as_a_table(client: TestClient, reports: Reports) -> None:
+    asked = ask(client, {"source": "baseline", "name": "VFH+"}, suite={"by": "name", "name": "simple-200"})
+    address = f"/api/evaluations/{asked['id']}/export"
+    assert "not measured yet" in client.get(address).json()["detail"]
+    reports.measured(asked)
+    answer = client.get(address)
+    assert answer.headers["content-disposition"] == 'attachment; filename="mapless-vfh-on-simple-200.csv"'
+    assert answer.headers["content-type"].startswith("text/csv")
+    heading, first, *_, last = csv.reader(answer.text.splitlines())
+    assert heading == [
+        *("scenario", "map", "outcome", "steps", "seconds (s)", "path_length (m)", "shortest_path (m)"),
+        *("spl", "clearance (m)", "jerk (m/s3)", "reward", "reward/arrival", "reward/collision"),
+    ]
+    # Ways end at the arrival circle, 0.2 m before the target: of 3.5 m 3.3 count.
+    arrived = dict(zip(heading, first, strict=True))
+    assert float(arrived.pop("spl")) == pytest.approx(3.3 / 4.0)
+    assert list(arrived.values())[:7] == ["1", "room", "arrival", "80", "16.0", "4.0", "3.5"]
+    assert list(arrived.values())[7:] == ["0.3", "0.5", "100.0", "100.0", "0.0"]
+    assert last[:3] == ["10", "room", "collision"]
+    assert last[-2:] == ["0.0", "-100.0"]
+    whole = client.get(address, params={"format": "json"}).json()
+    assert (whole["suite"], whole["figures"]["reward"], len(whole["episodes"])) == ("simple-200", 60.0, 10)
+    assert whole["episodes"][9]["terms"] == {"arrival": 0.0, "collision": -100.0}
+    # Eight of ten, exact (Clopper and Pearson 1934): 44.4 to 97.5 %.
+    table = client.get(address, params={"format": "markdown"}).text
+    assert "| Success (%) | 80.0 [44.4, 97.5] | 10 |" in table
+    assert "| Steps to target | 80.0 [80.0, 80.0] | 8 |" in table
+    assert "| Return by collision | -20.0 [-50.2, 10.2] | 10 |" in table
+    paper = client.get(address, params={"format": "latex"}).text
+    assert r"\toprule" in paper
+    assert r"Success (\%) & 80.0 [44.4, 97.5] & 10" in paper
+    # Kept by who has it.
+    assert client.get(address, headers={"If-None-Match": answer.headers["etag"]}).status_code == 304
+
+
+def test_what_was_measured_before_terms_were_kept_leaves_without_them(
+    client: TestClient, services: Services, reports: Reports
+) -> None:
+    asked = ask(client, {"source": "baseline", "name": "VFH+"})
+    reports.measured(asked)
+    with services.database.write() as session:
+        row = session.get_one(tables.PolicyEvaluation, asked["id"])
+        kept = json.loads(zlib.decompress(row.ways or b""))
+        row.ways = zlib.compress(json.dumps({name: kept[name] for name in list(kept)[:4]}).encode())
+        row.figures = {name: value for name, value in (row.figures or {}).items() if name != "terms"}
+    assert client.get(f"/api/evaluations/{asked['id']}").json()["figures"]["terms"] is None
+    address = f"/api/evaluations/{asked['id']}/export"
+    first = next(csv.DictReader(client.get(address).text.splitlines()))
+    assert (first["map"], first["jerk (m/s3)"], "reward/arrival" in first) == ("room", "", False)
+    assert "| Jerk (m/s³) | 0.500 | 10 |" in client.get(address, params={"format": "markdown"}).text
 
 
 def test_each_sees_what_was_measured_of_what_they_may_see(client: TestClient, services: Services, reports: Reports) -> None:

@@ -16,7 +16,19 @@ from server.settings import Settings
 from server.worker_api.attempts import FencedError
 from server.worker_api.leases import Leases
 from tests.server.test_claims_at_once import Clock
-from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobKind, JobSpec, ReplayJob, ShippedPolicyName, ViewJob
+from workers.job_protocol import (
+    BaselineName,
+    EvaluateJob,
+    JobClaim,
+    JobClaimRequest,
+    JobEnd,
+    JobKind,
+    JobSpec,
+    ReplayJob,
+    ShippedPolicyName,
+    ViewJob,
+)
+from workers.runtime.jobs.__main__ import places
 
 LEASE = 15.0
 ALL: tuple[JobKind, ...] = ("view", "play", "replay", "film", "export", "evaluate")
@@ -102,6 +114,38 @@ def test_who_looks_comes_first(jobs: JobService) -> None:
     jobs.ask(replay())
     view = jobs.ask(replay("view", ViewJob(policy=ShippedPolicyName(name="simple"))))
     assert claimed(jobs).id == view
+
+
+def test_what_takes_minutes_leaves_a_place_to_what_takes_seconds(jobs: JobService) -> None:
+    slow, slower = (
+        jobs.ask(replay(name, EvaluateJob(policy=BaselineName.model_validate({"name": name}))))
+        for name in ("MPPI", "mapping, A* and dynamic window")
+    )
+    quick = jobs.ask(replay("quick", EvaluateJob(policy=BaselineName(name="VFH+"))))
+
+    def place(number: int, *, long: bool) -> str | None:
+        request = JobClaimRequest(worker=f"w@host/jobs{number}", claim_id=f"{number:032x}", kinds=ALL, long=long)
+        found = jobs.claim(request)
+        return found.id if found else None
+
+    # Asked for last it goes first; the place of what takes seconds stays free then.
+    assert place(1, long=True) == quick
+    assert place(0, long=False) is None
+    assert place(2, long=True) == slow
+    # Who waits hears behind what.
+    (waits,) = jobs.turns([jobs.find(slower)]).values()
+    assert (len(waits.behind), waits.starts_in) == (2, None)
+    jobs.report(slow, 1, 0.5)
+    (waits,) = jobs.turns([jobs.find(slower)]).values()
+    assert waits.starts_in is not None
+    another = jobs.ask(replay("another", EvaluateJob(policy=BaselineName(name="random"))))
+    assert place(0, long=False) == another
+
+
+def test_one_place_alone_takes_everything_and_of_two_one_stays_for_what_is_short() -> None:
+    assert [takes.long for takes in places(1) if "evaluate" in takes.kinds] == [True]
+    assert [takes.long for takes in places(2) if "evaluate" in takes.kinds] == [False, True]
+    assert [takes.long for takes in places(3) if "evaluate" in takes.kinds] == [False, True, True]
 
 
 def test_a_claim_whose_answer_was_lost_is_the_same_claim(jobs: JobService) -> None:

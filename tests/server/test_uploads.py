@@ -38,19 +38,29 @@ def test_a_bundle_that_went_out_comes_back_and_drives_as_it_did(client: TestClie
     # onnxruntime rounds otherwise than torch: an episode in a hundred may end otherwise.
     assert abs(done["figures"]["success"]["value"] - recorded.success_rate) <= 0.01
     entries = client.get(f"/api/leaderboards/{done['suite_hash']}").json()["entries"]
-    assert ("evaluation", "From elsewhere") in {(entry["kind"], entry["title"]) for entry in entries}
+    assert ("uploaded", "From elsewhere") in {(entry["kind"], entry["title"]) for entry in entries}
     # What was measured stays when the policy goes.
     assert client.delete(f"/api/uploads/{mine['id']}").status_code == 204
     assert client.get(f"/api/evaluations/{asked['id']}").json()["figures"] == done["figures"]
     assert client.get("/api/uploads").json() == {"items": [], "total": 0}
 
 
-def test_a_policy_of_another_robot_says_so(client: TestClient, job_worker: None) -> None:
-    mine = upload(client, graph(numbers=SIZE + 1), task={})
-    (asked,) = client.post("/api/evaluations", json={"policies": [{"source": "uploaded", "id": mine["id"]}]}).json()
-    failed = ended(client, asked)
-    assert failed["state"] == "failed"
-    assert "choose the ones that the policy was trained with" in failed["error"]
+def test_a_policy_of_another_robot_or_none_at_all_is_refused_when_it_comes(client: TestClient) -> None:
+    for content, reason in (
+        (graph(numbers=SIZE + 1), "choose the ones that the policy was trained with"),
+        (b"\x08 and no more of it", "this is no ONNX file"),
+        (b"no graph", "this is no ONNX file"),
+    ):
+        (problem,) = upload(client, content, task={})["detail"]
+        assert problem["loc"] == ["body", "content"]
+        assert reason in problem["msg"]
+    assert client.get("/api/uploads").json()["total"] == 0
+
+
+def test_a_file_that_takes_for_ever_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.uploads.look._SECONDS", 0.01)
+    (problem,) = upload(client, graph(), task={})["detail"]
+    assert "ONNX Runtime was not done with it" in problem["msg"]
 
 
 def test_what_is_no_policy_is_refused_next_to_its_field(client: TestClient) -> None:
@@ -102,7 +112,11 @@ def test_a_project_that_is_not_there_is_named(client: TestClient) -> None:
 @pytest.mark.parametrize("packing", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_a_bundle_with_other_bytes_in_it_is_taken_or_refused(client: TestClient, packing: int, data: st.DataObject) -> None:
+def test_a_bundle_with_other_bytes_in_it_is_taken_or_refused(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, packing: int, data: st.DataObject
+) -> None:
+    # What is in the bundle is looked at in a process of its own, each time anew; here it is how it is packed.
+    monkeypatch.setattr("server.uploads.service.problem_of", lambda *_: "")
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", packing) as archive:
         archive.writestr("robot/policy.onnx", b"a graph " * 20)

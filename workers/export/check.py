@@ -7,20 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workers.errors import ExportError
-from workers.export.graph import (
-    ACTION,
-    LAST_ACTION,
-    MEMORY,
-    NEXT_MEMORY,
-    OBSERVATION,
-    POSE,
-    PREVIOUS,
-    RANGES,
-    SPEEDS,
-    TARGET,
-    VELOCITY,
-    scan_inputs,
-)
+from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, VELOCITY, scan_inputs
+from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
 from workers.export.ros2.mapless_navigator.observation import observe
 from workers.export.ros2.mapless_navigator.policy import Policy as ShippedPolicy
 from workers.manifest import Manifest

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from sim.actions import ActionComponent
+from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
 from workers.export.ros2.mapless_navigator.policy import Forward, Part, Specification
 from workers.export.tracing import trace
 from workers.kernels.constants import LEAKY_SLOPE
@@ -40,11 +41,9 @@ from workers.policy import Policy
 OPSET = 17
 IR_VERSION = 8
 
-OBSERVATION, ACTION, VELOCITY = "observation", "action", "velocity"
+VELOCITY = "velocity"
 RANGES, POSE, TARGET, PREVIOUS = "ranges", "pose", "target", "previous"
 SPEEDS, LAST_ACTION = "speeds", "last_action"
-
-MEMORY, NEXT_MEMORY = "memory", "next_memory"
 
 # Operators of a formula that are operators of ONNX by another name.
 _OPERATORS = {

@@ -3,17 +3,8 @@
 import math
 
 from workers.export.check import CheckReport
-from workers.export.graph import (
-    LAST_ACTION,
-    MEMORY,
-    NEXT_MEMORY,
-    POSE,
-    PREVIOUS,
-    RANGES,
-    SPEEDS,
-    TARGET,
-    scan_inputs,
-)
+from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
+from workers.export.names import MEMORY, NEXT_MEMORY
 from workers.export.ros2.mapless_navigator.policy import Part, Specification
 from workers.manifest import Manifest
 

@@ -74,7 +74,7 @@ export function FigureEstimate({
 function shortOf({ unit, seeds, episodes, failed }: Estimate): string {
   if (unit === 'episodes') return `N = ${count(episodes)}${failed ? ', one seed' : ''}`
   const n = `N = ${plural(seeds, 'seed')}`
-  if (!failed) return n
+  if (!failed || failed.told === false) return n
   if (failed.failed === seeds) return `${n}, all failed`
   return `${n}, ${failed.failed || 'none'} failed: up to ${Math.round(failed.at_most * 100)} % may`
 }

@@ -1,18 +1,21 @@
 /** A policy on a suite: its figures, where it drove, every episode. */
 import { Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
+import { useRef } from 'react'
 import { Link, useParams } from 'react-router'
 import { $api } from '../api/client'
-import type { AskedEvaluation } from '../api/types'
+import type { AskedEvaluation, Outcome } from '../api/types'
 import { EpisodesQuery } from '../components/Episodes'
 import { suiteTitle } from '../components/evaluations/choices'
+import { EvaluationExport } from '../components/evaluations/EvaluationExport'
 import { isOpen, Progress, titleOf } from '../components/evaluations/EvaluationTable'
 import { WaysMap } from '../components/evaluations/WaysMap'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { Replay } from '../components/replay/Replay'
 import { Message, Page, Panel, QueryError } from '../components/ui'
-import { byInterest } from '../lib/episodes'
-import { percent, significant } from '../lib/format'
+import { arranged } from '../lib/episodes'
+import { percent, significant, words } from '../lib/format'
 import { useReplayInAddress, useTitle } from '../lib/hooks'
+import { endedSo, useArrangement } from '../lib/useArrangement'
 import classes from './EvaluationPage.module.css'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
@@ -57,9 +60,10 @@ export function EvaluationPage() {
 }
 
 /** Where its policy comes from, and what else was measured on its suite. */
-function Links({ evaluation: { policy, run_id, suite_hash } }: { evaluation: AskedEvaluation }) {
+function Links({ evaluation: { id, policy, run_id, suite_hash, figures } }: { evaluation: AskedEvaluation }) {
   return (
     <Group gap="xs">
+      {figures && <EvaluationExport id={id} />}
       {run_id && (
         <Button component={Link} to={`/runs/${run_id}`} variant="default">
           Its run
@@ -81,8 +85,11 @@ function Links({ evaluation: { policy, run_id, suite_hash } }: { evaluation: Ask
 
 function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
   const [episode, setEpisode] = useReplayInAddress()
+  const [{ order, reversed }] = useArrangement()
   const path = { evaluation_id: evaluation.id }
   const { figures } = evaluation
+  const list = useRef<HTMLDivElement>(null)
+  const show = () => list.current?.scrollIntoView({ block: 'start', behavior: 'smooth' })
   const episodes = $api.useQuery(
     'get',
     '/api/evaluations/{evaluation_id}/episodes',
@@ -108,9 +115,9 @@ function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
       </Panel>
     )
   }
-  const facts: [name: string, value: string, hint?: string][] = [
-    ['Collision', percent(figures.collision)],
-    ['Time-out', percent(figures.timeout)],
+  const facts: [name: string, value: string, hint?: string, outcome?: Outcome][] = [
+    ['Collision', percent(figures.collision), 'Opens its episodes', 'collision'],
+    ['Time-out', percent(figures.timeout), 'Opens its episodes', 'timeout'],
     ['SPL', figures.spl.toFixed(3), 'Success weighted by path length'],
     [
       'SPL of the worst tenth',
@@ -142,30 +149,91 @@ function Loaded({ evaluation }: { evaluation: AskedEvaluation }) {
             <Text size="xs" c="dimmed">
               Success, 95 % interval
             </Text>
-            <SuccessEstimate estimate={figures.success} detail />
+            <ToEpisodes outcome="arrival" onFollow={show}>
+              <SuccessEstimate estimate={figures.success} detail />
+            </ToEpisodes>
           </div>
           <dl className={classes.facts}>
-            {facts.map(([name, value, hint]) => (
+            {facts.map(([name, value, hint, outcome]) => (
               <div key={name} title={hint}>
                 <dt>{name}</dt>
-                <dd>{value}</dd>
+                <dd>
+                  {outcome ? (
+                    <ToEpisodes outcome={outcome} onFollow={show}>
+                      {value}
+                    </ToEpisodes>
+                  ) : (
+                    value
+                  )}
+                </dd>
               </div>
             ))}
           </dl>
+          <Terms terms={figures.terms} />
         </Panel>
       </div>
-      <Panel title="Episodes" flush>
-        <EpisodesQuery query={episodes} onReplay={setEpisode} />
-      </Panel>
+      <div ref={list}>
+        <Panel title="Episodes" flush>
+          <EpisodesQuery query={episodes} onReplay={setEpisode} />
+        </Panel>
+      </div>
       {episode !== null && (
         <Replay
           of={`evaluation:${evaluation.id}`}
           episode={episode}
-          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          order={arranged(episodes.data ?? { episodes: [] }, order, reversed).map(({ index }) => index)}
           onReplay={setEpisode}
           onClose={() => setEpisode(null)}
         />
       )}
     </Stack>
+  )
+}
+
+interface ToEpisodesProps {
+  outcome: Outcome
+  onFollow: () => void
+  children: React.ReactNode
+}
+
+/** A number that opens the episodes behind it. */
+function ToEpisodes({ outcome, onFollow, children }: ToEpisodesProps) {
+  return (
+    <Anchor
+      component={Link}
+      to={endedSo(outcome)}
+      replace
+      preventScrollReset
+      inherit
+      title="Its episodes"
+      onClick={onFollow}
+    >
+      {children}
+    </Anchor>
+  )
+}
+
+/** The return by the reward's terms. */
+function Terms({ terms }: { terms: NonNullable<AskedEvaluation['figures']>['terms'] }) {
+  if (terms === null)
+    return (
+      <Text size="xs" c="dimmed" mt="sm">
+        The return by reward terms was not kept when this was measured.
+      </Text>
+    )
+  return (
+    <>
+      <Text size="xs" c="dimmed" mt="md" mb={6}>
+        Return by reward terms
+      </Text>
+      <dl className={classes.facts} aria-label="Return by reward terms">
+        {terms.map(({ name, value }) => (
+          <div key={name} title="Mean of the episodes' sums">
+            <dt>{words(name)}</dt>
+            <dd>{significant(value, 3)}</dd>
+          </div>
+        ))}
+      </dl>
+    </>
   )
 }

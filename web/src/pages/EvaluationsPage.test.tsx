@@ -1,6 +1,6 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
-import type { AskedEvaluation, Leaderboard } from '../api/types'
+import type { AskedEvaluation, Leaderboard, Outcome } from '../api/types'
 import { policy } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
@@ -27,6 +27,8 @@ const measured: AskedEvaluation = {
   waits_for: [],
   created_at: 0,
   job_id: 'job1',
+  behind: [],
+  starts_in: null,
   state: 'done',
   progress: 1,
   seconds_left: null,
@@ -46,6 +48,10 @@ const measured: AskedEvaluation = {
     min_clearance: 0.21,
     jerk: 0.3,
     reward: 12,
+    terms: [
+      { name: 'arrival', value: 90 },
+      { name: 'collision', value: -78 },
+    ],
   },
 }
 const running: AskedEvaluation = {
@@ -88,6 +94,27 @@ test('what is under way says how long it takes, what is measured its figures', a
   expect(done).toHaveTextContent(/20\.0\s%\s*0\.70\s*18\ss\s*0\.21\sm/)
   await user.click(screen.getByRole('button', { name: 'Call it off: Dynamic window' }))
   await waitFor(() => expect(server.changes[0]?.route).toBe('POST /api/evaluations/ev2/cancel'))
+})
+
+test('what waits says behind what, and about how long', async () => {
+  const waits = { ...running, state: 'queued' as const, progress: 0, seconds_left: null }
+  const behind = ['MPPI on maze 1', 'VFH+ on maze 1']
+  startServer({
+    ...routes,
+    'GET /api/evaluations': {
+      items: [
+        { ...waits, behind: behind.slice(0, 1), starts_in: 300 },
+        { ...waits, id: 'ev3', behind },
+        { ...waits, id: 'ev4' },
+      ],
+      total: 3,
+    },
+  })
+  open('/evaluations')
+  const [first, second, third] = await screen.findAllByTestId('evaluation')
+  expect(first).toHaveTextContent(/Waits behind MPPI on maze 1, about 5\smin/)
+  expect(second).toHaveTextContent('Waits behind MPPI on maze 1 and 1 more')
+  expect(third).toHaveTextContent('Waits for a worker')
 })
 
 test('policies on suites are chosen, or come with the address', async () => {
@@ -207,8 +234,154 @@ test('an evaluation shows its figures and its ways, and a click on one replays i
   expect(screen.getByRole('link', { name: 'Leaderboard' })).toHaveAttribute('href', '/leaderboards/abc')
 })
 
+const episode = (outcome: Outcome, steps: number, clearance: number) => ({
+  outcome,
+  steps,
+  reward: 1,
+  path_length: 4,
+  shortest_path: 3,
+  min_clearance: clearance,
+})
+/** Three episodes on two maps. */
+const listed = {
+  suite: 'complex-200',
+  suite_hash: 'abc',
+  episodes: [episode('arrival', 90, 0.3), episode('collision', 12, 0), episode('arrival', 60, 0.1)],
+  maps: ['maze-1', 'maze-2', 'maze-2'],
+  spl: [0.6, 0, 0.9],
+}
+const rows = () => screen.getAllByTestId('episode').map((row) => row.textContent?.match(/^\d+/)?.[0])
+
+test('episodes are put in order by a head’s press, the worst first, and the order stands in the address', async () => {
+  startServer({
+    ...routes,
+    'GET /api/evaluations/ev1': measured,
+    'GET /api/evaluations/ev1/episodes': listed,
+    'GET /api/evaluations/ev1/ways': refusal(404, 'Not kept.'),
+  })
+  const { user, router } = open('/evaluations/ev1')
+  await screen.findAllByTestId('episode')
+  expect(rows()).toEqual(['2', '3', '1'])
+  expect(screen.getAllByTestId('episode')[0]).toHaveTextContent('maze-2')
+  const head = (name: string) => screen.getByRole('columnheader', { name: new RegExp(`^${name}`) })
+  await user.click(within(head('Steps')).getByRole('button'))
+  expect(rows()).toEqual(['1', '3', '2'])
+  expect(head('Steps')).toHaveAttribute('aria-sort', 'ascending')
+  expect(router.state.location.search).toBe('?order=steps')
+  await user.click(within(head('Steps')).getByRole('button'))
+  expect(rows()).toEqual(['2', '3', '1'])
+  expect(router.state.location.search).toBe('?order=-steps')
+  await user.click(within(head('Steps')).getByRole('button'))
+  expect(router.state.location.search).toBe('')
+  await user.click(within(head('SPL')).getByRole('button'))
+  expect(rows()).toEqual(['2', '1', '3'])
+})
+
+test('a number opens the episodes behind it', async () => {
+  startServer({
+    ...routes,
+    'GET /api/evaluations/ev1': measured,
+    'GET /api/evaluations/ev1/episodes': listed,
+    'GET /api/evaluations/ev1/ways': refusal(404, 'Not kept.'),
+  })
+  const { user, router } = open('/evaluations')
+  const [, done] = await screen.findAllByTestId('evaluation')
+  await user.click(within(done as HTMLElement).getByRole('link', { name: /^20\.0/ }))
+  expect(router.state.location).toMatchObject({ pathname: '/evaluations/ev1', search: '?outcome=collision' })
+  await screen.findAllByTestId('episode')
+  expect(rows()).toEqual(['2'])
+  await user.click(screen.getByRole('link', { name: /^75\.0/ }))
+  expect(rows()).toEqual(['3', '1'])
+  expect(router.state.location.search).toBe('?outcome=arrival')
+})
+
+test('the return is told by the reward’s terms, and everything can be taken away', async () => {
+  const server = startServer({
+    ...routes,
+    'GET /api/evaluations/ev1': measured,
+    'GET /api/evaluations/ev1/episodes': listed,
+    'GET /api/evaluations/ev1/ways': refusal(404, 'Not kept.'),
+  })
+  const { user, unmount } = open('/evaluations/ev1')
+  expect(await screen.findByLabelText('Return by reward terms')).toHaveTextContent('Arrival90Collision−78')
+  await user.click(screen.getByRole('button', { name: 'Export' }))
+  const items = (await screen.findAllByRole('menuitem')).map((item) => item.getAttribute('href'))
+  expect(items).toEqual(
+    ['csv', 'json', 'latex', 'markdown'].map((format) => `/api/evaluations/ev1/export?format=${format}`),
+  )
+  unmount()
+  const before = { ...measured, figures: { ...(measured.figures as object), terms: null } }
+  server.routes['GET /api/evaluations/ev1'] = before
+  open('/evaluations/ev1')
+  expect(
+    await screen.findByText('The return by reward terms was not kept when this was measured.'),
+  ).toBeInTheDocument()
+})
+
+test('an evaluation is deleted after a question', async () => {
+  const server = startServer({
+    ...routes,
+    'DELETE /api/evaluations/ev1': new Response(null, { status: 204 }),
+  })
+  const { user } = open('/evaluations')
+  await user.click(await screen.findByRole('button', { name: 'Delete: Dynamic window' }))
+  const question = await screen.findByRole('dialog', { name: 'Delete “Dynamic window” on complex-200?' })
+  expect(server.changes).toHaveLength(0)
+  await user.click(within(question).getByRole('button', { name: 'Delete' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('DELETE /api/evaluations/ev1'))
+})
+
+test('an uploaded policy is deleted after a question', async () => {
+  const mine = {
+    id: 'up1',
+    name: 'Mine',
+    project_id: 'default',
+    task: {},
+    sha256: 'a',
+    size: 2048,
+    created_at: 1,
+  }
+  const server = startServer({
+    ...routes,
+    'GET /api/uploads': { items: [mine], total: 1 },
+    'DELETE /api/uploads/up1': new Response(null, { status: 204 }),
+  })
+  const { user } = open('/evaluations')
+  expect(await screen.findByTestId('uploaded-policy')).toHaveTextContent(/^Mine2/)
+  await user.click(screen.getByRole('button', { name: 'Delete Mine' }))
+  const question = await screen.findByRole('dialog', { name: 'Delete “Mine”?' })
+  expect(server.changes).toHaveLength(0)
+  await user.click(within(question).getByRole('button', { name: 'Delete' }))
+  await waitFor(() => expect(server.changes[0]?.route).toBe('DELETE /api/uploads/up1'))
+})
+
+test('why something can’t be measured stands in the form', async () => {
+  startServer({
+    ...routes,
+    'POST /api/evaluations': refusal(400, 'Mine: suite ‘barn’ is for the robot Jackal-like.'),
+  })
+  const { user } = open('/evaluations?policy=shipped:crowd')
+  await user.click(await screen.findByRole('button', { name: 'Evaluate, 1 time' }))
+  expect(await screen.findByRole('alert')).toHaveTextContent('is for the robot Jackal-like')
+})
+
+test('a checkpoint that comes with the address is named by training, seed and step', async () => {
+  startServer({
+    ...routes,
+    'GET /api/checkpoints/nkny4x/start': {
+      start_from: { source: 'checkpoint', name: 'nkny4x', sha256: null, title: 'Rooms, seed 1, step 40,000' },
+      kind: 'best',
+      experiment_id: 'e1',
+      success: null,
+    },
+  })
+  open('/evaluations?policy=checkpoint:nkny4x')
+  await waitFor(() => expect(screen.getAllByText('Rooms, seed 1, step 40,000').length).toBeGreaterThan(0))
+})
+
 test('a leaderboard says what is tied with the best, and by what that is known', async () => {
-  const entry = { kind: 'shipped' as const, spl: 0.9, steps: 80, success }
+  const of = { experiment_id: null, evaluations: [], p: null }
+  const entry = { ...of, kind: 'shipped' as const, spl: 0.9, steps: 80, success }
   const board: Leaderboard = {
     suite: 'complex-200',
     suite_hash: 'abc',
@@ -216,7 +389,18 @@ test('a leaderboard says what is tied with the best, and by what that is known',
     comparisons: 2,
     entries: [
       { ...entry, rank: 1, id: 'crowd', title: 'Crowd', tied: true, told_by: 'best' },
-      { ...entry, rank: 2, kind: 'training', id: 'e1', title: 'Mine', tied: true, told_by: 'seeds' },
+      {
+        ...entry,
+        rank: 2,
+        kind: 'training',
+        id: 'e1',
+        experiment_id: 'e1',
+        evaluations: [],
+        p: 0.2,
+        title: 'Mine',
+        tied: true,
+        told_by: 'seeds',
+      },
       {
         ...entry,
         rank: 3,
@@ -239,8 +423,76 @@ test('a leaderboard says what is tied with the best, and by what that is known',
   expect(screen.getByText("The paper's complex arena.")).toBeInTheDocument()
   expect(screen.getByRole('link', { name: 'Mine' })).toHaveAttribute('href', '/experiments/e1')
   expect(
-    screen.getByText(/2 entries can't be told from the best, itself included\. 2 comparisons/),
+    screen.getByText(/2 entries can't be told from the best, itself included\. 2 tests/),
   ).toBeInTheDocument()
+})
+
+test('what was asked for is called by what it is, and the seeds of a training are one entry', async () => {
+  const entry = { spl: 0.9, steps: 80, success, tied: true, told_by: 'nothing' as const, p: null }
+  const seeds = {
+    ...success,
+    unit: 'seeds' as const,
+    seeds: 2,
+    per_seed: [0.7, 0.8],
+    failed: { failed: 0, seeds: 2, at_most: 0.78, told: true, sentence: 'None of 2 seeds failed.' },
+  }
+  startServer({
+    ...routes,
+    'GET /api/leaderboards/abc': {
+      suite: 'complex-200',
+      suite_hash: 'abc',
+      meaning: null,
+      comparisons: 0,
+      entries: [
+        {
+          ...entry,
+          rank: 1,
+          kind: 'baseline',
+          id: 'ev1',
+          evaluations: ['ev1'],
+          title: 'VFH+',
+          told_by: 'best',
+        },
+        {
+          ...entry,
+          rank: 2,
+          kind: 'evaluation',
+          id: 'ev2',
+          experiment_id: 'e1',
+          evaluations: ['ev2', 'ev3'],
+          title: 'base',
+          success: seeds,
+        },
+        {
+          ...entry,
+          rank: 3,
+          kind: 'evaluation',
+          id: 'ev4',
+          experiment_id: 'e2',
+          evaluations: ['ev4'],
+          title: 'other, seed 0, step 5',
+        },
+        { ...entry, rank: 4, kind: 'uploaded', id: 'ev5', evaluations: ['ev5'], title: 'From elsewhere' },
+      ],
+    },
+  })
+  open('/leaderboards/abc')
+  const rows = await screen.findAllByTestId('entry')
+  expect(rows[0]).toHaveTextContent(/^1VFH\+Untrained.*N = 200/)
+  expect(rows[0]).not.toHaveTextContent('one seed')
+  expect(rows[1]).toHaveTextContent(/^2baseEvaluation.*N = 2 seeds, none failed.*Not told/)
+  expect(rows[3]).toHaveTextContent(/^4From elsewhereUploaded/)
+  // A number opens its episodes where one evaluation stands behind it; of several seeds the training has them.
+  const links = (row: HTMLElement) =>
+    within(row)
+      .getAllByRole('link')
+      .map((link) => link.getAttribute('href'))
+  expect(rows.map(links)).toEqual([
+    ['/evaluations/ev1', '/evaluations/ev1?outcome=arrival'],
+    ['/experiments/e1'],
+    ['/evaluations/ev4', '/evaluations/ev4?outcome=arrival'],
+    ['/evaluations/ev5', '/evaluations/ev5?outcome=arrival'],
+  ])
 })
 
 test('an ONNX file is uploaded for the robot of a policy, and chosen at once; a refusal stands in the dialog', async () => {

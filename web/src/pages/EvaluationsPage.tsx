@@ -8,6 +8,7 @@ import { AskForm } from '../components/evaluations/AskForm'
 import { EvaluationTable, isOpen } from '../components/evaluations/EvaluationTable'
 import { OwnSuites } from '../components/evaluations/OwnSuites'
 import { PolicyUpload } from '../components/evaluations/PolicyUpload'
+import { UploadedPolicies } from '../components/evaluations/UploadedPolicies'
 import { Pager } from '../components/Pager'
 import { Message, Page, Panel, QueryError } from '../components/ui'
 import { HEADS } from '../heads'
@@ -35,6 +36,9 @@ export function EvaluationsPage() {
           <Button component={Link} to="/leaderboards" variant="default">
             Leaderboards
           </Button>
+          <Button component={Link} to="/policies#families" variant="default">
+            Families
+          </Button>
           <Button component={Link} to="/recordings" variant="default">
             From a robot
           </Button>
@@ -49,6 +53,7 @@ export function EvaluationsPage() {
         </Panel>
         <Below height={400}>
           <OwnSuites />
+          <UploadedPolicies />
           <Panel title="Measured" flush>
             {error && !data ? (
               <QueryError error={error} what="list of evaluations" retry={refetch} />

@@ -1,7 +1,8 @@
 """`python -m workers.runtime.jobs PLACES`: takes up jobs until SIGTERM; `mapless worker` starts it.
 
-Most places take what somebody waits for and what nobody does alike, the first only the former, so that an evaluation never
-keeps a replay waiting; views, which last as long as somebody looks and cost little, have places of their own.
+Most places take all of it, the first only what takes seconds: what somebody waits for, and short evaluations behind it.
+So an evaluation of minutes keeps nothing waiting that is short. Views, which last as long as somebody looks and cost little,
+have places of their own.
 """
 
 import logging
@@ -11,6 +12,7 @@ import sys
 import threading
 import time
 from multiprocessing.forkserver import ensure_running
+from typing import NamedTuple
 
 from workers.errors import UnfitError
 from workers.job_protocol import KINDS, JobKind
@@ -24,7 +26,6 @@ from workers.runtime.sight import ServerSight
 from workers.runtime.supervised import end_with_supervisor
 
 _VIEWS: tuple[JobKind, ...] = ("view", "play")
-_WAITED_FOR: tuple[JobKind, ...] = ("replay", "film", "bag", "export")
 _ALL_BUT_VIEWS: tuple[JobKind, ...] = tuple(kind for kind in KINDS if kind not in _VIEWS)
 # Of finished policies that are watched or played with at a time; each takes a few per cent of a core.
 VIEW_PLACES = 4
@@ -32,11 +33,17 @@ VIEW_PLACES = 4
 _END_SECONDS = 3.0
 
 
-def kinds_of_places(count: int) -> list[tuple[JobKind, ...]]:
-    """What each place takes; `count` of them beside those for views."""
-    if count == 1:
-        return [_ALL_BUT_VIEWS, *[_VIEWS] * VIEW_PLACES]
-    return [_WAITED_FOR, *[_ALL_BUT_VIEWS] * (count - 1), *[_VIEWS] * VIEW_PLACES]
+class Takes(NamedTuple):
+    """What a place takes: kinds of jobs, and whether those too that go on for minutes."""
+
+    kinds: tuple[JobKind, ...]
+    long: bool
+
+
+def places(count: int) -> list[Takes]:
+    """What each place takes; `count` of them beside those for views. The only one takes everything."""
+    first = Takes(_ALL_BUT_VIEWS, long=count == 1)
+    return [first, *[Takes(_ALL_BUT_VIEWS, long=True)] * (count - 1), *[Takes(_VIEWS, long=False)] * VIEW_PLACES]
 
 
 def main(count: int) -> None:
@@ -61,9 +68,9 @@ def main(count: int) -> None:
     fitness = Fitness(settings.work_dir, settings.min_free_bytes)
     sight = ServerSight(settings.server_url)
     threads = []
-    for index, kinds in enumerate(kinds_of_places(count)):
+    for index, takes in enumerate(places(count)):
         name = f"{settings.host_name}/jobs{index}"
-        place = Place(name, kinds, client, settings.work_dir, fitness, sight, context, ending)
+        place = Place(name, takes.kinds, takes.long, client, settings.work_dir, fitness, sight, context, ending)
         threads.append(threading.Thread(target=place.run, name=place.name, daemon=True))
         threads[-1].start()
     while not ending.wait(HEARTBEAT_SECONDS):

@@ -18,10 +18,17 @@ _BLOCK = 256 * 1024
 class JobClient(ServerClient):
     """Claims jobs and brings what comes out of them; errors as of `ServerClient`, where a run is a job."""
 
-    def claim_job(self, worker: str, kinds: tuple[JobKind, ...], claim_id: str, wait_seconds: float) -> JobClaim | None:
-        """Take up the next job, waiting for one; None where none came."""
+    def claim_job(
+        self, worker: str, kinds: tuple[JobKind, ...], claim_id: str, wait_seconds: float, *, long: bool = True
+    ) -> JobClaim | None:
+        """Take up the next job, waiting for one, one of minutes only if `long`; None where none came."""
         request = JobClaimRequest(
-            worker=worker, claim_id=claim_id, kinds=kinds, extensions=found_extensions(), wait_seconds=wait_seconds
+            worker=worker,
+            claim_id=claim_id,
+            kinds=kinds,
+            long=long,
+            extensions=found_extensions(),
+            wait_seconds=wait_seconds,
         )
         response = self._send("POST", "/api/worker/jobs/claim", content=request.model_dump_json())
         return None if response.status_code == httpx.codes.NO_CONTENT else read_answer(JobClaim, response)

@@ -74,6 +74,7 @@ class Place:
     Args:
         name: under which the server knows it.
         kinds: of jobs that it takes.
+        long: whether those too that go on for minutes.
         client: to the server.
         work_dir: where jobs keep their files while they are under way.
         fitness: of this machine.
@@ -86,6 +87,7 @@ class Place:
         self,
         name: str,
         kinds: tuple[JobKind, ...],
+        long: bool,
         client: JobClient,
         work_dir: Path,
         fitness: Fitness,
@@ -95,6 +97,7 @@ class Place:
     ) -> None:
         self.name = name
         self._kinds = kinds
+        self._long = long
         self._client = client
         self._work_dir = work_dir
         self._fitness = fitness
@@ -110,7 +113,7 @@ class Place:
                 self._ending.wait(REPORT_SECONDS)
                 continue
             try:
-                claim = self._client.claim_job(self.name, self._kinds, claim_id, _CLAIM_WAIT_SECONDS)
+                claim = self._client.claim_job(self.name, self._kinds, claim_id, _CLAIM_WAIT_SECONDS, long=self._long)
             except ServerError as error:
                 self._sight.lost(error)
                 self._ending.wait(_RETRY_SECONDS)
@@ -246,6 +249,8 @@ class _Watch:
                         due = time.monotonic() + REPORT_SECONDS
                         self._send_frames()
                 case PlaySeen():
+                    # Behind the moment that it is of, which nobody is to see it without.
+                    self._send_frames()
                     self._send_seen(said)
                 case Progressed():
                     self._progress = said.share
@@ -264,6 +269,8 @@ class _Watch:
 
     def _send_frames(self) -> None:
         frames, self._frames = self._frames, []
+        if not frames:
+            return
         packed = b"".join(len(frame).to_bytes(FRAME_LENGTH_BYTES, "little") + frame for frame in frames)
         if len(packed) > MAX_FRAMES_BYTES:
             return

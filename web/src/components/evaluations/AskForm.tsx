@@ -1,14 +1,16 @@
 /** Which policies are to be measured on which suites. */
 import { Button, Group, MultiSelect, Stack } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
-import { keepPreviousData } from '@tanstack/react-query'
+import { keepPreviousData, useQueries } from '@tanstack/react-query'
 import { useState } from 'react'
 import { useSearchParams } from 'react-router'
 import { $api } from '../../api/client'
+import { refusalOf } from '../../api/errors'
 import type { ArenaConfig } from '../../api/types'
 import { plural, words } from '../../lib/format'
 import { DifficultySlider } from '../DifficultySlider'
 import { useChange } from '../people/useChange'
+import { Notice } from '../ui'
 import {
   BASELINES,
   isFamily,
@@ -39,10 +41,30 @@ function strangers(
   return chosen.filter((value) => !values.has(value)).map((value) => ({ value, label: label(value) }))
 }
 
-/** "Checkpoint 9a1…", "crowd". */
-function nameOf(key: string): string {
-  const name = key.slice(key.indexOf(':') + 1)
-  return key.startsWith('checkpoint:') ? `Checkpoint ${name}` : name
+const CHECKPOINT = 'checkpoint:'
+
+/** "crowd"; a checkpoint, until its name has come, as such. */
+function nameOf(key: string, checkpoints: ReadonlyMap<string, string>): string {
+  return key.startsWith(CHECKPOINT)
+    ? (checkpoints.get(key) ?? 'A checkpoint')
+    : key.slice(key.indexOf(':') + 1)
+}
+
+/** What the chosen checkpoints are called: "Two rooms, seed 1, step 40,000", by key. */
+function useCheckpointNames(keys: readonly string[]): ReadonlyMap<string, string> {
+  const wanted = keys.filter((key) => key.startsWith(CHECKPOINT))
+  return useQueries({
+    queries: wanted.map((key) =>
+      $api.queryOptions(
+        'get',
+        '/api/checkpoints/{checkpoint_id}/start',
+        { params: { path: { checkpoint_id: key.slice(CHECKPOINT.length) } } },
+        FOR_GOOD,
+      ),
+    ),
+    combine: (found) =>
+      new Map(wanted.map((key, index) => [key, found[index]?.data?.start_from.title ?? 'A checkpoint'])),
+  })
 }
 
 /** "maze, difficulty 0.5". */
@@ -53,7 +75,7 @@ function groundOf(key: string, difficulty: number): string {
 
 export function AskForm() {
   const [search] = useSearchParams()
-  const settle = useChange()
+  const { onSettled } = useChange()('ask for these evaluations')
   const [policies, setPolicies] = useState(() =>
     search.getAll('policy').filter((key) => policyOf(key) !== null),
   )
@@ -81,7 +103,8 @@ export function AskForm() {
     { params: { query: { limit: 30, ...(wanted ? { query: JSON.stringify(wanted) } : {}) } } },
     { placeholderData: keepPreviousData },
   )
-  const ask = $api.useMutation('post', '/api/evaluations', settle('ask for these evaluations'))
+  const checkpoints = useCheckpointNames(policies)
+  const ask = $api.useMutation('post', '/api/evaluations', { onSettled })
 
   const own: Option[] = (trainings.data?.items ?? []).map((each) => ({
     value: policyKey('training', each.id),
@@ -150,7 +173,7 @@ export function AskForm() {
           value={policies}
           onChange={setPolicies}
           data={[
-            { group: 'Chosen', items: strangers(policies, known, nameOf) },
+            { group: 'Chosen', items: strangers(policies, known, (key) => nameOf(key, checkpoints)) },
             { group: 'Your trainings', items: own },
             { group: 'Uploaded', items: sent },
             { group: 'Shipped', items: ready },
@@ -186,6 +209,11 @@ export function AskForm() {
       </Group>
       {families && (
         <DifficultySlider label="Difficulty of families" value={difficulty} onChange={setDifficulty} />
+      )}
+      {ask.error && (
+        <Notice title="Not asked for" bad role="alert">
+          {refusalOf(ask.error)}
+        </Notice>
       )}
       <Group gap="sm">
         <Button type="submit" disabled={policies.length === 0} loading={ask.isPending}>

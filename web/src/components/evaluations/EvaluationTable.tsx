@@ -1,9 +1,12 @@
 /** Evaluations that were asked for: how far they are, and what came of them. */
 import { ActionIcon, Anchor, Group, Table, Text, Tooltip, VisuallyHidden } from '@mantine/core'
+import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../../api/client'
 import type { AskedEvaluation } from '../../api/types'
 import { duration, percent, significant, words } from '../../lib/format'
+import { endedSo } from '../../lib/useArrangement'
+import { DeleteDialog } from '../DeleteDialog'
 import table from '../ExperimentTable.module.css'
 import { IconTrash, IconX } from '../icons'
 import { SuccessEstimate } from '../MeasuredEstimate'
@@ -19,6 +22,7 @@ export const titleOf = ({ title, policy }: AskedEvaluation) =>
 
 export function EvaluationTable({ evaluations }: { evaluations: readonly AskedEvaluation[] }) {
   const settle = useChange()
+  const [deleted, setDeleted] = useState<AskedEvaluation>()
   const cancel = $api.useMutation(
     'post',
     '/api/evaluations/{evaluation_id}/cancel',
@@ -34,8 +38,8 @@ export function EvaluationTable({ evaluations }: { evaluations: readonly AskedEv
       <Table className={table.table} highlightOnHover aria-label="Evaluations">
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Policy</Table.Th>
-            <Table.Th>Suite</Table.Th>
+            <Table.Th w="24%">Policy</Table.Th>
+            <Table.Th w="14%">Suite</Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th ta="right" visibleFrom="sm">
               Collision
@@ -68,19 +72,36 @@ export function EvaluationTable({ evaluations }: { evaluations: readonly AskedEv
                 <Action
                   evaluation={each}
                   onCancel={() => cancel.mutate({ params: { path: { evaluation_id: each.id } } })}
-                  onDelete={() => remove.mutate({ params: { path: { evaluation_id: each.id } } })}
+                  onDelete={() => setDeleted(each)}
                 />
               </Table.Td>
             </Table.Tr>
           ))}
         </Table.Tbody>
       </Table>
+      {deleted && (
+        <DeleteDialog
+          opened
+          what={`“${titleOf(deleted)}” on ${deleted.suite ?? suiteTitle(deleted.choice)}`}
+          busy={remove.isPending}
+          onClose={() => setDeleted(undefined)}
+          onDelete={() =>
+            remove.mutate(
+              { params: { path: { evaluation_id: deleted.id } } },
+              { onSettled: () => setDeleted(undefined) },
+            )
+          }
+        >
+          Its figures, its episodes and where its robots drove go for good, from leaderboards too. The policy
+          stays, and can be measured again.
+        </DeleteDialog>
+      )}
     </Table.ScrollContainer>
   )
 }
 
 function Outcome({ evaluation }: { evaluation: AskedEvaluation }) {
-  const { figures, state, error } = evaluation
+  const { id, figures, state, error } = evaluation
   if (figures === null) {
     return (
       <Table.Td colSpan={5}>
@@ -97,10 +118,14 @@ function Outcome({ evaluation }: { evaluation: AskedEvaluation }) {
   return (
     <>
       <Table.Td>
-        <SuccessEstimate estimate={figures.success} />
+        <Anchor component={Link} to={`/evaluations/${id}${endedSo('arrival')}`} c="inherit" size="sm">
+          <SuccessEstimate estimate={figures.success} />
+        </Anchor>
       </Table.Td>
       <Table.Td ta="right" className={ui.number} visibleFrom="sm">
-        {percent(figures.collision)}
+        <Anchor component={Link} to={`/evaluations/${id}${endedSo('collision')}`} c="inherit" size="sm">
+          {percent(figures.collision)}
+        </Anchor>
       </Table.Td>
       <Table.Td ta="right" className={ui.number} visibleFrom="sm">
         {figures.spl.toFixed(2)}
@@ -117,12 +142,17 @@ function Outcome({ evaluation }: { evaluation: AskedEvaluation }) {
 
 /** A bar with the time that is left. */
 export function Progress({ evaluation }: { evaluation: AskedEvaluation }) {
-  const { state, progress, seconds_left: left, waits_for: lacking } = evaluation
+  const { state, progress, seconds_left: left, waits_for: lacking, behind = [], starts_in } = evaluation
   if (state === 'queued') {
     const having = lacking.map(({ name, version }) => `${name} ${version}`).join(', ')
     return (
       <Text size="sm" c="dimmed">
-        {lacking.length > 0 ? `Waits for a worker that has ${having}` : 'Waits for a worker'}
+        {lacking.length > 0
+          ? `Waits for a worker that has ${having}`
+          : behind[0] === undefined
+            ? 'Waits for a worker'
+            : `Waits behind ${words(behind[0])}${behind.length > 1 ? ` and ${behind.length - 1} more` : ''}`}
+        {starts_in != null && `, about ${duration(starts_in)}`}
       </Text>
     )
   }
