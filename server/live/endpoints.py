@@ -18,7 +18,7 @@ from server.live.page import HEADERS, VISER_PROTOCOL, live_page, own_websocket
 from server.live.settings import LiveSettings, LiveState
 from server.live.watched import CHECKPOINT_PREFIX, Watched, checkpoint_view, policy_view, watched
 from server.security.permissions import SIGNED_IN, view
-from server.security.principal import principal_of
+from server.security.principal import Principal, PrincipalDep, principal_of
 from server.services import Services, ServicesDep
 from sim.errors import ArenaError
 from workers.scene.themes import Theme
@@ -49,42 +49,48 @@ WatchedCheckpointDep = Annotated[Watched, Depends(_watched_checkpoint)]
 
 
 @router.get("/api/runs/{run_id}/live", responses=NOT_FOUND, dependencies=[view("run_id")])
-async def get_live(subject: WatchedDep, services: ServicesDep) -> LiveState:
+async def get_live(subject: WatchedDep, services: ServicesDep, principal: PrincipalDep) -> LiveState:
     """What the live view of a run shows, and whether it has anything to show."""
-    return _state(subject, services)
+    return _state(subject, services, principal)
 
 
 @router.put("/api/runs/{run_id}/live", responses=NOT_FOUND, dependencies=[view("run_id")])
-async def change_live(subject: WatchedDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
-    """Change what the live view of a run shows, for everyone who watches it."""
-    services.live.configure(subject.id, settings)
-    return _state(subject, services)
+async def change_live(
+    subject: WatchedDep, settings: LiveSettings, services: ServicesDep, principal: PrincipalDep
+) -> LiveState:
+    """Change what the live view of a run shows: mode and speed for everyone who watches it, the rest for oneself."""
+    services.live.configure(subject.id, settings, principal.person)
+    return _state(subject, services, principal)
 
 
 @router.get("/api/policies/{name}/live", responses=NOT_FOUND, dependencies=[SIGNED_IN])
-async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep) -> LiveState:
+async def get_policy_live(subject: WatchedPolicyDep, services: ServicesDep, principal: PrincipalDep) -> LiveState:
     """What the live view of a shipped policy shows."""
-    return _state(subject, services)
+    return _state(subject, services, principal)
 
 
 @router.put("/api/policies/{name}/live", responses=NOT_FOUND, dependencies=[SIGNED_IN])
-async def change_policy_live(subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
-    """Change what the live view of a shipped policy shows, for everyone who watches it."""
-    services.live.configure(subject.id, settings)
-    return _state(subject, services)
+async def change_policy_live(
+    subject: WatchedPolicyDep, settings: LiveSettings, services: ServicesDep, principal: PrincipalDep
+) -> LiveState:
+    """Change what the live view of a shipped policy shows: speed for everyone who watches it, the rest for oneself."""
+    services.live.configure(subject.id, settings, principal.person)
+    return _state(subject, services, principal)
 
 
 @router.get("/api/checkpoints/{checkpoint_id}/live", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
-async def get_checkpoint_live(subject: WatchedCheckpointDep, services: ServicesDep) -> LiveState:
+async def get_checkpoint_live(subject: WatchedCheckpointDep, services: ServicesDep, principal: PrincipalDep) -> LiveState:
     """What the live view of a checkpoint shows."""
-    return _state(subject, services)
+    return _state(subject, services, principal)
 
 
 @router.put("/api/checkpoints/{checkpoint_id}/live", responses=NOT_FOUND, dependencies=[view("checkpoint_id")])
-async def change_checkpoint_live(subject: WatchedCheckpointDep, settings: LiveSettings, services: ServicesDep) -> LiveState:
-    """Change what the live view of a checkpoint shows, for everyone who watches it."""
-    services.live.configure(subject.id, settings)
-    return _state(subject, services)
+async def change_checkpoint_live(
+    subject: WatchedCheckpointDep, settings: LiveSettings, services: ServicesDep, principal: PrincipalDep
+) -> LiveState:
+    """Change what the live view of a checkpoint shows: speed for everyone who watches it, the rest for oneself."""
+    services.live.configure(subject.id, settings, principal.person)
+    return _state(subject, services, principal)
 
 
 @router.get("/live/{run_id}/", include_in_schema=False, dependencies=[view("run_id")])
@@ -123,7 +129,9 @@ async def stream_scene(websocket: WebSocket, run_id: str, services: ServicesDep,
         async with AsyncExitStack() as stack:
             if subject.driven is not None:
                 await stack.enter_async_context(services.drivers.driving(JobService(services), run_id, subject.driven))
-            view = await stack.enter_async_context(services.live.watch(run_id, subject.task, theme, subject.stage))
+            view = await stack.enter_async_context(
+                services.live.watch(run_id, subject.task, theme, subject.stage, _person(subject, websocket))
+            )
             await until_one_ends(
                 partial(bridge, websocket, view, PLAY if subject.stage is not None else WATCH),
                 partial(services.gate.until_changed, principal_of(websocket)),
@@ -150,7 +158,7 @@ async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, servic
 async def _send_scores(websocket: WebSocket, subject: Watched, theme: Theme, services: Services) -> None:
     told = ""
     while True:
-        score = services.live.score(subject.id, theme)
+        score = services.live.score(subject.id, theme, _person(subject, websocket))
         if subject.driven is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
             score = score.model_copy(update={"refusal": refusal})
         if subject.id.startswith(CHECKPOINT_PREFIX):
@@ -174,5 +182,11 @@ async def _found(identifier: str, services: Services) -> Watched | None:
         return None
 
 
-def _state(subject: Watched, services: Services) -> LiveState:
-    return LiveState(**services.live.settings(subject.id).model_dump(), status=services.live.status(subject.id))
+def _state(subject: Watched, services: Services, principal: Principal) -> LiveState:
+    settings = services.live.settings(subject.id, principal.person)
+    return LiveState(**settings.model_dump(), status=services.live.status(subject.id))
+
+
+def _person(subject: Watched, websocket: WebSocket) -> str:
+    """Whose scene it is: what is in a playground is everybody's."""
+    return "" if subject.stage is not None else principal_of(websocket).person

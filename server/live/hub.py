@@ -90,20 +90,40 @@ class _Screen:
 
 @dataclass
 class _Channel:
-    """All that is known about one run's live view."""
+    """All that is known about one run's live view.
 
-    settings: LiveSettings = field(default_factory=LiveSettings)
+    Attributes:
+        common: of which mode and speed count, since whoever drives sends one picture to all: as somebody chose last.
+        chosen: what each person has chosen, where that is not what everybody has at first.
+    """
+
+    common: LiveSettings = field(default_factory=LiveSettings)
+    chosen: dict[str, LiveSettings] = field(default_factory=dict)
     callbacks: list[WatchCallback] = field(default_factory=list)
     driver: WatchCallback | None = None
     told: WatchRequest | None = None
-    screens: dict[Theme, _Screen] = field(default_factory=dict)
+    screens: dict[tuple[str, Theme], _Screen] = field(default_factory=dict)
     last_frame: float = float("-inf")
     playground: bool = False
 
     @property
-    def views(self) -> list[View]:
-        """The scenes that somebody looks at."""
-        return [screen.view for screen in self.screens.values() if screen.watchers and screen.view is not None]
+    def views(self) -> list[tuple[str, View]]:
+        """Who looks, and at which scene."""
+        return [
+            (person, screen.view)
+            for (person, _), screen in self.screens.items()
+            if screen.watchers and screen.view is not None
+        ]
+
+    def settings_of(self, person: str) -> LiveSettings:
+        """What a person sees, or would see."""
+        own = self.chosen.get(person, _AT_FIRST)
+        return own.model_copy(update={"mode": self.common.mode, "speed": self.common.speed})
+
+    def choose(self, person: str, settings: LiveSettings) -> None:
+        """Follows a person's choice."""
+        self.common = settings
+        self.chosen[person] = settings
 
     @property
     def connected(self) -> bool:
@@ -111,11 +131,16 @@ class _Channel:
         return bool(self.callbacks) or self.driver is not None
 
     def request(self) -> WatchRequest | None:
-        return self.settings.watch_request() if self.views else None
+        """What is asked of whoever drives: as many robots as anybody who looks wants to see."""
+        watching = [self.settings_of(person) for person, _ in self.views]
+        return max(watching, key=lambda one: one.robots).watch_request() if watching else None
+
+
+_AT_FIRST = LiveSettings()
 
 
 class LiveHub:
-    """The live views of all runs.
+    """The live views of all runs. A person is named by the account; what all share, as a playground, is nobody's: "".
 
     Args:
         view_factory: builds the scene of a run; called in a thread, at the first watcher.
@@ -184,7 +209,7 @@ class LiveHub:
         if channel is None or not (views := channel.views):
             return
         frame = data if isinstance(data, Frame) else Frame.decode(data)
-        for view in views:
+        for _, view in views:
             view.show(frame)
         channel.last_frame = time.monotonic()
 
@@ -195,15 +220,14 @@ class LiveHub:
 
     # -- the pages' side --------------------------------------------------------------------------------------------------
 
-    def settings(self, run_id: str) -> LiveSettings:
-        """What the live view of this run shows, or would show."""
-        channel = self._channels.get(run_id)
-        return channel.settings if channel else LiveSettings()
+    def settings(self, run_id: str, person: str = "") -> LiveSettings:
+        """What the live view of this run shows to a person, or would show."""
+        return self._channels.get(run_id, _NOBODY).settings_of(person)
 
-    def configure(self, run_id: str, settings: LiveSettings) -> None:
-        """Changes what the live view of this run shows, for everyone who watches it."""
+    def configure(self, run_id: str, settings: LiveSettings, person: str = "") -> None:
+        """Changes what the live view of this run shows: mode and speed for all who watch it, the rest for a person."""
         channel = self._channel(run_id)
-        channel.settings = settings
+        channel.choose(person, settings)
         self._apply(channel)
 
     def status(self, run_id: str) -> LiveStatus:
@@ -217,7 +241,7 @@ class LiveHub:
 
     @contextlib.asynccontextmanager
     async def watch(
-        self, run_id: str, task: TaskConfig, theme: Theme = "light", stage: "Stage | None" = None
+        self, run_id: str, task: TaskConfig, theme: Theme = "light", stage: "Stage | None" = None, person: str = ""
     ) -> AsyncGenerator[View]:
         """Counts a watcher of this run for as long as the context lasts.
 
@@ -226,17 +250,18 @@ class LiveHub:
             task: what to draw.
             theme: light or dark.
             stage: of a playground.
+            person: who watches, in a scene of their own.
 
         Raises:
             TooManyViewsError: the cap on scenes is reached.
         """
         channel = self._channel(run_id)
         channel.playground = stage is not None
-        screen = channel.screens.setdefault(theme, _Screen())
+        screen = channel.screens.setdefault((person, theme), _Screen())
         screen.watchers += 1
         try:
             # Shielded: a browser that leaves meanwhile must not leave a scene behind that nobody knows of.
-            yield await asyncio.shield(self._start(self._open(channel, screen, task, theme, stage)))
+            yield await asyncio.shield(self._start(self._open(channel, screen, task, theme, stage, person)))
         finally:
             screen.watchers -= 1
             self._apply(channel)
@@ -255,10 +280,10 @@ class LiveHub:
             screen.watchers for channel in tuple(self._channels.values()) for screen in tuple(channel.screens.values())
         )
 
-    def score(self, run_id: str, theme: Theme) -> Score:
-        """What the head-up display of a scene shows."""
+    def score(self, run_id: str, theme: Theme, person: str = "") -> Score:
+        """What the head-up display of a person's scene shows."""
         channel = self._channels.get(run_id, _NOBODY)
-        screen = channel.screens.get(theme)
+        screen = channel.screens.get((person, theme))
         if screen is None or screen.view is None:
             score = Score(state="waiting" if channel.connected else "no worker")
             if self._open_scenes >= self._capacity:
@@ -287,8 +312,8 @@ class LiveHub:
 
     def _apply(self, channel: _Channel) -> None:
         """Tells the scene and the worker's link where they stand, the latter only what is new to it."""
-        for view in channel.views:
-            view.apply(channel.settings, channel.connected)
+        for person, view in channel.views:
+            view.apply(channel.settings_of(person), channel.connected)
         request = channel.request()
         if request != channel.told:
             channel.told = request
@@ -302,14 +327,17 @@ class LiveHub:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    async def _open(self, channel: _Channel, screen: _Screen, task: TaskConfig, theme: Theme, stage: "Stage | None") -> View:
+    async def _open(
+        self, channel: _Channel, screen: _Screen, task: TaskConfig, theme: Theme, stage: "Stage | None", person: str
+    ) -> View:
         async with screen.lock:
             if screen.view is None:
                 if self._open_scenes >= self._capacity:
                     raise TooManyViewsError(self._full)
                 self._open_scenes += 1
                 try:
-                    screen.view = await asyncio.to_thread(self._view_factory, task, theme, channel.settings, stage)
+                    settings = channel.settings_of(person)
+                    screen.view = await asyncio.to_thread(self._view_factory, task, theme, settings, stage)
                 except BaseException:
                     self._open_scenes -= 1
                     raise

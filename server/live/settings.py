@@ -15,7 +15,7 @@ RECEIVING_SECONDS = 2.0
 
 
 class LiveSettings(Frozen):
-    """What the live view of a run shows; one setting per run, shared by everyone who watches it."""
+    """What the live view of a run shows: mode and speed to everyone who watches it, the rest as each person chose."""
 
     mode: ViewMode = Field(
         "policy", title="Show", description="Training: what the training robots do, time-lapsed. Policy: the newest weights."

@@ -129,6 +129,7 @@ class LiveView:
             frame = self._buffer.take()
             settings = self._settings
             if frame is not None:
+                frame = frame.of_first(settings.robots)  # somebody else may watch more of them
                 self._scoreboard.update(frame)
         self._scene.show_rays(settings.rays, None if settings.ray_robots == "all" else settings.follow or 0)
         self._camera.follow(settings.follow, now)

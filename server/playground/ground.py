@@ -174,6 +174,7 @@ class Ground:
                 value=round(seen.value, _DECIMALS) if seen else None,
                 outcome=seen.outcome if seen else None,
                 seconds=seen.seconds if seen else None,
+                outdated=seen is None or seen.revision < self._revision,
                 problem=seen.problem if seen else None,
             )
 

@@ -109,6 +109,9 @@ class Playground(Schema):
     value: float | None = Field(description="Discounted sum of the rewards that it is about to collect, driven ahead.")
     outcome: Outcome | None = Field(description="How its attempt is about to end; null where that takes longer.")
     seconds: float | None = Field(description="Until then, simulated.")
+    outdated: bool = Field(
+        description="Whether value, outcome and seconds are of before the last change; new ones follow within a second."
+    )
     problem: str | None = Field(description="What could not be done.")
 
 

@@ -41,6 +41,11 @@ class Principal:
     roles: Mapping[str, Role] = field(default_factory=dict)
 
     @property
+    def person(self) -> str:
+        """Whom it comes from, whichever way they signed in: an account, or all who hold the owner's token."""
+        return self.user_id or self.kind
+
+    @property
     def visible(self) -> frozenset[str] | None:
         """The projects that may be seen; None for all."""
         return None if self.everywhere is not None else frozenset(self.roles)

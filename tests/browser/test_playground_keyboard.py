@@ -107,7 +107,7 @@ def test_everything_in_a_playground_is_done_by_keyboard_alone(context: BrowserCo
 
     # Time.
     press(page, "Pause")
-    before = asked.until(lambda now: now["settings"]["paused"])
+    before = asked.until(lambda now: now["settings"]["paused"] and not now["outdated"])
     expect(page.get_by_role("button", name="Go on")).to_be_focused()
     press(page, "One step")
     after = asked.until(lambda now: now["sim_time"] > before["sim_time"])

@@ -162,6 +162,31 @@ def test_a_scene_lives_as_long_as_somebody_watches_and_a_little_longer() -> None
     asyncio.run(scenario())
 
 
+def test_what_a_person_chooses_is_their_own_but_for_mode_and_speed() -> None:
+    async def scenario() -> None:
+        hub, asked = LiveHub(LiveView, linger=0.0), Asked()
+        hub.attach("run", asked.tell)
+        async with hub.watch("run", TaskConfig(), person="ada") as hers, hub.watch("run", TaskConfig(), person="bob") as his:
+            assert hers is not his
+            hub.configure("run", LiveSettings(robots=12, rays=False, follow=3, speed=5), "ada")
+            assert hub.settings("run", "ada") == LiveSettings(robots=12, rays=False, follow=3, speed=5)
+            assert hub.settings("run", "bob") == LiveSettings(speed=5)
+            # As many robots as anybody wants to see.
+            assert asked.newest() == WatchRequest(robots=12, speed=5.0)
+            hub.configure("run", LiveSettings(robots=2, speed=5), "bob")
+            for number in range(60):
+                hub.frames("run", make_frame(number, robots=12))
+                await asyncio.sleep(0.02)
+            # Of the twelve each sees those that were asked for.
+            assert [line.index for line in hub.score("run", "light", "ada").robots] == [3]
+            assert [line.index for line in hub.score("run", "light", "bob").robots] == [0, 1]
+            hub.configure("run", LiveSettings(robots=2, mode="training"), "bob")
+            assert asked.newest() == WatchRequest(mode="training", robots=12)
+        await hub.close()
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.parametrize(
     "headers",
     [{}, {"Origin": "http://evil.example"}, {"Authorization": "Bearer guessed"}, {"Authorization": "Bearer ünïcode"}],
@@ -478,7 +503,7 @@ def test_the_camera_gets_through_and_nothing_else(client: TestClient, services: 
             browser.send_bytes(msgspec.msgpack.encode(forbidden))
         browser.send_text("no bytes")
         browser.send_bytes(msgspec.msgpack.encode(CAMERA))
-        view = services.live._channels[run_id].screens["light"].view
+        view = services.live._channels[run_id].screens["owner", "light"].view
         assert isinstance(view, LiveView)
         # viser counts a client as connected once it knows its camera.
         deadline = time.monotonic() + 10

@@ -420,6 +420,8 @@ function LiveControls({ live, change, driven, said }: LiveControlsProps) {
       </Group>
       <Text size="xs" c="dimmed" mt={6}>
         {said ?? (driven ? 'The best policy, after training, in real time or faster.' : DESCRIPTIONS[mode])}
+        {(live?.status.watchers ?? 0) > 1 &&
+          ` ${count(live?.status.watchers ?? 0)} watch: the ${driven ? 'speed is' : 'policy or training and the speed are'} the same for all, the rest is your own.`}
       </Text>
     </fieldset>
   )

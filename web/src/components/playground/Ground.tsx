@@ -63,7 +63,7 @@ export function Ground({ ground }: { ground: Playground }) {
           <dl className={classes.facts} data-testid="foresight">
             <div>
               <dt>Ahead</dt>
-              <dd data-testid="outcome">
+              <dd data-testid="outcome" data-outdated={ground.outdated || undefined}>
                 {ground.seconds === null
                   ? '–'
                   : ground.outcome
@@ -73,7 +73,9 @@ export function Ground({ ground }: { ground: Playground }) {
             </div>
             <div>
               <dt>Value</dt>
-              <dd>{ground.value === null ? '–' : significant(ground.value, 4)}</dd>
+              <dd data-outdated={ground.outdated || undefined}>
+                {ground.value === null ? '–' : significant(ground.value, 4)}
+              </dd>
             </div>
             <div>
               <dt>Reward since the last target</dt>
