@@ -10,14 +10,13 @@ from server.comparison.following import Followed
 from server.comparison.grid import Curve, Grid, all_under_way, resample
 from server.comparison.schemas import ExperimentCurves, SeedCurve
 from server.database import tables
-from server.estimates import is_rate
+from server.estimates import metric_band
 from server.metrics.buckets import MAX_BUCKETS, SUMMARY_WIDTH, Buckets
 from server.metrics.lines import cut_lines
 from server.metrics.points import Points
 from server.metrics.repository import MetricRepository
 from server.metrics.service import json_rows
 from server.metrics.thinning import EVALUATIONS
-from workers.statistics.seeds import means_band, rates_band
 
 
 def _width(points: int) -> int:
@@ -67,19 +66,19 @@ class _Together:
     band: NDArray[np.float64]
 
     @classmethod
-    def of(cls, curves: Sequence[Curve], grid: NDArray[np.float64], *, rate: bool, driven: Sequence[int]) -> "_Together":
+    def of(cls, curves: Sequence[Curve], grid: NDArray[np.float64], *, name: str, driven: Sequence[int]) -> "_Together":
         """Of the curves of its runs.
 
         Args:
             curves: of each run.
             grid: where they are looked at.
-            rate: whether the metric is a rate, 0 to 1.
+            name: of the metric.
             driven: episodes behind each value of each run; 0 where that is not known.
         """
         values = np.array([resample(curve, grid) for curve in curves]).reshape(len(curves), grid.size)
         episodes = np.array(driven, np.float64)[:, None]
         counted = episodes[np.isfinite(values).any(axis=1)].all()
-        band = rates_band(values, episodes if counted else None) if rate else means_band(values)
+        band = metric_band(name, values, episodes if counted else None)
         return cls(values, np.where(all_under_way(curves, values), np.stack(band), np.nan))
 
 
@@ -108,7 +107,7 @@ def experiment_curves(
         _Together.of(
             [series[run.id] for run in experiment.runs],
             grid,
-            rate=is_rate(name),
+            name=name,
             driven=[episodes.get(run.id, 0) if measured else 0 for run in experiment.runs],
         )
         for experiment in experiments

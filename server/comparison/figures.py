@@ -86,7 +86,7 @@ class FinalFigures:
             suite=self.suite,
             suite_hash=self.suite_hash,
             success=success_estimate(self.arrivals, self.episodes) if self.seeds else None,
-            steps_per_target=mean_estimate(self.steps),
+            steps_per_target=mean_estimate(self.steps, least=0.0),
             reward=mean_estimate([seed.reward for seed in self.driven]),
         )
 

@@ -43,7 +43,8 @@ def elapsed(seconds: float) -> str:
 
 
 def _counted(value: float) -> str:
-    return f"{value:,g}"
+    # As on the pages: a narrow space between thousands.
+    return (f"{value:,.0f}" if value == round(value) else f"{value:,g}").replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
 STEPS = Horizontal("Steps", _counted)

@@ -8,9 +8,10 @@ from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles
 from server.estimates import is_rate
 from server.printing.axes import ACROSS, Horizontal
+from server.printing.names import metric_words
 from server.printing.palette import STYLE, looks_of
 from server.printing.svg import Line, can_be_logarithmic, line_chart
-from server.printing.tables import PrintedTable, TableName, printed
+from server.printing.tables import MEASURES, PrintedTable, TableName, printed
 
 _STYLE = """
 :root { color-scheme: light dark; }
@@ -20,6 +21,7 @@ th, td { padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; bo
 .wide { overflow-x: auto; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr)); gap: 1.5rem; }
 figure { margin: 0; }
+h3 code { font-weight: 400; font-size: .8em; opacity: .75; }
 p.note, figcaption.note { max-width: 90ch; font-size: .87em; opacity: .85; }
 """
 _TABLES: tuple[TableName, ...] = ("figures", "verdicts", "improvements", "differences")
@@ -80,6 +82,7 @@ class Report:
                 f'<p class="note">{escape(self.made)} <a href="{escape(self.link)}">{escape(self.link)}</a></p>',
                 *self._warnings(),
                 *(_table(table) for name in _TABLES if (table := printed(self.comparison, name)).rows),
+                *self._reasons(),
                 f'<h2>Charts</h2><p class="note">{_BANDS}</p><div class="charts">{"".join(charts)}</div>',
                 "</body></html>",
             ]
@@ -92,6 +95,16 @@ class Report:
         items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
         return [f"<h2>Before reading too much into this</h2><ul>{items}</ul>"]
 
+    def _reasons(self) -> list[str]:
+        names = {one.id: one.name for one in self.comparison.experiments}
+        items = [
+            f"{names[each.other]} beside {names[each.base]}, {MEASURES[each.measure].lower()}: {each.word}. {each.reason}"
+            for each in self.comparison.verdicts
+        ]
+        if not items:
+            return []
+        return ["<h2>Reasons of the verdicts</h2>", f"<ul>{''.join(f'<li>{escape(item)}</li>' for item in items)}</ul>"]
+
     def _profile(self) -> str:
         looks = looks_of(one.id for one in self.profiles.experiments)
         lines = [
@@ -100,7 +113,9 @@ class Report:
             if one.mean
         ]
         title = "Performance profile: share of attempts that score more"
-        return _figure(title, line_chart(title, _SCORE, self.profiles.thresholds, lines, rate=True))
+        return _figure(
+            title, line_chart(title, _SCORE, self.profiles.thresholds, lines, rate=True, vertical="Share of attempts")
+        )
 
     def _curves(self, curves: Curves) -> str:
         looks = looks_of(one.id for one in curves.experiments)
@@ -117,8 +132,14 @@ class Report:
             rate=is_rate(curves.name),
             log_x=self.look.log_x,
             log_y=log_y,
+            vertical=metric_words(curves.name),
         )
-        return _figure(curves.name, chart, " ".join(_notes(curves, linear=log_y and not can_be_logarithmic(lines))))
+        return _figure(
+            metric_words(curves.name),
+            chart,
+            " ".join(_notes(curves, linear=log_y and not can_be_logarithmic(lines))),
+            raw=curves.name,
+        )
 
 
 def _notes(curves: Curves, *, linear: bool) -> list[str]:
@@ -138,9 +159,10 @@ _SCORE = Horizontal("Score: path efficiency of an arrival, else 0", lambda value
 _BANDS = "Means over seeds; bands are 95 % intervals over seeds (Student's t, of rates on the scale of the logit)."
 
 
-def _figure(title: str, chart: str, note: str = "") -> str:
+def _figure(title: str, chart: str, note: str = "", raw: str = "") -> str:
     below = f'<figcaption class="note">{escape(note)}</figcaption>' if note else ""
-    return f"<figure><h3>{escape(title)}</h3>{chart}{below}</figure>"
+    name = f" <code>{escape(raw)}</code>" if raw else ""
+    return f"<figure><h3>{escape(title)}{name}</h3>{chart}{below}</figure>"
 
 
 def _label(name: str, seeds: int) -> str:

@@ -37,6 +37,7 @@ def line_chart(
     rate: bool,
     log_x: bool = False,
     log_y: bool = False,
+    vertical: str = "",
 ) -> str:
     """The chart as an `svg` element.
 
@@ -48,6 +49,7 @@ def line_chart(
         rate: whether y is a share, 0 to 1.
         log_x: whether x is logarithmic; every one is above 0 then.
         log_y: whether y is, where every mean is above 0.
+        vertical: what y is.
     """
     drawn = [line for line in lines if any(value is not None for value in line.mean)]
     log_y = log_y and can_be_logarithmic(drawn)
@@ -61,6 +63,7 @@ def line_chart(
         across = scale(x[0], x[-1], _LEFT, _WIDTH - _RIGHT, logarithmic=log_x)
         up = scale(low, high, _HEIGHT - _BOTTOM, _TOP, logarithmic=log_y)
         parts += _levels(ticks(low, high, logarithmic=log_y), up, rate=rate)
+        parts += _upright(vertical) if vertical else []
         parts += _places(horizontal, ticks(x[0], x[-1], horizontal.rounds, logarithmic=log_x), across)
         for line in drawn:
             # An interval that reaches below what a logarithmic axis shows ends at its edge.
@@ -92,6 +95,12 @@ def _places(horizontal: Horizontal, places: Sequence[float], across: Callable[[f
     below = _HEIGHT - _BOTTOM
     parts = [_text(across(tick), below + 16, "middle", horizontal.text(tick)) for tick in places]
     return [*parts, _text((_LEFT + _WIDTH - _RIGHT) / 2, below + 34, "middle", horizontal.title)]
+
+
+def _upright(title: str) -> list[str]:
+    middle = (_TOP + _HEIGHT - _BOTTOM) / 2
+    place = f'transform="translate(12 {middle:.1f}) rotate(-90)" text-anchor="middle"'
+    return [f'<text {place} fill="currentColor">{escape(title)}</text>']
 
 
 def _text(left: float, top: float, anchor: str, text: str) -> str:

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from server.comparison.schemas import Comparison, ComparisonVerdict
+from server.printing.names import setting_words
 from server.schemas import Estimate
 
 TableName = Literal["figures", "verdicts", "improvements", "differences"]
 
 NOTHING = "–"
-_MEASURES = {"success": "Success", "steps_per_target": "Steps to target"}
+MEASURES = {"success": "Success", "steps_per_target": "Steps to target"}
 # A p that is less is written so.
 _SMALL_P = 0.001
 _DIGITS = 3
@@ -27,13 +28,15 @@ class PrintedTable:
         caption: how its numbers were made.
         heading: of each column.
         rows: a cell for each column.
+        texts: the columns of words, by place; all others are of numbers.
     """
 
-    name: TableName
+    name: str
     title: str
     caption: str
     heading: tuple[str, ...]
     rows: list[tuple[str, ...]]
+    texts: frozenset[int] = frozenset({0})
 
 
 def printed(comparison: Comparison, name: TableName) -> PrintedTable:
@@ -68,13 +71,14 @@ def _figures(comparison: Comparison) -> PrintedTable:
                 one.name,
                 str(one.seeds),
                 str(one.episodes),
-                _percent(one.success),
-                _number(one.steps_per_target),
-                _number(one.reward),
+                percentage(one.success),
+                number(one.steps_per_target),
+                number(one.reward),
                 _failed(one.success),
             )
             for one in comparison.experiments
         ],
+        texts=frozenset({0, 6}),
     )
 
 
@@ -95,7 +99,7 @@ def _verdicts(comparison: Comparison) -> PrintedTable:
             (
                 names[verdict.other].name,
                 names[verdict.base].name,
-                _MEASURES[verdict.measure],
+                MEASURES[verdict.measure],
                 f"{names[verdict.other].seeds}, {names[verdict.base].seeds}",
                 _difference(verdict),
                 _p(verdict.p_holm),
@@ -107,6 +111,7 @@ def _verdicts(comparison: Comparison) -> PrintedTable:
             )
             for verdict in comparison.verdicts
         ],
+        texts=frozenset({0, 1, 2, 6}),
     )
 
 
@@ -128,6 +133,7 @@ def _improvements(comparison: Comparison) -> PrintedTable:
             )
             for one in comparison.improvements
         ],
+        texts=frozenset({0, 1}),
     )
 
 
@@ -138,26 +144,33 @@ def _differences(comparison: Comparison) -> PrintedTable:
         caption="Settings that are not the same in all trainings.",
         heading=("Setting", *(one.name for one in comparison.experiments)),
         rows=[
-            (row.path, *(_setting(value, out) for value, out in zip(row.values, row.left_out, strict=True)))
+            (setting_words(row.path), *(_setting(value, out) for value, out in zip(row.values, row.left_out, strict=True)))
             for row in comparison.differences
         ],
+        texts=frozenset(range(1 + len(comparison.experiments))),
     )
 
 
-def _percent(estimate: Estimate | None) -> str:
+def percentage(estimate: Estimate | None) -> str:
+    """A share as 96.3 [92.2, 98.2], in per cent."""
     if estimate is None:
         return NOTHING
     return _interval(100 * estimate.value, 100 * estimate.low, 100 * estimate.high, "{:.1f}")
 
 
-def _number(estimate: Estimate | None) -> str:
-    return NOTHING if estimate is None else _interval(estimate.value, estimate.low, estimate.high, "{:.1f}")
+def number(estimate: Estimate | None, digits: int = 1) -> str:
+    """A mean as 61.4 [58.9, 63.8], with so many digits behind the point."""
+    return (
+        NOTHING if estimate is None else _interval(estimate.value, estimate.low, estimate.high, f"{{:.{digits}f}}", digits)
+    )
 
 
 def _failed(estimate: Estimate | None) -> str:
     if estimate is None or estimate.failed is None:
         return NOTHING
     failed = estimate.failed
+    if not failed.told:
+        return f"not told of {failed.seeds}"
     return f"{failed.failed} of {failed.seeds}, up to {100 * failed.at_most:.0f} % may"
 
 
@@ -168,10 +181,10 @@ def _difference(verdict: ComparisonVerdict) -> str:
     return _interval(verdict.difference * factor, verdict.low * factor, verdict.high * factor, "{:+.1f}")
 
 
-def _interval(value: float, low: float, high: float, form: str) -> str:
+def _interval(value: float, low: float, high: float, form: str, digits: int = 1) -> str:
     """As 96.3 [92.2, 98.2]."""
     # "-0.0" would be a sign without a meaning.
-    shown, start, end = (form.format(round(number, 1) + 0.0) for number in (value, low, high))
+    shown, start, end = (form.format(round(each, digits) + 0.0) for each in (value, low, high))
     return f"{shown} [{start}, {end}]"
 
 

@@ -29,7 +29,7 @@ _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 
 def latex(table: PrintedTable) -> str:
     """A `table` with booktabs; every text is escaped."""
-    columns = "l" + "r" * (len(table.heading) - 1)
+    columns = "".join("l" if place in table.texts else "r" for place in range(len(table.heading)))
     lines = [
         r"% \usepackage{booktabs}",
         r"\begin{table}",
@@ -50,7 +50,7 @@ def latex(table: PrintedTable) -> str:
 
 def markdown(table: PrintedTable) -> str:
     """A table as GitHub and pandoc read it, its caption below."""
-    rule = ("---", *("---:" for _ in table.heading[1:]))
+    rule = ["---" if place in table.texts else "---:" for place in range(len(table.heading))]
     rows = [_markdown_row(table.heading), f"| {' | '.join(rule)} |", *(_markdown_row(row) for row in table.rows)]
     return "\n".join([f"**{table.title}**", "", *rows, "", table.caption]) + "\n"
 

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 from httpx import Response
 
 from server.printing.axes import STEPS, elapsed, ticks
+from server.printing.names import metric_words, setting_words
 from server.printing.palette import DARK, DASHES, LIGHT, Look, color_of, looks_of
 from server.printing.svg import Line, line_chart
 from server.printing.tables import PrintedTable
@@ -39,7 +40,7 @@ def test_the_verdicts_as_latex(client: TestClient, pair: tuple[dict[str, Any], d
     assert response.headers["content-disposition"] == 'attachment; filename="mapless-verdicts.tex"'
     for part in (
         r"\usepackage{booktabs}",
-        r"\begin{tabular}{lrrrrrrrr}",
+        r"\begin{tabular}{lllrrrlrr}",
         r"\toprule",
         r"\midrule",
         r"\bottomrule",
@@ -60,7 +61,7 @@ def test_figures_as_markdown_and_csv(client: TestClient, pair: tuple[dict[str, A
     text = printed(client, "table", *pair, table="figures", format="markdown").text
     heading, rule, base, other = [line for line in text.splitlines() if line.startswith("|")]
     assert heading.startswith("| Training | Seeds | N (episodes) | Success (%) |")
-    assert rule == "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    assert rule == "| --- | ---: | ---: | ---: | ---: | ---: | --- |"
     assert re.match(r"\| base \| 5 \| 5000 \| 81\.4 \[\d\d\.\d, \d\d\.\d\] \| 100\.0 \[100\.0, 100\.0\] \|", base)
     # The name's own bar is no column, and its tags are text.
     assert len(re.findall(r"(?<!\\)\|", other)) == 8
@@ -117,6 +118,10 @@ def test_the_report_is_one_file_without_a_script(
     ids = "&".join(f"experiment={experiment['id']}" for experiment in pair)
     assert page.links == [f"http://127.0.0.1:8400/compare?{ids}&margin=0.05&base={pair[1]['id']}"]
     assert "within 5 points of success" in response.text
+    # A verdict has its reason, a chart its words and the title of its axis.
+    assert "<li>base beside 50% &amp; more" in response.text
+    assert "<h3>Success rate, evaluation <code>eval/success_rate</code></h3>" in response.text
+    assert 'rotate(-90)" text-anchor="middle" fill="currentColor">Success rate, evaluation</text>' in response.text
     # Both curves with two points, and four metrics that nobody reported.
     assert response.text.count("<polyline") == 2 + 2
 
@@ -147,6 +152,14 @@ def test_logarithmic_axes_of_a_chart_in_numbers() -> None:
     )
 
 
+def test_metrics_and_settings_are_printed_in_words() -> None:
+    assert metric_words("eval/collision_rate") == "Collision rate, evaluation"
+    assert metric_words("own") == "Own"
+    assert setting_words("algorithm.gamma") == "Algorithm: Discount (gamma)"
+    assert setting_words("nothing.known_of") == "Nothing: Known of"
+    assert STEPS.text(20_000) == "20\N{NARROW NO-BREAK SPACE}000"
+
+
 def test_ticks_are_round_as_what_they_count() -> None:
     assert ticks(0.0, 1.0) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     assert ticks(0.0, 7_200.0, (900.0, 1_800.0, 3_600.0)) == [0.0, 1_800.0, 3_600.0, 5_400.0, 7_200.0]
@@ -167,8 +180,8 @@ def test_a_report_is_looked_at_as_its_page_was(client: TestClient, reports: Repo
         )
     asked = {"name": ["policy/kl", "loss/value"], "x": "wall", "log": "true", "ylog": ["loss/value"]}
     text = printed(client, "report", experiment, **asked).text  # type: ignore[arg-type]
-    assert text.index("<h3>policy/kl") < text.index("<h3>loss/value")
-    assert "<h3>eval/success_rate" not in text
+    assert text.index("<h3>KL divergence <code>policy/kl") < text.index("<h3>Value loss <code>loss/value")
+    assert "eval/success_rate</code>" not in text
     assert text.count(">Time under way</text>") == 2
     assert ">1 h 23 min</text>" in text
     assert "Means end where the first seed is through." in text

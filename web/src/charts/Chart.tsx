@@ -11,13 +11,17 @@ import { useLinkedCharts } from './LinkedCharts'
 import { dashes, lineColor } from './palette'
 import { listenForPinch } from './pinch'
 import { Swatch } from './Swatch'
-import { aboveZero, allPositive, type ChartData, type Line, lastValue, valueAt } from './series'
+import { aboveZero, allPositive, type ChartData, type Line, lastValue, readAt, withoutLines } from './series'
+import type { HiddenLines } from './view'
 
 const HEIGHT = 220
 const STRIP = 150
 const AXIS_FONT = '11px system-ui, sans-serif'
 const THIN_ALPHA = 0.38
+const FAINT_ALPHA = 0.14
 const BAND_ALPHA = 0.14
+/** A point so near to the cursor is pointed at. */
+const NEAR_PX = 8
 /** How uPlot calls what a scale is. */
 const LINEAR = 1
 const LOGARITHMIC = 3
@@ -37,6 +41,8 @@ interface ChartProps {
   x?: Horizontal
   /** Whether the legend has the last values while nobody points. */
   readsLast?: boolean
+  /** Lines that are hidden where somebody keeps it; else the chart keeps it itself. */
+  lines?: HiddenLines | undefined
   /** Where on x the cursor stands; null leaves it to whoever points. */
   at?: number | null
   /** A click's x. */
@@ -58,6 +64,7 @@ export function Chart({
   x = STEPS,
   readsLast = true,
   at = null,
+  lines: kept,
   onSeek,
 }: ChartProps) {
   const dark = useComputedColorScheme('light') === 'dark'
@@ -66,25 +73,23 @@ export function Chart({
   const place = useRef(at)
   place.current = at
   const plot = useRef<uPlot | null>(null)
-  const readout = useRef<(index: number | null) => void>(() => {})
+  const readout = useRef<(chart: uPlot) => void>(() => {})
   const linked = useLinkedCharts()
   const link = useRef(linked)
   link.current = linked
   const seek = useRef(onSeek)
   seek.current = onSeek
   const [zoomed, setZoomed] = useState(false)
-  const [hidden, setHidden] = useState<readonly string[]>([])
+  const [own, setOwn] = useState<readonly string[]>([])
+  const { keys: hidden, set: setHidden } = kept ?? { keys: own, set: setOwn }
   const all = useMemo(() => (logX ? aboveZero(data) : data), [data, logX])
   const labelled = all.lines.filter((line) => line.label !== undefined)
-  const drawn = useMemo(
-    () => ({ x: all.x, lines: all.lines.filter((line) => !hidden.some((key) => isOf(line, key))) }),
-    [all, hidden],
-  )
+  const drawn = useMemo(() => ({ ...withoutLines(all, hidden) }), [all, hidden])
   const logarithmic = useMemo(() => wanted && allPositive(drawn.lines), [wanted, drawn])
 
   // A plot is made anew when its lines are others; new values of the same lines are only handed over.
   const structure = JSON.stringify([
-    drawn.lines.map((line) => [line.key, line.color, line.dash, line.thin, !!line.band]),
+    drawn.lines.map((line) => [line.key, line.color, line.dash, line.thin, line.faint, !!line.band]),
   ])
   const [low, high] = yRange ?? [undefined, undefined]
   const lines = useRef(drawn.lines)
@@ -170,7 +175,7 @@ export function Chart({
               putCursor(chart, place.current)
             },
           ],
-          setCursor: [(chart) => readout.current(chart.cursor.idx ?? null)],
+          setCursor: [(chart) => readout.current(chart)],
           setSelect: [
             (chart) => {
               if (chart.select.width === 0 && chart.select.height === 0) return
@@ -244,18 +249,26 @@ export function Chart({
   }
 
   const written = (value: number | null) => (value === null ? '–' : format(value))
-  const atRest = ({ values }: Line) => (readsLast ? written(lastValue(values)) : '')
+  const atRest = ({ values, raw = values, until }: Line) => {
+    if (!readsLast) return ''
+    const last = written(lastValue(raw))
+    return until === undefined ? last : `${last} at ${x.format(until)}, where the first seed ends`
+  }
   const legend = useRef<HTMLDListElement>(null)
   const where = useRef<HTMLSpanElement>(null)
-  readout.current = (index) => {
+  readout.current = (chart) => {
     const cells = legend.current?.querySelectorAll('dd')
     if (!cells) return
+    const read = pointedAt(chart, linked !== null)
     labelled.forEach((line, at) => {
       const cell = cells[at]
-      if (cell) cell.textContent = index === null ? atRest(line) : written(valueAt(line.values, index))
+      if (!cell) return
+      const { place, seen, near } = read ?? {}
+      if (place === undefined || !seen) cell.textContent = atRest(line)
+      else cell.textContent = written(readAt(all.x, line.raw ?? line.values, place, seen, near))
     })
     const step = where.current
-    if (step) step.textContent = index === null ? '' : `${x.title} ${x.format(all.x[index] ?? 0)}`
+    if (step) step.textContent = read === null ? '' : `${x.title} ${x.format(read.place)}`
   }
 
   return (
@@ -311,11 +324,6 @@ export function Chart({
   )
 }
 
-/** Whether a line belongs to the one of a legend's entry: itself, its seeds, its raw values. */
-function isOf(line: Line, key: string): boolean {
-  return line.key === key || line.key.startsWith(`${key}:`)
-}
-
 function isAlone(column: uPlot.AlignedData[number] | undefined): boolean {
   let found = 0
   for (const value of column ?? []) if (value !== null && value !== undefined && ++found > 1) return false
@@ -324,6 +332,24 @@ function isAlone(column: uPlot.AlignedData[number] | undefined): boolean {
 
 function putCursor(chart: uPlot, at: number | null): void {
   if (at !== null) chart.setCursor({ left: chart.valToPos(at, 'x'), top: 0 })
+}
+
+/**
+ * Where on x one points, what is seen of it, and what is as good as pointed at; null where nobody points. Linked charts have
+ * one cursor and say its own place; another says that of the nearest point, if that is seen.
+ */
+function pointedAt(
+  chart: uPlot,
+  linked: boolean,
+): { place: number; seen: [number, number]; near: [number, number] } | null {
+  const { idx, left = -1 } = chart.cursor
+  if (idx === null || idx === undefined || left < 0) return null
+  const seen = rangeOf(chart)
+  const near: [number, number] = [chart.posToVal(left - NEAR_PX, 'x'), chart.posToVal(left + NEAR_PX, 'x')]
+  const nearest = chart.data[0][idx]
+  if (linked || nearest === undefined || nearest < seen[0] || nearest > seen[1])
+    return { place: chart.posToVal(left, 'x'), seen, near }
+  return { place: nearest, seen, near }
 }
 
 function rangeOf(chart: uPlot): [number, number] {
@@ -349,7 +375,7 @@ function seriesOf(
   for (const line of lines) {
     const color = lineColor(line.color, dark)
     series.push({
-      stroke: line.thin ? withAlpha(color, THIN_ALPHA) : color,
+      stroke: line.thin ? withAlpha(color, line.faint ? FAINT_ALPHA : THIN_ALPHA) : color,
       width: line.thin ? 1 : 2,
       dash: dashes(line.dash ?? 0, line.thin ? 1 : 2),
       spanGaps: true,

@@ -7,9 +7,11 @@ import type { ChartData } from './series'
 
 interface ChartExportProps extends PictureOptions {
   data: ChartData
+  /** The same, as it was reported. */
+  numbers: ChartData
 }
 
-export function ChartExport({ data, ...options }: ChartExportProps) {
+export function ChartExport({ data, numbers, ...options }: ChartExportProps) {
   const { title, x } = options
   const name = `mapless-${title.toLowerCase().replace(/[^a-z0-9]+/g, '-')}`
   return (
@@ -20,7 +22,7 @@ export function ChartExport({ data, ...options }: ChartExportProps) {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={() => saveText(`${name}.csv`, 'text/csv', csvOf(data, x))}>
+        <Menu.Item onClick={() => saveText(`${name}.csv`, 'text/csv', csvOf(numbers, x))}>
           Numbers (CSV)
         </Menu.Item>
         <Menu.Item onClick={() => saveText(`${name}.svg`, 'image/svg+xml', svgOf(data, options))}>

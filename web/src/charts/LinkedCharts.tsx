@@ -16,18 +16,21 @@ const Context = createContext<Linked | null>(null)
 interface LinkedChartsProps {
   /** What their x is: with another one they show all of it again. */
   of?: string
+  /** What they show of x where somebody keeps it; else they keep it themselves. */
+  kept?: { range: XRange | null; zoomTo: (range: XRange | null) => void }
   children: ReactNode
 }
 
-export function LinkedCharts({ of, children }: LinkedChartsProps) {
+export function LinkedCharts({ of, kept, children }: LinkedChartsProps) {
   const key = useId()
-  const [range, zoomTo] = useState<XRange | null>(null)
+  const [own, zoomOwn] = useState<XRange | null>(null)
+  const { range, zoomTo } = kept ?? { range: own, zoomTo: zoomOwn }
   const [shown, setShown] = useState(of)
   if (shown !== of) {
     setShown(of)
-    zoomTo(null)
+    zoomOwn(null)
   }
-  const linked = useMemo(() => ({ key, range, zoomTo }), [key, range])
+  const linked = useMemo(() => ({ key, range, zoomTo }), [key, range, zoomTo])
   return <Context.Provider value={linked}>{children}</Context.Provider>
 }
 

@@ -5,11 +5,11 @@ import { compact } from '../lib/format'
 import { lazily } from '../lib/lazily'
 import { type Horizontal, STEPS } from './axis'
 import { ChartExport } from './ChartExport'
+import { useLinkedCharts } from './LinkedCharts'
 import classes from './MetricChart.module.css'
-import { type ChartData, smoothed } from './series'
-import type { LogSwitch } from './view'
+import { type ChartData, smoothed, within, withoutLines } from './series'
+import { type HiddenLines, type LogSwitch, MOST_SMOOTHING, type SmoothSwitch } from './view'
 
-const MOST_SMOOTHING = 0.99
 /** Below a chart, about. */
 const LEGEND_PX = 24
 /** Asked for at once, but nothing waits for it: the page is there before its charts. */
@@ -26,6 +26,10 @@ interface MetricChartProps {
   smoothable?: boolean
   /** Whether y is logarithmic, where that is offered. */
   log?: LogSwitch
+  /** How much it is smoothed where somebody keeps it; else the chart keeps it itself. */
+  smooth?: SmoothSwitch
+  /** The same of the lines that are hidden. */
+  lines?: HiddenLines
   /** Whether x is. */
   logX?: boolean
   height?: number
@@ -44,6 +48,8 @@ export function MetricChart({
   note,
   data,
   smoothable = false,
+  smooth,
+  lines,
   log,
   logX = false,
   height = 220,
@@ -53,7 +59,15 @@ export function MetricChart({
   x = STEPS,
   ...rest
 }: MetricChartProps) {
-  const [strength, setStrength] = useState(0)
+  const [own, setOwn] = useState(0)
+  const [dragged, setDragged] = useState<number | null>(null)
+  const range = useLinkedCharts()?.range ?? null
+  const strength = smoothable ? (dragged ?? smooth?.strength ?? own) : 0
+  const kept = smooth?.set ?? setOwn
+  const pictured = (all: ChartData) => {
+    const left = withoutLines(all, lines?.keys ?? [])
+    return range ? within(left, range) : left
+  }
   const shown = useMemo(() => smoothed(data, strength), [data, strength])
   return (
     <div className={classes.metric}>
@@ -73,7 +87,11 @@ export function MetricChart({
                 max={MOST_SMOOTHING}
                 step={0.01}
                 value={strength}
-                onChange={setStrength}
+                onChange={setDragged}
+                onChangeEnd={(next) => {
+                  setDragged(null)
+                  kept(next)
+                }}
                 label={(value) => value.toFixed(2)}
                 thumbLabel={`Smoothing of ${title}${note ? `, ${note}` : ''}`}
               />
@@ -90,7 +108,9 @@ export function MetricChart({
           )}
           {data.x.length > 0 && (
             <ChartExport
-              data={shown}
+              data={pictured(shown)}
+              numbers={data}
+              note={strength > 0 ? `smoothed, ${strength.toFixed(2)}` : undefined}
               title={note ? `${title}, ${note}` : title}
               format={format}
               x={x}
@@ -112,6 +132,7 @@ export function MetricChart({
           label={title}
           logarithmic={log?.on ?? false}
           logX={logX}
+          lines={lines}
           height={height}
           format={format}
           x={x}

@@ -9,14 +9,14 @@ const look = { title: 'Success <rate>', x: { title: 'Steps', format: text }, for
 const data: ChartData = {
   x: [0, 100],
   lines: [
-    { key: 'a:0', color: 0, thin: true, values: [0.5, null] },
+    { key: 'a:0', name: 'One, seed 0', color: 0, thin: true, values: [0.5, null] },
     { key: 'a', label: '=One, 2 seeds', color: 0, values: [0, 1], band: { low: [0, 0.5], high: [0.5, 1] } },
   ],
 }
 
 test('a chart as CSV: a column for each line and the ends of its band, and no cell a formula', () => {
   expect(csvOf(data, look.x)).toBe(
-    '"Steps","a:0","\'=One, 2 seeds","\'=One, 2 seeds, low","\'=One, 2 seeds, high"\r\n0,0.5,0,0,0.5\r\n100,,1,0.5,1\r\n',
+    '"Steps","One, seed 0","\'=One, 2 seeds","\'=One, 2 seeds, low","\'=One, 2 seeds, high"\r\n0,0.5,0,0,0.5\r\n100,,1,0.5,1\r\n',
   )
 })
 
@@ -31,6 +31,10 @@ test('a chart as SVG: lines, bands, a single point as a dot, axes and legend', (
   expect(svg).toContain('=One, 2 seeds</text>')
   expect(new DOMParser().parseFromString(svg, 'image/svg+xml').querySelector('parsererror')).toBeNull()
   expect(svg).toContain(`height="${heightOf(data)}"`)
+})
+
+test('a picture of smoothed curves says so', () => {
+  expect(svgOf(data, { ...look, note: 'smoothed, 0.80' })).toContain(' · smoothed, 0.80</tspan>')
 })
 
 test('over time the numbers are seconds, and the picture has hours', () => {

@@ -18,6 +18,8 @@ export interface PictureOptions {
   x: Horizontal
   format: (value: number) => string
   yRange?: readonly [number, number] | undefined
+  /** What has to be known of the curves, behind the title. */
+  note?: string | undefined
   /** Where every value is above 0. */
   logarithmic?: boolean
   /** The same of x: what lies at 0 is left out. */
@@ -26,7 +28,7 @@ export interface PictureOptions {
 
 /** The chart in its light colours, with title, axes and legend; as high as `heightOf` says. */
 export function svgOf(whole: ChartData, options: PictureOptions): string {
-  const { title, x, format, yRange, logX = false } = options
+  const { title, note, x, format, yRange, logX = false } = options
   const data = logX ? aboveZero(whole) : whole
   const logarithmic = options.logarithmic === true && allPositive(data.lines)
   const bend = logarithmic ? Math.log10 : straight
@@ -49,7 +51,7 @@ export function svgOf(whole: ChartData, options: PictureOptions): string {
   return [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${WIDTH}" height="${heightOf(data)}" viewBox="0 0 ${WIDTH} ${heightOf(data)}" font-family="system-ui, sans-serif" font-size="12">`,
     `<rect width="100%" height="100%" fill="#fff"/>`,
-    `<text x="${LEFT}" y="20" font-size="14" font-weight="600" ${ink}>${escaped(title)}</text>`,
+    `<text x="${LEFT}" y="20" font-size="14" font-weight="600" ${ink}>${escaped(title)}${note ? `<tspan font-size="12" font-weight="400"> · ${escaped(note)}</tspan>` : ''}</text>`,
     ...yTicks.map(
       (tick) =>
         `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(format(tick))}</text>`,
@@ -76,7 +78,7 @@ export function heightOf(data: ChartData): number {
 /** A row for each x: every line, and the ends of its band. */
 export function csvOf(data: ChartData, { title, column = title }: Horizontal): string {
   const columns: { head: string; values: Values }[] = data.lines.flatMap((line) => {
-    const head = line.label ?? line.key
+    const head = line.label ?? line.name ?? line.key
     const own = [{ head, values: line.values }]
     return line.band
       ? [
@@ -96,7 +98,7 @@ function curve(
   across: (value: number) => number,
   up: (value: number) => number,
 ): string {
-  const { thin, values, band } = line
+  const { thin, faint, values, band } = line
   const ink = lineColor(line.color, false)
   const points = (of: Values) =>
     x.flatMap((at, index) => {
@@ -112,7 +114,7 @@ function curve(
     const [left, top] = first.split(',')
     return `${area}<circle cx="${left}" cy="${top}" r="3" fill="${ink}"/>`
   }
-  const look = `${thin ? 'stroke-width="1" stroke-opacity="0.4"' : 'stroke-width="2"'}${dashed(line, thin ? 1 : 2)}`
+  const look = `${thin ? `stroke-width="1" stroke-opacity="${faint ? 0.15 : 0.4}"` : 'stroke-width="2"'}${dashed(line, thin ? 1 : 2)}`
   const drawn = [...(first === undefined ? [] : [first]), ...rest].join(' ')
   return `${area}<polyline points="${drawn}" fill="none" stroke="${ink}" ${look}/>`
 }

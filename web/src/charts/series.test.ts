@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import { curves } from '../testing/examples'
 import { MAIN_CHARTS, SECTIONS } from './metrics'
 import { colorOf } from './palette'
-import { aboveZero, alignSeries, allPositive, lastValue, smooth, smoothed, valueAt } from './series'
+import { aboveZero, alignSeries, allPositive, lastValue, readAt, smooth, smoothed } from './series'
 import { chartOf, chartOfCurves } from './shape'
 
 test('series of different steps share one x, with gaps where they have no point', () => {
@@ -30,23 +30,34 @@ test('a constant stays a constant under smoothing', () => {
 test('what a legend reads', () => {
   expect(lastValue([1, 2, null])).toBe(2)
   expect(lastValue([])).toBeNull()
-  expect(valueAt([1, null, 3], 1)).toBe(1)
-  expect(valueAt([null, 2], 0)).toBeNull()
+  expect(readAt([0, 10, 20], [1, null, 3], 9, [0, 20])).toBe(1)
+  expect(readAt([0, 10, 20], [1, null, 3], 11, [0, 20])).toBe(3)
 })
 
-test('nothing is read beyond the end of a curve', () => {
-  expect(valueAt([1, null, 3, null], 2)).toBe(3)
-  expect(valueAt([1, null, 3, null], 3)).toBeNull()
+test('nothing is read beyond the ends of a curve, but what is as good as pointed at', () => {
+  const x = [0, 10, 20, 30]
+  const values = [null, 2, 3, null]
+  expect([9, 10, 20, 21].map((place) => readAt(x, values, place, [0, 30]))).toEqual([null, 2, 3, null])
+  expect(readAt(x, values, 9, [0, 30], [8, 10])).toBe(2)
+  expect(readAt(x, values, 22, [0, 30], [21, 23])).toBeNull()
 })
 
-test('a smoothed line keeps its raw values beneath it, and its own place in the legend', () => {
+test('what is read lies within what is seen', () => {
+  const x = [0, 57_344]
+  expect(readAt(x, [null, 1], 25_700, [19_000, 36_000])).toBeNull()
+  expect(readAt(x, [0, 1], 25_700, [19_000, 36_000])).toBeNull()
+  expect(readAt([0, 20_000, 57_344], [0, 0.4, 1], 50_000, [19_000, 56_000])).toBe(0.4)
+})
+
+test('a smoothed line keeps its raw values beneath it and for whoever reads it, a seed as well as a mean', () => {
   const line = { key: 'a', label: 'one', color: 2, values: [4, 8], band: { low: [3, 7], high: [5, 9] } }
   const seed = { key: 'a:0', color: 2, thin: true, values: [4, 8] }
   const soft = [4, 5 / 0.75]
   expect(smoothed({ x: [1, 2], lines: [seed, line] }, 0.5).lines).toEqual([
-    { ...seed, values: [4, 5 / 0.75] },
+    { ...seed, key: 'a:0:raw', faint: true },
+    { ...seed, values: [4, 5 / 0.75], raw: [4, 8] },
     { key: 'a:raw', color: 2, values: [4, 8], thin: true },
-    { key: 'a', label: 'one', color: 2, values: soft },
+    { key: 'a', label: 'one', color: 2, values: soft, raw: [4, 8] },
   ])
   expect(smoothed({ x: [1, 2], lines: [line] }, 0).lines).toEqual([line])
 })
@@ -91,6 +102,16 @@ test('experiments together: seeds thin, mean bold with its band, N in the legend
   ])
   expect(lines[2]?.band?.low).toEqual([0.1, 0.5, null])
   expect(lines[3]?.band).toBeUndefined()
+})
+
+test('a mean that ends before its seeds do says where', () => {
+  const [corridor, ...others] = curves.experiments
+  if (!corridor) throw new Error('no experiment')
+  const slow = { ...corridor, mean: [0.2, 0.4, null], count: [2, 2, 1] }
+  const { lines } = chartOfCurves({ ...curves, experiments: [slow, ...others] })
+  expect(lines.map(({ key, until }) => [key, until])).toContainEqual(['exp1', 100])
+  const together = { ...slow, count: [2, 2, 0] }
+  expect(chartOfCurves({ ...curves, experiments: [together] }).lines[2]?.until).toBeUndefined()
 })
 
 test('an experiment without a value has no line, and no chart without lines has an x', () => {

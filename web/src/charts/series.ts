@@ -7,13 +7,21 @@ export interface Line {
   key: string
   /** Absent for lines that the legend leaves out (single seeds). */
   label?: string
+  /** Among numbers, where the legend leaves it out. */
+  name?: string
   /** Index into the palette. */
   color: number
   /** Index into the dashes; a line is drawn through without it. */
   dash?: number
   /** `thin` lines stand back: a seed behind its mean. */
   thin?: boolean
+  /** `faint` lines lie beneath all others: what was reported, where what is drawn is smoothed. */
+  faint?: boolean
   values: Values
+  /** What was reported, where `values` are smoothed: what is read is always that. */
+  raw?: Values
+  /** Where on x a mean ends, though some of its seeds go on. */
+  until?: number
   band?: { low: Values; high: Values }
 }
 
@@ -59,17 +67,16 @@ export function smooth(values: Values, weight: number): (number | null)[] {
   })
 }
 
-/** Lines smoothed by `weight`, and beneath each that the legend names its raw values, thin. */
+/** Lines smoothed by `weight`, and beneath each its raw values: thin, or faint beneath a thin one. */
 export function smoothed({ x, lines }: ChartData, weight: number): ChartData {
   if (weight === 0) return { x, lines }
   return {
     x,
     lines: lines.flatMap((line) => {
       const { band, ...own } = line
-      const soft = { ...own, values: smooth(line.values, weight) }
-      if (line.thin || line.label === undefined) return [soft]
-      const { label: _, ...raw } = own
-      return [{ ...raw, key: `${line.key}:raw`, thin: true }, soft]
+      const soft = { ...own, values: smooth(line.values, weight), raw: line.values }
+      const { label: _, name: __, ...raw } = own
+      return [{ ...raw, key: `${line.key}:raw`, thin: true, ...(line.thin ? { faint: true } : {}) }, soft]
     }),
   }
 }
@@ -84,18 +91,29 @@ export function lastValue(values: Values): number | null {
 }
 
 /**
- * The value at `index`, or else the nearest one before it: what a legend shows where a sparse series has no point. Beyond the
- * last one there is none.
+ * What a legend reads at a place on x: the point nearest to it of those that are `seen`. Before the curve's first point and
+ * after its last there is none, but for what is as good as pointed at: `near`.
  */
-export function valueAt(values: Values, index: number): number | null {
-  let last = values.length - 1
-  while (last >= 0 && (values[last] ?? null) === null) last--
-  if (index > last) return null
-  for (let at = Math.min(index, values.length - 1); at >= 0; at--) {
-    const value = values[at]
-    if (value !== null && value !== undefined) return value
-  }
-  return null
+export function readAt(
+  x: readonly number[],
+  values: Values,
+  place: number,
+  seen: readonly [number, number],
+  near: readonly [number, number] = [place, place],
+): number | null {
+  let nearest = -1
+  let [begun, ended] = [false, true]
+  x.forEach((at, index) => {
+    if ((values[index] ?? null) === null) return
+    if (at <= place) begun = true
+    ended = at < place
+    if (at < seen[0] || at > seen[1]) return
+    if (nearest < 0 || Math.abs(at - place) < Math.abs((x[nearest] ?? 0) - place)) nearest = index
+  })
+  const at = x[nearest]
+  if (at === undefined) return null
+  const within = (begun && !ended) || (at >= near[0] && at <= near[1])
+  return within ? (values[nearest] ?? null) : null
 }
 
 /** Whether a logarithmic axis can show every value. */
@@ -110,6 +128,27 @@ export function aboveZero({ x, lines }: ChartData): ChartData {
   const cut = (values: Values) => (from < 0 ? [] : values.slice(from))
   return {
     x: from < 0 ? [] : x.slice(from),
+    lines: lines.map(({ band, ...line }) => ({
+      ...line,
+      values: cut(line.values),
+      ...(line.raw ? { raw: cut(line.raw) } : {}),
+      ...(band ? { band: { low: cut(band.low), high: cut(band.high) } } : {}),
+    })),
+  }
+}
+
+/** What is drawn where some lines are hidden by their entries in the legend: with each go its seeds and its raw values. */
+export function withoutLines({ x, lines }: ChartData, hidden: readonly string[]): ChartData {
+  const isOf = (line: Line, key: string) => line.key === key || line.key.startsWith(`${key}:`)
+  return { x, lines: lines.filter((line) => !hidden.some((key) => isOf(line, key))) }
+}
+
+/** What lies within a range of x. */
+export function within({ x, lines }: ChartData, [from, to]: readonly [number, number]): ChartData {
+  const cut = (values: Values) =>
+    values.filter((_, index) => (x[index] ?? from - 1) >= from && (x[index] ?? 0) <= to)
+  return {
+    x: x.filter((at) => at >= from && at <= to),
     lines: lines.map(({ band, ...line }) => ({
       ...line,
       values: cut(line.values),

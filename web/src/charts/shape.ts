@@ -59,7 +59,11 @@ export function chartOfCurves(
     const thin = single
       ? []
       : experiment.seeds.map(
-          ({ seed, values }): Line => ({ key: `${experiment.id}:${seed}`, color, dash, thin: true, values }),
+          ({ seed, values }): Line => ({
+            key: `${experiment.id}:${seed}`,
+            name: `${name}, seed ${seed}`,
+            ...{ color, dash, thin: true, values },
+          }),
         )
     const drawn = thin.length > 0 && thin.length < seeds ? `, ${thin.length} drawn` : ''
     const mean: Line = {
@@ -68,11 +72,19 @@ export function chartOfCurves(
       color,
       dash,
       values: experiment.mean,
+      ...untilOf(experiment, curves.x ?? curves.steps),
       ...(single ? {} : { band: { low: experiment.low, high: experiment.high } }),
     }
     return [...thin, mean]
   })
   return { x: lines.length > 0 ? (curves.x ?? curves.steps) : [], lines }
+}
+
+/** Where a mean ends before its last seed does, as it may over time; nothing where they end together. */
+function untilOf({ mean, count }: Curves['experiments'][number], x: readonly number[]): { until?: number } {
+  const last = mean.findLastIndex((value) => value !== null)
+  const until = x[last]
+  return until === undefined || last >= count.findLastIndex((seeds) => seeds > 0) ? {} : { until }
 }
 
 /** Experiments under their names, each in the look that stays with it. */

@@ -7,17 +7,28 @@ test('a view is read from the address as it was written there, and leaves the re
     logX: true,
     logY: ['loss/value', 'Return, per episode'],
     panels: ['policy/kl', 'train/return'],
+    smooth: { 'train/return': 0.8 },
+    hidden: ['a'],
+    zoom: [19_000, 36_000],
   } as const
   const written = writtenView(new URLSearchParams('experiment=a&experiment=b&x=cpu'), view)
   expect(written.toString()).toBe(
-    'experiment=a&experiment=b&x=wall&xlog=1&ylog=loss%2Fvalue&ylog=Return%2C+per+episode&panel=policy%2Fkl&panel=train%2Freturn',
+    'experiment=a&experiment=b&x=wall&xlog=1&ylog=loss%2Fvalue&ylog=Return%2C+per+episode&panel=policy%2Fkl&panel=train%2Freturn&smooth=0.8%7Etrain%2Freturn&hide=a&zoom=19000%7E36000',
   )
   expect(readView(written)).toEqual(view)
 })
 
 test('what is usual does not stand in the address, and what nobody could have chosen is not believed', () => {
-  const usual = readView(new URLSearchParams('x=nonsense&xlog=maybe'))
-  expect(usual).toEqual({ across: 'steps', logX: false, logY: [], panels: null })
+  const usual = readView(new URLSearchParams('x=nonsense&xlog=maybe&zoom=9~3&smooth=2~train/return'))
+  expect(usual).toEqual({
+    across: 'steps',
+    logX: false,
+    logY: [],
+    panels: null,
+    smooth: {},
+    hidden: [],
+    zoom: null,
+  })
   expect(writtenView(new URLSearchParams('x=nonsense&step=4'), usual).toString()).toBe('step=4')
   const many = new URLSearchParams(Array.from({ length: 500 }, (_, index) => ['ylog', `m/${index}`]))
   expect(readView(many).logY).toHaveLength(60)

@@ -12,13 +12,31 @@ export interface ChartView {
   logY: readonly string[]
   /** The metrics that are looked at, in order; null for what is usual. */
   panels: readonly string[] | null
+  /** How much of the past is in each chart's curves, by the chart's name; charts that are not smoothed are not there. */
+  smooth: Readonly<Record<string, number>>
+  /** The lines that are hidden in all charts, by their keys: ids of experiments, names of metrics. */
+  hidden: readonly string[]
+  /** What is shown of x; null for all of it. */
+  zoom: readonly [number, number] | null
 }
 
 /** What stands in the address only where it is another. */
-const USUAL: ChartView = { across: 'steps', logX: false, logY: [], panels: null }
+const USUAL: ChartView = {
+  across: 'steps',
+  logX: false,
+  logY: [],
+  panels: null,
+  smooth: {},
+  hidden: [],
+  zoom: null,
+}
 const ON = '1'
 /** More charts than a page has. */
 const MOST_NAMES = 60
+const LONGEST_NAME = 80
+/** Between a chart's smoothing and its name, and between the ends of a zoom. */
+const BETWEEN = '~'
+export const MOST_SMOOTHING = 0.99
 
 export function readView(search: URLSearchParams): ChartView {
   const across = search.get('x')
@@ -27,17 +45,40 @@ export function readView(search: URLSearchParams): ChartView {
     logX: search.get('xlog') === ON,
     logY: [...new Set(search.getAll('ylog'))].slice(0, MOST_NAMES),
     panels: panelsOf(search.getAll('panel')),
+    smooth: smoothOf(search.getAll('smooth')),
+    hidden: [...new Set(search.getAll('hide'))]
+      .filter((key) => key.length <= LONGEST_NAME)
+      .slice(0, MOST_NAMES),
+    zoom: zoomOf(search.get('zoom')),
   }
+}
+
+function smoothOf(texts: readonly string[]): Record<string, number> {
+  const found = texts.slice(0, MOST_NAMES).flatMap((text): [string, number][] => {
+    const [strength = '', ...name] = text.split(BETWEEN)
+    const value = Number(strength)
+    return value > 0 && value <= MOST_SMOOTHING ? [[name.join(BETWEEN), value]] : []
+  })
+  return Object.fromEntries(found)
+}
+
+function zoomOf(text: string | null): [number, number] | null {
+  const [from = Number.NaN, to = Number.NaN, ...more] = (text ?? '').split(BETWEEN).map(Number)
+  return more.length === 0 && Number.isFinite(from) && Number.isFinite(to) && from < to ? [from, to] : null
 }
 
 /** The address's query with a view in it; all else stays. */
 export function writtenView(before: URLSearchParams, view: ChartView): URLSearchParams {
   const after = new URLSearchParams(before)
-  for (const name of ['x', 'xlog', 'ylog', 'panel']) after.delete(name)
+  for (const name of ['x', 'xlog', 'ylog', 'panel', 'smooth', 'hide', 'zoom']) after.delete(name)
   if (view.across !== USUAL.across) after.set('x', view.across)
   if (view.logX) after.set('xlog', ON)
   for (const name of view.logY) after.append('ylog', name)
   for (const name of view.panels ?? []) after.append('panel', name)
+  for (const [name, strength] of Object.entries(view.smooth))
+    after.append('smooth', `${strength}${BETWEEN}${name}`)
+  for (const key of view.hidden) after.append('hide', key)
+  if (view.zoom) after.set('zoom', view.zoom.map((end) => Number(end.toPrecision(6))).join(BETWEEN))
   return after
 }
 
@@ -56,6 +97,8 @@ export function useChartView(): [ChartView, ChangeView] {
   const change = useCallback(
     (part: Partial<ChartView>) => {
       newest.current = { ...newest.current, ...part }
+      // A zoom is of what x was.
+      if ('across' in part || 'logX' in part) newest.current = { ...newest.current, zoom: null }
       setAsked(newest.current)
       setSearch((before) => writtenView(before, newest.current), { replace: true, preventScrollReset: true })
     },
@@ -74,6 +117,38 @@ export function logOf({ logY }: ChartView, change: ChangeView, name: string): Lo
   const others = logY.filter((one) => one !== name)
   return { on: others.length < logY.length, set: (on) => change({ logY: on ? [...others, name] : others }) }
 }
+
+/** How much a chart is smoothed, and what changes it. */
+export interface SmoothSwitch {
+  strength: number
+  set: (strength: number) => void
+}
+
+export function smoothOfChart({ smooth }: ChartView, change: ChangeView, name: string): SmoothSwitch {
+  const { [name]: strength = 0, ...others } = smooth
+  return {
+    strength,
+    set: (next) => change({ smooth: next > 0 ? { ...others, [name]: next } : others }),
+  }
+}
+
+/** Which lines are hidden, and what changes that. */
+export interface HiddenLines {
+  keys: readonly string[]
+  set: (keys: readonly string[]) => void
+}
+
+export const hiddenOf = ({ hidden }: ChartView, change: ChangeView): HiddenLines => ({
+  keys: hidden,
+  set: (keys) => change({ hidden: keys }),
+})
+
+/** The zoom of charts that share it, kept in the address. */
+export const useKeptZoom = ({ zoom }: ChartView, change: ChangeView) =>
+  useMemo(
+    () => ({ range: zoom, zoomTo: (next: ChartView['zoom']) => change({ zoom: next }) }),
+    [zoom, change],
+  )
 
 /** What charts that share their zoom have in common: with another one they show all of x again. */
 export const sharedX = ({ across, logX }: ChartView): string => (logX ? `${across}, logarithmic` : across)

@@ -1,8 +1,9 @@
 /** The episodes of a checkpoint's evaluation; which of them is replayed stands in the address, to be passed on. */
 import { $api } from '../api/client'
 import type { Checkpoint } from '../api/types'
-import { byInterest } from '../lib/episodes'
+import { arranged } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
+import { useArrangement } from '../lib/useArrangement'
 import { EpisodesQuery } from './Episodes'
 import { Replay } from './replay/Replay'
 
@@ -11,6 +12,7 @@ const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY }
 
 export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
   const [episode, setEpisode] = useReplayInAddress()
+  const [{ order, reversed }] = useArrangement()
   const path = { checkpoint_id: checkpoint.id }
   const episodes = $api.useQuery(
     'get',
@@ -25,7 +27,7 @@ export function CheckpointEpisodes({ checkpoint }: { checkpoint: Checkpoint }) {
         <Replay
           of={`checkpoint:${checkpoint.id}`}
           episode={episode}
-          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          order={arranged(episodes.data ?? { episodes: [] }, order, reversed).map(({ index }) => index)}
           onReplay={setEpisode}
           onClose={() => setEpisode(null)}
         />

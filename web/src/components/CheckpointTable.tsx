@@ -143,7 +143,6 @@ export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: Chec
                     to={`/new?checkpoint=${checkpoint.id}`}
                     size="compact-sm"
                     variant="default"
-                    visibleFrom="sm"
                     title="A training that begins with this policy"
                     aria-label={`Fine-tune step ${checkpoint.step}`}
                   >
@@ -154,7 +153,6 @@ export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: Chec
                     to={play(policyKey('checkpoint', checkpoint.id))}
                     size="compact-sm"
                     variant="default"
-                    visibleFrom="sm"
                     aria-label={`Play with step ${checkpoint.step}`}
                   >
                     Play
@@ -164,7 +162,6 @@ export function CheckpointTable({ checkpoints, chosen, onChoose, onWatch }: Chec
                     to={evaluate([policyKey('checkpoint', checkpoint.id)])}
                     size="compact-sm"
                     variant="default"
-                    visibleFrom="sm"
                     aria-label={`Evaluate step ${checkpoint.step} elsewhere`}
                   >
                     Evaluate

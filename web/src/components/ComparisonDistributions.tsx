@@ -7,7 +7,7 @@ import { $api } from '../api/client'
 import type { Comparison } from '../api/types'
 import { MetricChart } from '../charts/MetricChart'
 import { chartOfProfiles } from '../charts/shape'
-import { percent, percentRange, significant } from '../lib/format'
+import { percent, percentRange, plural, significant } from '../lib/format'
 import classes from './ComparisonDistributions.module.css'
 import { TableExport } from './ComparisonExport'
 import { NamedTraining } from './ComparisonVerdicts'
@@ -19,6 +19,9 @@ const SCORE = {
   title: 'Score: path efficiency of an arrival, else 0',
   format: (value: number) => significant(value, 2),
 }
+
+/** Below so many nothing is said of seeds to come. */
+const LEAST_SEEDS = 5
 
 interface ComparisonDistributionsProps {
   comparison: Comparison
@@ -35,6 +38,7 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
     { placeholderData: keepPreviousData },
   )
   const chart = useMemo(() => (data ? chartOfProfiles(data) : { x: [], lines: [] }), [data])
+  const leftOut = leftOutOf(comparison)
   return (
     <Panel title="Whole distributions">
       <div className={classes.columns}>
@@ -51,42 +55,67 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
         <div className={classes.column}>
           <Group justify="space-between">
             <Title order={3}>Probability of improvement</Title>
-            <TableExport table="improvements" title="Probability of improvement" query={query} />
+            {comparison.improvements.length > 0 && (
+              <TableExport table="improvements" title="Probability of improvement" query={query} />
+            )}
           </Group>
-          <Table.ScrollContainer type="native" minWidth={380} tabIndex={0}>
-            <Table className={table.table} aria-label="Probability of improvement" data-testid="improvements">
-              <Table.Thead>
-                <Table.Tr>
-                  <Table.Th>Training</Table.Th>
-                  <Table.Th>Beside</Table.Th>
-                  <Table.Th>Probability of improvement</Table.Th>
-                </Table.Tr>
-              </Table.Thead>
-              <Table.Tbody>
-                {comparison.improvements.map(({ base, other, value, low, high }) => (
-                  <Table.Tr key={`${base} ${other}`}>
-                    <Table.Td className={table.name}>
-                      <NamedTraining comparison={comparison} id={other} />
-                    </Table.Td>
-                    <Table.Td className={table.name}>
-                      <NamedTraining comparison={comparison} id={base} />
-                    </Table.Td>
-                    <Table.Td className={ui.number}>
-                      <strong>{percent(value)}</strong>{' '}
-                      <span className={ui.quiet}>{percentRange(low, high)}</span>
-                    </Table.Td>
+          {comparison.improvements.length > 0 && (
+            <Table.ScrollContainer type="native" minWidth={380} tabIndex={0}>
+              <Table
+                className={table.table}
+                aria-label="Probability of improvement"
+                data-testid="improvements"
+              >
+                <Table.Thead>
+                  <Table.Tr>
+                    <Table.Th>Training</Table.Th>
+                    <Table.Th>Beside</Table.Th>
+                    <Table.Th>Probability of improvement</Table.Th>
                   </Table.Tr>
-                ))}
-              </Table.Tbody>
-            </Table>
-          </Table.ScrollContainer>
+                </Table.Thead>
+                <Table.Tbody>
+                  {comparison.improvements.map(({ base, other, value, low, high }) => (
+                    <Table.Tr key={`${base} ${other}`}>
+                      <Table.Td className={table.name}>
+                        <NamedTraining comparison={comparison} id={other} />
+                      </Table.Td>
+                      <Table.Td className={table.name}>
+                        <NamedTraining comparison={comparison} id={base} />
+                      </Table.Td>
+                      <Table.Td className={ui.number}>
+                        <strong>{percent(value)}</strong>{' '}
+                        <span className={ui.quiet}>{percentRange(low, high)}</span>
+                      </Table.Td>
+                    </Table.Tr>
+                  ))}
+                </Table.Tbody>
+              </Table>
+            </Table.ScrollContainer>
+          )}
           <Text size="xs" c="dimmed" mt="sm">
             {comparison.improvements.length === 0
               ? 'How likely a seed of one scores higher than a seed of the other in a scenario: told of five seeds on either side, on one suite.'
               : 'How likely a seed of one scores higher than a seed of the other in a scenario; equal scores count half, so 50 % is no difference. 95 % interval over seeds (Student’s t on the logit).'}
           </Text>
+          {leftOut.length > 0 && (
+            <Text size="xs" c="dimmed" mt="xs" data-testid="improvements-left-out">
+              Left out: {leftOut.join('; ')}.
+            </Text>
+          )}
         </div>
       </div>
     </Panel>
   )
+}
+
+/** Who is in no row, and why. */
+function leftOutOf({ experiments, improvements }: Comparison): string[] {
+  const told = new Set(improvements.flatMap(({ base, other }) => [base, other]))
+  return experiments
+    .filter(({ id }) => !told.has(id))
+    .map(({ name, seeds }) =>
+      seeds < LEAST_SEEDS
+        ? `${name} has ${seeds === 0 ? 'no seed' : plural(seeds, 'seed')} evaluated, and it takes ${LEAST_SEEDS}`
+        : `${name} shares no suite with enough seeds with what it is held against`,
+    )
 }

@@ -8,7 +8,7 @@ import { useComparedCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import { lookOf } from '../charts/panels'
 import { chartOfCurves } from '../charts/shape'
-import { type ChangeView, type ChartView, logOf } from '../charts/view'
+import { type ChangeView, type ChartView, hiddenOf, logOf, smoothOfChart } from '../charts/view'
 import { plural } from '../lib/format'
 
 const POINTS = 400
@@ -39,6 +39,8 @@ export const CurveChart = memo(function CurveChart({ name, experiments, view, on
       x={ACROSS[data?.across ?? across]}
       logX={logX}
       log={logOf(view, onView, name)}
+      smooth={smoothOfChart(view, onView, name)}
+      lines={hiddenOf(view, onView)}
       foot={data ? gridOf(data) : null}
       empty={error && !data ? 'Could not be loaded' : data ? (leftOut(data) ?? 'No value yet') : ''}
     />

@@ -4,7 +4,7 @@ import { useDeferredValue } from 'react'
 import { LinkedCharts } from '../charts/LinkedCharts'
 import charts from '../charts/MetricChart.module.css'
 import { PANELS_AT_ONCE, USUAL_PANELS } from '../charts/panels'
-import { sharedX, useChartView } from '../charts/view'
+import { sharedX, useChartView, useKeptZoom } from '../charts/view'
 import { Below } from './Below'
 import { ChartControls } from './ChartControls'
 import { CurveChart, useReported } from './CurveChart'
@@ -18,6 +18,7 @@ export function CurvePanels({ experiments }: { experiments: readonly string[] })
   const [view, setView] = useChartView()
   // The controls show what was chosen while the charts are drawn.
   const shown = useDeferredValue(view)
+  const kept = useKeptZoom(view, setView)
   const reported = useReported(experiments)
   return (
     <Panel
@@ -32,7 +33,7 @@ export function CurvePanels({ experiments }: { experiments: readonly string[] })
         </Group>
       }
     >
-      <LinkedCharts of={sharedX(shown)}>
+      <LinkedCharts of={sharedX(shown)} kept={kept}>
         <div className={charts.grid}>
           {(shown.panels ?? USUAL_PANELS).map((name, place) => (
             <Below key={name} height={CHART_PX} waits={place >= PANELS_AT_ONCE}>

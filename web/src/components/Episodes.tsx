@@ -1,10 +1,11 @@
-/** The episodes of an evaluation, failures first, each with its replay. */
-import { Button, Group, Skeleton, Table, Text, VisuallyHidden } from '@mantine/core'
+/** The episodes of an evaluation, failures first or by any of their numbers, each with its replay. */
+import { Button, Group, Skeleton, Table, Text, UnstyledButton, VisuallyHidden } from '@mantine/core'
 import { useState } from 'react'
 import { ApiError } from '../api/errors'
-import type { EpisodeResult, Outcome } from '../api/types'
-import { byInterest, detour, OUTCOMES, tally } from '../lib/episodes'
+import type { Outcome } from '../api/types'
+import { arranged, detour, type FoundEpisodes, type Order, OUTCOMES, tally } from '../lib/episodes'
 import { count } from '../lib/format'
+import { useArrangement } from '../lib/useArrangement'
 import table from './ExperimentTable.module.css'
 import { IconPlayerPlay } from './icons'
 import { Segments } from './Segments'
@@ -15,14 +16,31 @@ import ui from './ui.module.css'
 const ROWS = 25
 
 interface EpisodesProps {
-  episodes: readonly EpisodeResult[]
+  found: FoundEpisodes
   onReplay: (episode: number) => void
 }
 
-export function Episodes({ episodes, onReplay }: EpisodesProps) {
-  const [filter, setFilter] = useState<Outcome | 'all'>('all')
+export function Episodes({ found: whole, onReplay }: EpisodesProps) {
+  const { episodes } = whole
+  const [{ outcome: filter, order, reversed }, arrange] = useArrangement()
   const [rows, setRows] = useState(ROWS)
-  const found = byInterest(episodes).filter(({ outcome }) => filter === 'all' || outcome === filter)
+  const found = arranged(whole, order, reversed).filter(
+    ({ outcome }) => filter === 'all' || outcome === filter,
+  )
+  const maps = new Set(whole.maps).size > 1
+  const spl = (whole.spl?.length ?? 0) > 0
+  const head = (by: Order, title: string, look: Omit<HeadProps, 'sorted' | 'onSort' | 'title'> = {}) => (
+    <Head
+      {...look}
+      title={title}
+      sorted={order !== by ? 'none' : reversed ? 'descending' : 'ascending'}
+      onSort={() => {
+        const back = order === by && reversed
+        arrange({ order: back ? 'interest' : by, reversed: order === by && !reversed })
+        setRows(ROWS)
+      }}
+    />
+  )
   return (
     <div data-testid="episodes">
       <Group px="md" pb="sm" gap="sm">
@@ -31,7 +49,7 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
           aria-label="Outcome"
           value={filter}
           onChange={(next) => {
-            setFilter(next)
+            arrange({ outcome: next })
             setRows(ROWS)
           }}
           data={[
@@ -43,27 +61,27 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
           ]}
         />
         <Text size="xs" c="dimmed">
-          {filter === 'all' ? 'Failures first, then the narrowest.' : 'The narrowest first.'}
+          {order !== 'interest'
+            ? reversed
+              ? 'The best first.'
+              : 'The worst first.'
+            : filter === 'all'
+              ? 'Failures first, then the narrowest.'
+              : 'The narrowest first.'}
         </Text>
       </Group>
       <Table.ScrollContainer type="native" minWidth={340}>
         <Table highlightOnHover className={table.table}>
           <Table.Thead>
             <Table.Tr>
-              <Table.Th ta="right" w={84}>
-                Episode
-              </Table.Th>
-              <Table.Th>Outcome</Table.Th>
-              <Table.Th ta="right">Steps</Table.Th>
-              <Table.Th ta="right" visibleFrom="sm">
-                Path
-              </Table.Th>
-              <Table.Th ta="right" visibleFrom="sm">
-                Of the shortest
-              </Table.Th>
-              <Table.Th ta="right" visibleFrom="sm">
-                Clearance
-              </Table.Th>
+              {head('episode', 'Episode', { ta: 'right', w: 84 })}
+              {maps && head('map', 'Map', { visibleFrom: 'md' })}
+              {head('outcome', 'Outcome')}
+              {head('steps', 'Steps', NUMBER)}
+              {head('path', 'Path', WIDE)}
+              {head('detour', 'Of the shortest', WIDE)}
+              {spl && head('spl', 'SPL', WIDE)}
+              {head('clearance', 'Clearance', WIDE)}
               <Table.Th w={120}>
                 <VisuallyHidden>Replay</VisuallyHidden>
               </Table.Th>
@@ -75,6 +93,11 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
                 <Table.Td ta="right" fw={550} className={ui.number}>
                   {count(episode.index + 1)}
                 </Table.Td>
+                {maps && (
+                  <Table.Td visibleFrom="md" className={ui.quiet}>
+                    {episode.map}
+                  </Table.Td>
+                )}
                 <Table.Td>
                   <OutcomeLabel outcome={episode.outcome} />
                 </Table.Td>
@@ -87,6 +110,11 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
                 <Table.Td ta="right" className={`${ui.number} ${ui.quiet}`} visibleFrom="sm">
                   {factor(detour(episode))}
                 </Table.Td>
+                {spl && (
+                  <Table.Td ta="right" className={ui.number} visibleFrom="sm">
+                    {(episode.spl ?? 0).toFixed(2)}
+                  </Table.Td>
+                )}
                 <Table.Td
                   ta="right"
                   className={ui.number}
@@ -122,6 +150,30 @@ export function Episodes({ episodes, onReplay }: EpisodesProps) {
   )
 }
 
+const NUMBER = { ta: 'right' } as const
+const WIDE = { ta: 'right', visibleFrom: 'sm' } as const
+
+interface HeadProps {
+  title: string
+  sorted: 'none' | 'ascending' | 'descending'
+  onSort: () => void
+  ta?: 'right'
+  w?: number
+  visibleFrom?: 'sm' | 'md'
+}
+
+/** A column's head: pressed once it has the worst first, twice the best, and once more all is as it was. */
+function Head({ title, sorted, onSort, ...look }: HeadProps) {
+  return (
+    <Table.Th aria-sort={sorted} {...look}>
+      <UnstyledButton fz="inherit" fw="inherit" c="inherit" onClick={onSort}>
+        {title}
+        {sorted === 'none' ? '' : sorted === 'ascending' ? ' ↑' : ' ↓'}
+      </UnstyledButton>
+    </Table.Th>
+  )
+}
+
 const factor = (value: number | null) => (value === null ? '–' : `${value.toFixed(2)} ×`)
 
 /** How an episode ended: a dot and a word. */
@@ -136,13 +188,13 @@ export function OutcomeLabel({ outcome }: { outcome: Outcome }) {
 }
 
 interface EpisodesQueryProps {
-  query: { data?: { episodes: EpisodeResult[] } | undefined; error: unknown; refetch: () => unknown }
+  query: { data?: FoundEpisodes | undefined; error: unknown; refetch: () => unknown }
   onReplay: (episode: number) => void
 }
 
 /** The episodes once they have come. */
 export function EpisodesQuery({ query, onReplay }: EpisodesQueryProps) {
-  if (query.data) return <Episodes episodes={query.data.episodes} onReplay={onReplay} />
+  if (query.data) return <Episodes found={query.data} onReplay={onReplay} />
   if (query.error instanceof ApiError && query.error.status === 404)
     return <Message title="Not measured">There are no episodes of this policy.</Message>
   if (query.error)

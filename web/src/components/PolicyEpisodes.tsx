@@ -2,8 +2,9 @@
 import { useSearchParams } from 'react-router'
 import { $api } from '../api/client'
 import type { ShippedPolicy } from '../api/types'
-import { byInterest } from '../lib/episodes'
+import { arranged } from '../lib/episodes'
 import { useReplayInAddress } from '../lib/hooks'
+import { useArrangement } from '../lib/useArrangement'
 import { EpisodesQuery } from './Episodes'
 import { Replay } from './replay/Replay'
 import { Segments } from './Segments'
@@ -17,6 +18,7 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
   const named = search.get('suite')
   const suite = suites.find((each) => each === named) ?? suites[0] ?? ''
   const [episode, setEpisode] = useReplayInAddress()
+  const [{ order, reversed }] = useArrangement()
   const path = { name: policy.name, suite }
   const episodes = $api.useQuery(
     'get',
@@ -45,7 +47,7 @@ export function PolicyEpisodes({ policy }: { policy: ShippedPolicy }) {
         <Replay
           of={`policy:${policy.name}:${suite}`}
           episode={episode}
-          order={byInterest(episodes.data?.episodes ?? []).map(({ index }) => index)}
+          order={arranged(episodes.data ?? { episodes: [] }, order, reversed).map(({ index }) => index)}
           onReplay={setEpisode}
           onClose={() => setEpisode(null)}
         />

@@ -9,7 +9,7 @@ import grid from '../charts/MetricChart.module.css'
 import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
 import { lookOf, PANELS_AT_ONCE, USUAL_PANELS } from '../charts/panels'
 import { chartOf } from '../charts/shape'
-import { type ChangeView, type ChartView, logOf, useChartView } from '../charts/view'
+import { type ChangeView, type ChartView, hiddenOf, logOf, smoothOfChart, useChartView } from '../charts/view'
 import { Below } from './Below'
 import { ChartControls } from './ChartControls'
 import { PanelsButton } from './PanelsButton'
@@ -65,7 +65,9 @@ export function MainCurves({ curves }: { curves: RunCurves }) {
       <Stack gap="md">
         <ChartControls {...curves} />
         {MAIN_CHARTS.map((spec) => (
-          <SpecChart key={spec.title} spec={spec} height={214} curves={curves} />
+          <Below key={spec.title} height={CHART_PX}>
+            <SpecChart spec={spec} height={214} curves={curves} />
+          </Below>
         ))}
       </Stack>
     </Panel>
@@ -88,7 +90,9 @@ export function AllCurves({ curves }: { curves: RunCurves }) {
           <Tabs.Panel key={title} value={title}>
             <div className={grid.grid}>
               {charts.map((spec) => (
-                <SpecChart key={nameOf(spec)} spec={spec} height={180} curves={curves} />
+                <Below key={nameOf(spec)} height={CHART_PX}>
+                  <SpecChart spec={spec} height={180} curves={curves} />
+                </Below>
               ))}
             </div>
           </Tabs.Panel>
@@ -140,6 +144,8 @@ const Drawn = memo(function Drawn({ spec, height, series, view, onView, empty }:
       x={ACROSS[view.across]}
       logX={view.logX}
       log={logOf(view, onView, nameOf(spec))}
+      smooth={smoothOfChart(view, onView, nameOf(spec))}
+      lines={hiddenOf(view, onView)}
       height={height}
       empty={empty}
     />

@@ -1,7 +1,7 @@
 /** The frame around every page: navigation, the state of the service, colour scheme, version. */
 import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
-import { memo, Suspense } from 'react'
-import { Link, NavLink, Outlet, useLocation } from 'react-router'
+import { memo, Suspense, useLayoutEffect, useRef } from 'react'
+import { Link, NavLink, Outlet, useLocation, useNavigationType } from 'react-router'
 import { useAlertNews } from '../alerts/useAlertNews'
 import { useAccount } from '../api/account'
 import { isUnauthorized } from '../api/errors'
@@ -29,6 +29,7 @@ export function Shell() {
   const offline = isError && !locked
   useServerEvents(status !== undefined && !locked)
   useAlertNews(status !== undefined && !locked)
+  useTopOfNewPages()
 
   return (
     <div className={classes.shell}>
@@ -89,6 +90,18 @@ export function Shell() {
       </footer>
     </div>
   )
+}
+
+/** Another page begins at its top; the browser goes back to where one was on the last. */
+function useTopOfNewPages() {
+  const { pathname, hash } = useLocation()
+  const kind = useNavigationType()
+  const before = useRef(pathname)
+  useLayoutEffect(() => {
+    if (before.current === pathname) return
+    before.current = pathname
+    if (kind !== 'POP' && hash === '') window.scrollTo(0, 0)
+  }, [pathname, hash, kind])
 }
 
 /** Not drawn anew with the header: news of the service would draw a page that is on its way at one go, not in slices. */

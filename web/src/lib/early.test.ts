@@ -55,6 +55,6 @@ test.each(Object.entries(FIRST_QUESTIONS))('%s asks what its HTML says', async (
   const [address = ''] = Object.entries(ROUTES).find(([, page]) => page === name) ?? []
   open(address.replace(/:\w+/, 'abc'))
   for (const each of questions) {
-    await vi.waitFor(() => expect(server.asked).toContain(each.replace(/{\w+}/, 'abc')))
+    await vi.waitFor(() => expect(server.asked).toContain(each.replace(/{\w+}/, 'abc')), { timeout: 20_000 })
   }
 })

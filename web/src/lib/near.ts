@@ -1,4 +1,7 @@
-/** What lies far below what is seen is made when one comes near; most of it also when the browser has nothing else to do, one by one. */
+/**
+ * What lies far below what is seen is made when one comes near; most of it also when the browser has nothing else to do. One by one,
+ * each in a turn of its own: between two of them the page answers.
+ */
 import { type RefObject, startTransition, useEffect, useRef, useState } from 'react'
 
 /** How far beyond the window is near. */
@@ -6,47 +9,75 @@ const MARGIN = '600px'
 /** After the page's own beginning. */
 const FIRST_MS = 150
 
-const waiting = new Set<() => void>()
-let coming = false
+type Show = () => void
 
-/** Shows one of those that wait, and comes again. */
-function showOne(): void {
-  coming = false
-  const [first] = waiting
-  if (!first) return
-  first()
-  waiting.delete(first)
-  later(0)
+/** Those that wait are shown one after the other; `turn` comes for the next one. */
+function inTurn(turn: (showNext: Show, first: boolean) => void) {
+  const waiting = new Set<Show>()
+  let coming = false
+  const come = (first: boolean) => {
+    if (coming || waiting.size === 0) return
+    coming = true
+    turn(() => {
+      coming = false
+      const [next] = waiting
+      if (next) waiting.delete(next)
+      next?.()
+      come(false)
+    }, first)
+  }
+  return {
+    add(show: Show) {
+      waiting.add(show)
+      come(true)
+    },
+    remove: (show: Show) => waiting.delete(show),
+  }
 }
 
-function later(ms: number): void {
-  if (coming) return
-  coming = true
-  setTimeout(() => ('requestIdleCallback' in window ? window.requestIdleCallback(showOne) : showOne()), ms)
-}
+const soon = inTurn((showNext) => setTimeout(showNext))
+const whenIdle = inTurn((showNext, first) =>
+  setTimeout(
+    () => ('requestIdleCallback' in window ? window.requestIdleCallback(showNext) : showNext()),
+    first ? FIRST_MS : 0,
+  ),
+)
+
+/** Without it nothing is known of what is seen: all of it may be. */
+const knowsSight = () => 'IntersectionObserver' in window
 
 /** Whether `ref` is, or once was, near what is seen, or there was time for it; with `waits` there never is. */
 export function useNear(ref: RefObject<Element | null>, waits = false): boolean {
-  const [near, setNear] = useState(!('IntersectionObserver' in window))
+  const [near, setNear] = useState(!knowsSight())
   useEffect(() => {
     const element = ref.current
     if (near || !element) return
     const show = () => startTransition(() => setNear(true))
     const observer = new IntersectionObserver(
-      (entries) => entries.some(({ isIntersecting }) => isIntersecting) && show(),
+      (entries) => entries.some(({ isIntersecting }) => isIntersecting) && soon.add(show),
       { rootMargin: MARGIN },
     )
     observer.observe(element)
-    if (!waits) {
-      waiting.add(show)
-      later(FIRST_MS)
-    }
+    if (!waits) whenIdle.add(show)
     return () => {
       observer.disconnect()
-      waiting.delete(show)
+      soon.remove(show)
+      whenIdle.remove(show)
     }
   }, [near, ref, waits])
   return near
+}
+
+/** How many of `total` parts there are by now: one more in each turn. */
+export function useOneByOne(total: number): number {
+  const [made, setMade] = useState(knowsSight() ? 1 : Number.POSITIVE_INFINITY)
+  useEffect(() => {
+    if (made >= total) return
+    const show = () => startTransition(() => setMade(made + 1))
+    soon.add(show)
+    return () => void soon.remove(show)
+  }, [made, total])
+  return Math.min(made, total)
 }
 
 /** How far beyond the window something is drawn anew: so that it is new when it is scrolled to. */

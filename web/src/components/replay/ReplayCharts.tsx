@@ -32,7 +32,7 @@ export function ReplayCharts({ query, time, onSeek }: ReplayChartsProps) {
       <Stack
         gap="xs"
         data-testid="replay-charts"
-        onPointerEnter={() => setPointing(true)}
+        onPointerMove={() => setPointing(true)} // it may lie still where the charts appear
         onPointerLeave={() => setPointing(false)}
       >
         {strips.map(({ chart, data }) => (

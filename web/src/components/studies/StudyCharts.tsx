@@ -19,7 +19,7 @@ export function StudyCharts({ study, titles }: { study: Study; titles: readonly 
   }
   const past = history(named)
   const unbeaten = front(named)
-  const success = successAxis()
+  const success = successAxis(study)
   if (past.points.length === 0) return null
   return (
     <>
@@ -34,6 +34,11 @@ export function StudyCharts({ study, titles }: { study: Study; titles: readonly 
             {...past}
             onOpen={open}
           />
+          {study.results.some(({ state }) => state === 'pruned') && (
+            <Text size="xs" c="dimmed" mt={4}>
+              Grey, here and below: stopped early, at what was measured of them last.
+            </Text>
+          )}
         </Panel>
         <Panel title="Importance">
           <Importances study={study} titles={titles} />
@@ -77,13 +82,18 @@ export function StudyCharts({ study, titles }: { study: Study; titles: readonly 
   )
 }
 
-function Importances({ study: { importances, spec }, titles }: { study: Study; titles: readonly string[] }) {
+/** Complete trials below which importances are said to be a guess. */
+const ENOUGH = 30
+
+function Importances({ study, titles }: { study: Study; titles: readonly string[] }) {
+  const { importances, spec } = study
   if (importances === null)
     return (
       <Text size="sm" c="dimmed">
         Said once eight trials are complete, and differ.
       </Text>
     )
+  const trials = complete(study).length
   const shares = spec.settings
     .map(({ path }, index) => ({ path, title: titles[index], share: importances[path] ?? 0 }))
     .sort((a, b) => b.share - a.share)
@@ -101,7 +111,8 @@ function Importances({ study: { importances, spec }, titles }: { study: Study; t
         ))}
       </dl>
       <Text size="xs" c="dimmed" mt="sm">
-        How much each had to do with being among the best tenth (PED-ANOVA).
+        How much each had to do with being among the best tenth (PED-ANOVA), an estimate from {trials}{' '}
+        complete trials{trials < ENOUGH ? ': so few may well tell otherwise with others' : ''}.
       </Text>
     </>
   )
@@ -123,7 +134,7 @@ function Parallel({
       label="Every complete trial's values, from axis to axis; the stronger the colour, the more success"
       axes={[
         ...settings.map((setting, index) => ({ title: titles[index] ?? '', axis: settingAxis(setting) })),
-        { title: 'Success', axis: successAxis() },
+        { title: 'Success', axis: successAxis(study) },
       ]}
       lines={complete(study).map((trial) => ({
         key: String(trial.number),

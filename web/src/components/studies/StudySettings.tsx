@@ -58,7 +58,10 @@ export function StudySettings({ settings, choices, onChange }: StudySettingsProp
   )
   return (
     <Stack gap="md" role="group" aria-label="Study">
-      <Text size="sm">{plural(settings, 'setting')} searched: this is a study.</Text>
+      <Text size="sm">
+        {plural(settings, 'setting')} searched: this is a study. The best trial is the one with the most
+        success over its seeds (interquartile mean); among equals, the one that is soonest at the target.
+      </Text>
       {number('trials', 'Trials', 'Choices of the settings to train.', 1, MOST_TRIALS)}
       <Select
         label="Chosen by"
@@ -73,6 +76,7 @@ export function StudySettings({ settings, choices, onChange }: StudySettingsProp
       {number('at_once', 'Trials at once', 'The fewer, the more each can learn of.', 1, MOST_AT_ONCE)}
       <Switch
         label="Stop unpromising trials early"
+        description="From a quarter of the steps on, where one's best is below the median of what complete trials had by then."
         checked={choices.stop_early}
         onChange={(event) => onChange({ ...choices, stop_early: event.currentTarget.checked })}
       />

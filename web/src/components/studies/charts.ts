@@ -4,18 +4,37 @@ import type { Point } from '../../charts/Scatter'
 import { labelsOf } from '../../form/labels'
 import type { Schema } from '../../form/schema'
 import { settingText } from '../../form/settingText'
-import { duration, percent, significant } from '../../lib/format'
+import { count, duration, percent, significant } from '../../lib/format'
 import type { SearchedSetting, Study, Trial } from './study'
 
 const [ORDINARY, BEST] = [0, 1]
-const SHARE = { from: 0, to: 1 }
 
-/** Of success rates. */
-export const successAxis = (): Axis => numbers([0, 1], (share) => percent(share), SHARE)
+/** Above so much, the axis begins at a tenth below the worst: what is between 90 and 98 % would be a flat row. */
+const HIGH = 0.5
+
+type Measured = Trial & { success: number }
+
+/** Of the success rates of all trials that have one, those that were stopped early included. */
+export function successAxis(study: Study): Axis {
+  const least = Math.min(1, ...measured(study).map(({ success }) => success))
+  const from = least > HIGH ? Math.ceil(least * 10 - 1) / 10 : 0
+  return numbers([from, 1], (share) => percent(share), { from, to: 1 })
+}
 
 /** The trials that have a success rate: the complete ones. */
-export const complete = (study: Study): (Trial & { success: number })[] =>
-  study.results.filter((trial): trial is Trial & { success: number } => trial.success !== null)
+export const complete = (study: Study): Measured[] =>
+  study.results.filter((trial): trial is Measured => trial.success !== null)
+
+/** These, and those that were stopped early, with what was measured of them last, in the order of their numbers. */
+export function measured(study: Study): Measured[] {
+  return study.results.flatMap((trial) => {
+    const last = Object.keys(trial.rungs).length ? trial.rungs[lastRung(trial)] : undefined
+    const success = trial.success ?? (trial.state === 'pruned' ? last : undefined)
+    return success === undefined ? [] : [{ ...trial, success }]
+  })
+}
+
+const lastRung = (trial: Trial): number => Math.max(...Object.keys(trial.rungs).map(Number))
 
 /** The axis of a searched setting: all that it may be. */
 export function settingAxis(setting: SearchedSetting): Axis {
@@ -44,7 +63,8 @@ export function titleOf(
 ): string {
   const values = settings.map(({ path }, index) => `${titles[index]} ${settingText(trial.values[path])}`)
   const success = trial.success === null ? '' : `: ${percent(trial.success)}`
-  return `Trial ${trial.number}${success}\n${values.join('\n')}`
+  const early = trial.state === 'pruned' ? `, stopped early after ${count(lastRung(trial))} steps` : ''
+  return `Trial ${trial.number}${success}${early}\n${values.join('\n')}`
 }
 
 interface Named {
@@ -58,19 +78,19 @@ function point({ study, titles }: Named, trial: Trial, x: unknown, y: unknown): 
     key: String(trial.number),
     x,
     y,
-    color: best ? BEST : ORDINARY,
+    color: trial.state === 'pruned' ? null : best ? BEST : ORDINARY,
     large: best,
     title: titleOf(trial, study.spec.settings, titles),
   }
 }
 
-/** Success by number, and the best until then. */
+/** Success by number, and the best complete one until then. */
 export function history(named: Named): { points: Point[]; line: [number, number][] } {
   let best = Number.NEGATIVE_INFINITY
   const line: [number, number][] = []
-  const points = complete(named.study).map((trial) => {
-    best = Math.max(best, trial.success)
-    line.push([trial.number, best])
+  const points = measured(named.study).map((trial) => {
+    if (trial.state !== 'pruned') best = Math.max(best, trial.success)
+    if (best >= 0) line.push([trial.number, best])
     return point(named, trial, trial.number, trial.success)
   })
   return { points, line }
@@ -78,7 +98,7 @@ export function history(named: Named): { points: Point[]; line: [number, number]
 
 /** Success over the values of one setting. */
 export const slice = (named: Named, path: string): Point[] =>
-  complete(named.study).map((trial) => point(named, trial, trial.values[path], trial.success))
+  measured(named.study).map((trial) => point(named, trial, trial.values[path], trial.success))
 
 /** Success over cost, and the trials that no other one beats in both. */
 export function front(named: Named): { points: Point[]; line: [number, number][]; axis: Axis } {
