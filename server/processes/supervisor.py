@@ -178,7 +178,10 @@ class Supervisor:
                 worker.start()
             if not self._signals:
                 self._say(f"Mapless is at {login_url(settings, secrets.token)}")
-                self._say(f"{count} workers, data in {settings.data_dir}. Ctrl-C stops; trainings go on at the next start.")
+                workers = "worker" if count == 1 else "workers"
+                self._say(
+                    f"{count} {workers}, data in {settings.data_dir}. Ctrl-C stops; trainings go on at the next start."
+                )
             while not self._signals:
                 for child in children:
                     child.restart_if_dead(self._say)

@@ -17,7 +17,7 @@ from server.database import tables
 from server.errors import ConflictError, CorruptUploadError, NotFoundError
 from server.evaluations.repository import PolicyEvaluationRepository, encode_episodes, episodes_of
 from server.evaluations.schemas import EvaluationFigures
-from server.evaluations.ways import KeptWays
+from server.evaluations.ways import unpacked
 from server.ids import new_id
 from server.project_archives.repository import ProjectArchiveRepository
 from server.project_archives.schemas import ArchivedAskedEvaluation, ArchivedPolicy, ArchivedRecording
@@ -155,7 +155,7 @@ def archived_evaluation(session: Session, evaluation_id: str) -> ArchivedAskedEv
             "figures": row.figures and EvaluationFigures.model_validate(row.figures),
             "task": row.task,
             "result": result,
-            "ways": KeptWays.model_validate_json(zlib.decompress(row.ways)) if row.ways else None,
+            "ways": unpacked(row.ways) if row.ways else None,
         }
     )
 

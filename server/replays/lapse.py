@@ -63,10 +63,11 @@ def filmed(subjects: Sequence[Subject], recordings: Sequence[Recording], theme: 
         for subject, (begins, lasts) in zip(subjects, times, strict=True)
     )
     said = [
-        (begins, f"Step {subject.step:,}: {_success(recording):.0%} of all arrive")
+        (begins, f"Step {subject.step:,}: {100.0 * _success(recording):.1f} % of all arrive")
         for subject, recording, (begins, _) in zip(subjects, recordings, times, strict=True)
     ]
-    caption = LapseCaption(subjects[-1].title, subjects[0].recorded.suite, len(scenarios), said)
+    run = subjects[-1].title.removesuffix(f", step {subjects[-1].step:,}")  # its checkpoints come one after another
+    caption = LapseCaption(run, subjects[0].recorded.suite, len(scenarios), said)
     return LapseFilm(theme=theme, scenarios=tuple(scenarios), chapters=chapters), caption
 
 

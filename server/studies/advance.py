@@ -211,7 +211,7 @@ class StudyMover:
                 StudyRepository(session).move(study, "judging")
             return
         training = space_of(spec).training(best.values)
-        name = f"{study.name[:_LONGEST_NAME]}, the best judged"
+        name = f"{study.name[:_LONGEST_NAME]}, the best judged, trial {best.number}"
         experiment = _experiment(study, name, training, fresh_seeds(spec.seeds))
         with self._services.database.write() as session:
             moved = StudyRepository(session).move(study, "judging", judged_trial=best.number, judgement_id=experiment.id)

@@ -142,7 +142,8 @@ class Space:
             raise UnusableSettingError(path, "only numbers and choices can be searched")
         if isinstance(setting, ListedSetting):
             return
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        # One that is not set has no kind yet: whether it takes numbers is seen as the ends are tried.
+        if isinstance(value, bool) or not isinstance(value, int | float | None):
             raise UnusableSettingError(path, "a range is for numbers: list its values instead")
         if isinstance(value, int) and not (setting.low.is_integer() and setting.high.is_integer()):
             raise UnusableSettingError(path, "its range has to begin and end at whole numbers")

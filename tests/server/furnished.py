@@ -17,6 +17,7 @@ from server.services import Services
 from sim.config import ArenaFile
 from tests.server.harness import TOKEN, Reports
 from tests.server.people import Lab
+from tests.workers.test_onnx_policy import graph
 
 SUITE = "simple-200"
 
@@ -97,7 +98,7 @@ def _furnish(client: httpx.Client, services: Services) -> dict[str, list[str]]:
         for name in ("simple", "complex")
     )
     reports.measured(measured, SUITE)
-    upload = made("/api/uploads", name="Elsewhere", content=base64.b64encode(b"no graph").decode(), task={})
+    upload = made("/api/uploads", name="Elsewhere", content=base64.b64encode(graph()).decode(), task={})
     campaign = made("/api/reproduction", seeds=1, effort=0.01)["campaign"]["id"]
     recording = client.post("/api/recordings", params={"name": "drive"}, content=b"no recording").json()["id"]
     playground = made("/api/playgrounds", policy={"source": "shipped", "name": "simple"}, arena={"name": "rooms"})

@@ -52,9 +52,9 @@ class Reports:
         rows = (arrived,) * arrivals + (collided,) * (episodes - arrivals)
         return EvaluationResult(suite="simple-200", suite_hash=suite_hash, episodes=rows)
 
-    def measured(self, evaluation: dict[str, Any], suite: str | None = None) -> None:
+    def measured(self, evaluation: dict[str, Any], suite: str | None = None, *, arrivals: int = 8) -> None:
         """What a worker would bring of an evaluation that was asked for: eight of ten arrive, on straight ways."""
-        result = Reports.evaluation(8)
+        result = Reports.evaluation(arrivals)
         if suite is not None:
             result = result.model_copy(update={"suite": suite})
         measurement = Measurement(
@@ -65,6 +65,8 @@ class Reports:
             targets=((1.0, 1.0),) * len(result.episodes),
             ways=(((0.0, 0.0), (1.0, 1.0)),) * len(result.episodes),
             jerks=(0.5,) * len(result.episodes),
+            terms=("arrival", "collision"),
+            returns=((100.0, 0.0),) * 8 + ((0.0, -100.0),) * 2,
         )
         with self.services.database.write() as session:
             PolicyEvaluationRepository(session).measured(evaluation["job_id"], measurement)

@@ -1,5 +1,6 @@
 """Examples in the API's description: one for every body, all of them true, and what they launch is launched."""
 
+import base64
 import json
 from typing import Any
 
@@ -11,6 +12,7 @@ from pydantic import TypeAdapter
 from server.app import ROUTERS
 from server.examples import ANSWERS, BODIES
 from server.written.openapi import description
+from tests.workers.test_onnx_policy import graph
 
 ROUTES = {
     f"{method} {route.path}": route
@@ -32,7 +34,6 @@ DONE_AT_ONCE = (
     "POST /api/reproduction",
     "POST /api/worker-tokens",
     "POST /api/alerts/rules",
-    "POST /api/uploads",
     "PUT /api/workbench/views",
 )
 
@@ -68,6 +69,13 @@ def test_what_an_example_asks_for_is_done(client: TestClient, name: str) -> None
     method, path = name.split(" ")
     response = client.request(method, path, json=BODIES[name])
     assert response.is_success, response.text
+
+
+def test_a_policy_is_uploaded_as_the_example_says_once_its_file_is_whole(client: TestClient) -> None:
+    """A file takes more than an example's line: the one there is how it begins."""
+    whole = BODIES["POST /api/uploads"] | {"content": base64.b64encode(graph()).decode()}
+    assert client.post("/api/uploads", json=whole).status_code == 201
+    assert client.post("/api/uploads", json=BODIES["POST /api/uploads"]).status_code == 422
 
 
 def test_a_training_is_launched_as_the_example_says(client: TestClient) -> None:

@@ -1,5 +1,6 @@
 """Every route and socket, asked by everybody: the table says what each takes, and a new one without an entry fails."""
 
+import base64
 import json
 import shutil
 from collections.abc import Iterator
@@ -24,6 +25,7 @@ from server.services import Services
 from server.settings import Settings
 from tests.server.harness import BASE_URL, TOKEN, WORKER_TOKEN, Reports
 from tests.server.people import Lab, launch
+from tests.workers.test_onnx_policy import graph
 
 # What each route takes. Parameters stand for things of the project "here".
 TABLE = {
@@ -134,6 +136,7 @@ TABLE = {
         GET /api/recordings/{recording_id}/beside
         GET /api/evaluations/{evaluation_id}
         GET /api/evaluations/{evaluation_id}/episodes
+        GET /api/evaluations/{evaluation_id}/export
         GET /api/evaluations/{evaluation_id}/ways
         GET /api/evaluations/{evaluation_id}/replays/{episode}
         GET /api/replays/{subjects}/progress
@@ -417,7 +420,7 @@ def everybody(
             policies = [{"source": "checkpoint", "id": checkpoint}]
             (evaluation,) = client.post("/api/evaluations", json={"policies": policies}).json()
             Reports(client, services).measured(evaluation)
-            onnx = {"name": "Mine", "project_id": here, "content": "AAAA", "task": {}}
+            onnx = {"name": "Mine", "project_id": here, "content": base64.b64encode(graph()).decode(), "task": {}}
             upload = client.post("/api/uploads", json=onnx).json()
             recorded = f"/api/recordings?name=drive.mcap&project_id={here}"
             recording = client.post(recorded, content=b"not looked at").json()

@@ -47,7 +47,7 @@ from tests.server.test_evaluations import ended
 from tests.server.test_own_suites import add, made, scenario
 from tests.workers.robot_bags import as_mcap, messages, simulated
 from tests.workers.test_bags import task
-from tests.workers.test_onnx_policy import SIZE, graph
+from tests.workers.test_onnx_policy import graph
 from workers.export.bundle import bundle, export_checkpoint
 from workers.protocol import LogBatch, LogLine
 from workers.shipped.library import shipped_policy
@@ -226,7 +226,7 @@ def measured(client: TestClient, services: Services, job_worker: None) -> list[d
     policies: list[Any] = [{"source": "checkpoint", "id": checkpoint(here, run, 1_000, None)}]
     uploads: list[tuple[bytes, dict[str, Any]]] = [
         (bundle(export_checkpoint(SHIPPED)), {}),
-        (graph(numbers=SIZE + 1), {"task": {}}),
+        (graph(scale=float("nan")), {"task": {}}),
     ]
     for content, more in uploads:
         body = {"name": "From elsewhere", "content": base64.b64encode(content).decode(), **more}

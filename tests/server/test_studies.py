@@ -309,6 +309,8 @@ def test_a_deleted_study_leaves_its_trials_in_the_trash(client: TestClient, move
         ({"settings": [LEARNING_RATE, LEARNING_RATE]}, ["algorithm", "learning_rate"], "only once"),
         ({"settings": [{**LEARNING_RATE, "path": "algorithm.epochs"}]}, ["algorithm", "epochs"], "whole numbers"),
         ({"settings": [{**LEARNING_RATE, "path": "algorithm.scale_returns"}]}, ["algorithm", "scale_returns"], "list its"),
+        ({"settings": [{**LEARNING_RATE, "path": "algorithm.final_std"}]}, ["algorithm", "final_std"], "is refused"),
+        ({"settings": [{**LEARNING_RATE, "path": "start_from"}]}, ["start_from"], "is refused"),
     ],
 )
 def test_what_can_not_be_searched_is_refused_at_its_field(

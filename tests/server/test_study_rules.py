@@ -14,7 +14,7 @@ from server.studies.proposals import SamplerName, Told, importances, propose, tr
 from server.studies.rules import hopeless, rungs_of, score
 from server.studies.space import ListedSetting, RangedSetting, Space, Values
 from server.studies.views import front
-from workers.config import TrainingConfig
+from workers.config import PpoConfig, TrainingConfig
 from workers.statistics.seeds import interquartile_mean
 
 RATE = RangedSetting(kind="range", path="algorithm.learning_rate", low=1e-4, high=1e-2, log=True, points=3)
@@ -119,6 +119,14 @@ def test_every_proposal_is_within_its_ranges(seed: int, number: int, sampler: Sa
     assert type(values[EPOCHS.path]) is int
     assert values[SCHEDULE.path] in ("linear", "constant")
     assert ours.training(values).algorithm.name == "ppo"
+
+
+def test_a_number_that_is_not_set_may_have_a_range() -> None:
+    falling = space(RangedSetting(kind="range", path="algorithm.final_std", low=0.05, high=0.5, log=True, points=3))
+    falling.check()
+    algorithm = falling.training({"algorithm.final_std": 0.1}).algorithm
+    assert isinstance(algorithm, PpoConfig)
+    assert algorithm.final_std == 0.1
 
 
 def test_a_grid_takes_every_combination_once_in_a_drawn_order() -> None:

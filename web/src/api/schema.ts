@@ -498,7 +498,7 @@ export interface paths {
         get: operations["get_checkpoint_live_api_checkpoints__checkpoint_id__live_get"];
         /**
          * Change Checkpoint Live
-         * @description Change what the live view of a checkpoint shows, for everyone who watches it.
+         * @description Change what the live view of a checkpoint shows: speed for everyone who watches it, the rest for oneself.
          */
         put: operations["change_checkpoint_live_api_checkpoints__checkpoint_id__live_put"];
         post?: never;
@@ -771,6 +771,26 @@ export interface paths {
          * @description Every episode behind its figures, in the suite's order.
          */
         get: operations["list_evaluation_episodes_api_evaluations__evaluation_id__episodes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/evaluations/{evaluation_id}/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Evaluation
+         * @description An evaluation as a file.
+         */
+        get: operations["export_evaluation_api_evaluations__evaluation_id__export_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1606,7 +1626,7 @@ export interface paths {
         get: operations["get_policy_live_api_policies__name__live_get"];
         /**
          * Change Policy Live
-         * @description Change what the live view of a shipped policy shows, for everyone who watches it.
+         * @description Change what the live view of a shipped policy shows: speed for everyone who watches it, the rest for oneself.
          */
         put: operations["change_policy_live_api_policies__name__live_put"];
         post?: never;
@@ -2372,7 +2392,7 @@ export interface paths {
         get: operations["get_live_api_runs__run_id__live_get"];
         /**
          * Change Live
-         * @description Change what the live view of a run shows, for everyone who watches it.
+         * @description Change what the live view of a run shows: mode and speed for everyone who watches it, the rest for oneself.
          */
         put: operations["change_live_api_runs__run_id__live_put"];
         post?: never;
@@ -4034,6 +4054,18 @@ export interface components {
         AskedEpisodes: {
             /** Episodes */
             episodes: components["schemas"]["EpisodeResult"][];
+            /**
+             * Maps
+             * @description The arena of each, by name; empty where they took too much room to keep.
+             * @default []
+             */
+            maps: string[];
+            /**
+             * Spl
+             * @description Of each: shortest path over the driven one, 0 where it did not arrive.
+             * @default []
+             */
+            spl: number[];
             /** Suite */
             suite: string | null;
             /** Suite Hash */
@@ -4044,6 +4076,12 @@ export interface components {
          * @description A policy or a baseline on a suite.
          */
         AskedEvaluation: {
+            /**
+             * Behind
+             * @description While it waits: evaluations under way, then those that go before it.
+             * @default []
+             */
+            behind: string[];
             /** Choice */
             choice: components["schemas"]["NamedSuite-Output"] | components["schemas"]["ArenaSuite-Output"] | components["schemas"]["ScenarioSuite-Output"] | components["schemas"]["workers__job_protocol__OwnSuite-Output"];
             /** Created At */
@@ -4073,6 +4111,11 @@ export interface components {
              * @description Null where that is not known yet, and once it has ended.
              */
             seconds_left: number | null;
+            /**
+             * Starts In
+             * @description Seconds, about; null where others go first, or it is not known yet.
+             */
+            starts_in: number | null;
             /**
              * State
              * @enum {string}
@@ -5836,15 +5879,31 @@ export interface components {
          */
         Entry: {
             /**
+             * Evaluations
+             * @description Ids of the evaluations behind it that were asked for, one a seed.
+             * @default []
+             */
+            evaluations: string[];
+            /**
+             * Experiment Id
+             * @description The training that it is of; null for what is none's.
+             */
+            experiment_id: string | null;
+            /**
              * Id
-             * @description Name of a shipped policy or a baseline; id of a training or an evaluation.
+             * @description Name of a shipped policy or a baseline; id of a training; of what was asked for, id of the evaluation.
              */
             id: string;
             /**
              * Kind
              * @enum {string}
              */
-            kind: "shipped" | "training" | "evaluation" | "baseline";
+            kind: "shipped" | "training" | "evaluation" | "baseline" | "uploaded";
+            /**
+             * P
+             * @description That the two are one, adjusted for all tests here (Holm 1979); tied from 0.05. Null: no test.
+             */
+            p: number | null;
             /**
              * Rank
              * @description By success, from 1; equal rates share one.
@@ -5870,10 +5929,10 @@ export interface components {
             title: string;
             /**
              * Told By
-             * @description What that is known by: the difference over seeds where both have five or more (95 % interval), else Fisher's exact test over the episodes of these very policies (p below 0.05).
+             * @description What that is known by: the difference over seeds where those that have several have five or more; Fisher's exact test over the episodes where either is one very policy; nothing where either has two to four seeds.
              * @enum {string}
              */
-            told_by: "best" | "seeds" | "episodes";
+            told_by: "best" | "seeds" | "episodes" | "nothing";
         };
         /**
          * EpisodeReplay
@@ -6137,6 +6196,11 @@ export interface components {
              */
             steps: number | null;
             success: components["schemas"]["Estimate"];
+            /**
+             * Terms
+             * @description The same by the reward's terms, in its order; null where it was measured before these were kept.
+             */
+            terms: components["schemas"]["TermReturn"][] | null;
             /** Timeout */
             timeout: number;
             /**
@@ -6401,13 +6465,15 @@ export interface components {
          * FailedSeeds
          * @description What a few seeds leave open about those that were not trained.
          *
-         *     A seed has failed if it arrives at most half as often as the best of them, or never.
+         *     A seed has failed if it arrives at most half as often as the best of them, or never. Where even the best hardly arrives
+         *     (`USELESS`), or the worse of two is that bad, half of the best tells nothing: which have failed is not said then.
          *
          *     Attributes:
          *         failed: seeds that have.
          *         seeds: of so many.
          *         at_most: share of all seeds that may fail, one-sided 95 %, exact.
          *         sentence: the same in words.
+         *         told: whether these seeds can say at all which of them have failed; else `failed` counts those that never arrive.
          */
         FailedSeeds: {
             /** At Most */
@@ -6418,6 +6484,11 @@ export interface components {
             seeds: number;
             /** Sentence */
             sentence: string;
+            /**
+             * Told
+             * @default true
+             */
+            told: boolean;
         };
         /**
          * FieldCell
@@ -6431,10 +6502,15 @@ export interface components {
             collision: number;
             /**
              * Evaluation
-             * @description Of which asked evaluation; null for what ships.
+             * @description Of which asked evaluation, that of the first seed; null for what ships.
              */
             evaluation: string | null;
             success: components["schemas"]["Estimate"];
+            /**
+             * Suite Hash
+             * @description Of the suite of what was asked for; null for what ships.
+             */
+            suite_hash: string | null;
             /**
              * Worst Tenth Spl
              * @description Success weighted by path length over the tenth of the episodes that did worst; a mean over seeds.
@@ -6471,7 +6547,7 @@ export interface components {
         FieldMatrix: {
             /**
              * Asked
-             * @description What was asked for here at difficulty 1: 20 maps, 200 scenarios, attempts as long as the policy's own.
+             * @description What was asked for here at difficulty 1: 20 maps, 200 scenarios, attempts as long as the policy's own. A training's seeds are one driver. First what was measured in most families, of these the best.
              */
             asked: components["schemas"]["FieldDriver"][];
             /**
@@ -6627,6 +6703,13 @@ export interface components {
              */
             difficulty: number;
             /**
+             * Map sampling
+             * @description In which maps episodes begin. Uniform: in all as often. Learnability: half of them more often where some attempts arrive and some do not, since there is most to learn.
+             * @default uniform
+             * @enum {string}
+             */
+            map_sampling: "uniform" | "learnability";
+            /**
              * Maps
              * @description Different arenas of the training; with few of them the policy learns them by heart.
              * @default 64
@@ -6663,6 +6746,13 @@ export interface components {
              * @default 0.5
              */
             difficulty: number;
+            /**
+             * Map sampling
+             * @description In which maps episodes begin. Uniform: in all as often. Learnability: half of them more often where some attempts arrive and some do not, since there is most to learn.
+             * @default uniform
+             * @enum {string}
+             */
+            map_sampling: "uniform" | "learnability";
             /**
              * Maps
              * @description Different arenas of the training; with few of them the policy learns them by heart.
@@ -7232,7 +7322,7 @@ export interface components {
             state: "queued" | "running" | "done" | "failed" | "cancelled";
             /**
              * Title
-             * @description Whose: a policy's name.
+             * @description Whose: a policy's name; of an evaluation with the suite.
              */
             title: string;
             /**
@@ -7436,7 +7526,7 @@ export interface components {
         Leaderboard: {
             /**
              * Comparisons
-             * @description How many entries were compared with the best: of so many, some differ by chance.
+             * @description How many entries were tested against the best, which every p is adjusted for.
              */
             comparisons: number;
             /** Entries */
@@ -7813,7 +7903,7 @@ export interface components {
         };
         /**
          * LiveSettings
-         * @description What the live view of a run shows; one setting per run, shared by everyone who watches it.
+         * @description What the live view of a run shows: mode and speed to everyone who watches it, the rest as each person chose.
          */
         LiveSettings: {
             /**
@@ -8981,6 +9071,11 @@ export interface components {
              */
             outcome: ("arrival" | "collision" | "timeout") | null;
             /**
+             * Outdated
+             * @description Whether value, outcome and seconds are of before the last change; new ones follow within a second.
+             */
+            outdated: boolean;
+            /**
              * Policy
              * @description For people.
              */
@@ -9229,6 +9324,11 @@ export interface components {
              */
             epochs: number;
             /**
+             * Final std
+             * @description A limit of the exploration noise falls to it over the training's second half. Empty: no limit.
+             */
+            final_std?: number | null;
+            /**
              * GAE lambda
              * @default 0.95
              */
@@ -9326,6 +9426,11 @@ export interface components {
              * @default 6
              */
             epochs: number;
+            /**
+             * Final std
+             * @description A limit of the exploration noise falls to it over the training's second half. Empty: no limit.
+             */
+            final_std: number | null;
             /**
              * GAE lambda
              * @default 0.95
@@ -12606,6 +12711,22 @@ export interface components {
             warmup_steps: number;
         };
         /**
+         * TermReturn
+         * @description What a term of the reward comes to.
+         */
+        TermReturn: {
+            /**
+             * Name
+             * @description As curves and settings have it.
+             */
+            name: string;
+            /**
+             * Value
+             * @description Mean of the episodes' sums.
+             */
+            value: number;
+        };
+        /**
          * Thinned
          * @description What was done to the curves of a run that ended long ago: neighbouring points were put together.
          *
@@ -12871,7 +12992,7 @@ export interface components {
             algorithm?: components["schemas"]["PpoConfig-Input"] | components["schemas"]["DdpgConfig-Input"] | components["schemas"]["Td3Config-Input"] | components["schemas"]["SacConfig-Input"];
             /**
              * Device
-             * @description Small networks train fastest on a CPU core.
+             * @description CUDA pays for PPO with ResBlock, wide networks or hundreds of robots. Auto: where a worker has it.
              * @default cpu
              * @enum {string}
              */
@@ -12914,7 +13035,7 @@ export interface components {
             algorithm: components["schemas"]["PpoConfig-Output"] | components["schemas"]["DdpgConfig-Output"] | components["schemas"]["Td3Config-Output"] | components["schemas"]["SacConfig-Output"];
             /**
              * Device
-             * @description Small networks train fastest on a CPU core.
+             * @description CUDA pays for PPO with ResBlock, wide networks or hundreds of robots. Auto: where a worker has it.
              * @default cpu
              * @enum {string}
              */
@@ -15349,6 +15470,51 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AskedEpisodes"];
+                };
+            };
+            /** @description What the tag in `If-None-Match` names is still true */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["Unreadable"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            422: components["responses"]["Refused"];
+            429: components["responses"]["TooManyAttempts"];
+            503: components["responses"]["NotNow"];
+        };
+    };
+    export_evaluation_api_evaluations__evaluation_id__export_get: {
+        parameters: {
+            query?: {
+                /** @description csv: an episode in a row, with its return by the reward's terms where these were kept. json: the same with the figures. latex (booktabs), markdown: the figures with N and 95 % intervals. */
+                format?: "csv" | "json" | "latex" | "markdown";
+            };
+            header?: {
+                /** @description Tags of answers that one has. */
+                "If-None-Match"?: string | null;
+            };
+            path: {
+                evaluation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": Record<string, never>;
+                    "application/x-tex": string;
+                    "text/csv": string;
+                    "text/markdown": string;
                 };
             };
             /** @description What the tag in `If-None-Match` names is still true */

@@ -79,7 +79,7 @@ const MEASURE = [
 
 /** Numbers and choices of the training, but for what trials are measured by. */
 function isSearchable(field: Field): boolean {
-  if (!field.key.startsWith(BASE) || field.nullable) return false
+  if (!field.key.startsWith(BASE) || (field.nullable && field.kind !== 'number')) return false
   const path = field.key.slice(BASE.length)
   if (MEASURE.some((fixed) => path === fixed || path.startsWith(`${fixed}.`))) return false
   if (field.kind === 'choice') return field.options.length > 1
@@ -89,16 +89,33 @@ function isSearchable(field: Field): boolean {
 /** What a field is searched over at first, from the value that it has. */
 export function freshSearch(field: Field, value: Json): Searched {
   if (field.kind !== 'number') return { kind: 'list', values: optionsOf(field).map((option) => option.value) }
-  const { minimum, maximum, exclusiveMaximum } = field.schema
+  const { minimum, maximum, exclusiveMinimum, exclusiveMaximum } = field.schema
   const most = maximum ?? exclusiveMaximum ?? Number.POSITIVE_INFINITY
+  if (value === null) return middle(minimum ?? exclusiveMinimum ?? 0, Number.isFinite(most) ? most : REACH)
   const least = minimum ?? Number.NEGATIVE_INFINITY
   const number = typeof value === 'number' ? value : 0
+  if (!field.integer && most <= 1 && number > most / 2 && number < most) return upTo(most, number)
   const log = !field.integer && number > 0
   const reach = log ? REACH : WHOLE_REACH
   const low = field.integer ? Math.floor(number / reach) : number / reach
   const high = number > 0 ? number * reach : 1
   const tidy = (end: number) => Number(Math.min(most, Math.max(least, end)).toPrecision(6))
   return { kind: 'range', low: tidy(low), high: tidy(high), log }
+}
+
+/** Near an end that it does not reach, as a discount is: what lies between counts, a tenth of it to ten times. */
+function upTo(most: number, number: number): Searched {
+  const tidy = (left: number) => Number((most - left).toPrecision(6))
+  const left = most - number
+  return { kind: 'range', low: tidy(Math.min(left * REACH, most / 2)), high: tidy(left / REACH), log: false }
+}
+
+/** Where nothing is set: the middle half of what may be, of its logarithm where it may not be 0. */
+function middle(least: number, most: number): Searched {
+  const log = least > 0
+  const at = (share: number) => (log ? least * (most / least) ** share : least + (most - least) * share)
+  const tidy = (end: number) => Number(end.toPrecision(2))
+  return { kind: 'range', low: tidy(at(0.25)), high: tidy(at(0.75)), log }
 }
 
 /** The values of a choice with the words for them. */

@@ -18,7 +18,15 @@ const GALLERY: ArenaSummary[] = [
     kind: 'generated',
     key: 'maze',
     title: 'Maze',
-    config: { name: 'maze', difficulty: 0.5, maps: 64, seed: 0, own_maps: false, movers },
+    config: {
+      name: 'maze',
+      difficulty: 0.5,
+      maps: 64,
+      seed: 0,
+      own_maps: false,
+      map_sampling: 'uniform',
+      movers,
+    },
     imported_at: null,
   },
   {
@@ -113,6 +121,7 @@ test('the difficulty is what is drawn, and what the training starts with', async
     maps: 64,
     seed: 1,
     own_maps: false,
+    map_sampling: 'uniform',
     movers,
   })
 })

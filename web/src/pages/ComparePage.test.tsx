@@ -81,6 +81,15 @@ test('whole distributions: a profile, and how likely one improves on the other',
   expect(profile).not.toHaveTextContent('Alone')
 })
 
+test('who is left out of the probability of improvement is said, and no table is empty', async () => {
+  startServer({ ...routes, 'GET /api/compare': { ...comparison, improvements: [] } })
+  open('/compare?experiment=exp1&experiment=exp2')
+  expect(await screen.findByTestId('improvements-left-out')).toHaveTextContent(
+    'Left out: Corridor has 2 seeds evaluated, and it takes 5',
+  )
+  expect(screen.queryByRole('table', { name: 'Probability of improvement' })).not.toBeInTheDocument()
+})
+
 test('tables leave as one prints them, as they are judged on the page', async () => {
   startServer(routes)
   const { user } = open('/compare?experiment=exp1&experiment=exp2&base=exp2')
@@ -102,6 +111,35 @@ test('with none chosen there is a list to choose from', async () => {
   await user.click(screen.getByRole('button', { name: 'Compare 1' }))
   expect(router.state.location.search).toBe('?experiment=exp1')
   expect(await screen.findByTestId('figures')).toBeInTheDocument()
+})
+
+const ONE_GONE = {
+  ...routes,
+  'GET /api/compare': (request: Request) =>
+    new URL(request.url).searchParams.has('experiment', 'thrown')
+      ? new Response(JSON.stringify({ detail: 'There is no experiment thrown' }), { status: 404 })
+      : comparison,
+  'GET /api/experiments/exp1': { ...listed, id: 'exp1', name: 'Corridor' },
+  'GET /api/experiments/exp2': { ...listed, id: 'exp2', name: 'Alone' },
+  'GET /api/experiments/thrown': () => new Response(JSON.stringify({ detail: 'gone' }), { status: 404 }),
+  'GET /api/experiments': { items: [{ ...listed, id: 'thrown', name: 'Short sight' }], total: 1, next: null },
+}
+
+test('a deleted training is named and left out, and the others are compared', async () => {
+  startServer(ONE_GONE)
+  open('/compare?experiment=exp1&experiment=thrown&experiment=exp2')
+  expect(await screen.findByTestId('gone')).toHaveTextContent(
+    /1 of 3 trainings left outShort sight lies in the trash, from where it can be taken out again/,
+  )
+  expect(await screen.findByTestId('figures')).toHaveTextContent('Corridor')
+})
+
+test('where fewer than two remain, the page says so and how to go on', async () => {
+  startServer(ONE_GONE)
+  open('/compare?experiment=exp1&experiment=thrown')
+  expect(await screen.findByRole('alert')).toHaveTextContent('Only Corridor is left of 2 trainings')
+  expect(screen.getByRole('link', { name: 'Open Corridor' })).toHaveAttribute('href', '/experiments/exp1')
+  expect(screen.getByRole('link', { name: 'the trash' })).toHaveAttribute('href', '/?place=trash')
 })
 
 test('curves over time under way: in the address, on a grid that is told, and who is left out', async () => {

@@ -1,15 +1,17 @@
 /** Experiments side by side: curves, final figures with what stands behind them, and what differs in their settings. */
 import { Anchor, Button, Group, Skeleton, Stack, Table, Text } from '@mantine/core'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useState } from 'react'
+import { type ReactNode, useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
 import { $api } from '../api/client'
+import { isNotFound } from '../api/errors'
 import type { Comparison } from '../api/types'
 import { looksOf } from '../charts/palette'
 import { ExperimentSwatch } from '../charts/Swatch'
 import { useChartView } from '../charts/view'
 import { ComparisonDistributions } from '../components/ComparisonDistributions'
 import { comparisonQuery, TableExport, WholeExport } from '../components/ComparisonExport'
+import { ComparisonRemains } from '../components/ComparisonRemains'
 import { ComparisonVerdicts, EVERY_PAIR } from '../components/ComparisonVerdicts'
 import { CurvePanels } from '../components/CurvePanels'
 import table from '../components/ExperimentTable.module.css'
@@ -92,9 +94,12 @@ interface ChosenProps {
   base: string | null
   onBase: (base: string) => void
   onChange: () => void
+  /** What has to be said of those that are not there any more. */
+  notice?: ReactNode
 }
 
-function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProps) {
+function Chosen(props: ChosenProps) {
+  const { chosen, margin, onMargin, base, onBase, onChange, notice } = props
   const held = base === EVERY_PAIR ? { pairs: true } : base === null ? {} : { base }
   const query = comparisonQuery(chosen, margin, held)
   const [view] = useChartView()
@@ -104,6 +109,19 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
     { params: { query: { experiment: [...chosen], margin, ...held } } },
     { placeholderData: keepPreviousData },
   )
+  if (isNotFound(error) && !notice)
+    return (
+      <ComparisonRemains chosen={chosen} onChange={onChange}>
+        {(there, gone) => (
+          <Chosen
+            {...props}
+            chosen={there}
+            base={base === EVERY_PAIR || (base && there.includes(base)) ? base : null}
+            notice={gone}
+          />
+        )}
+      </ComparisonRemains>
+    )
   return (
     <Page
       {...HEADS.ComparePage}
@@ -127,6 +145,7 @@ function Chosen({ chosen, margin, onMargin, base, onBase, onChange }: ChosenProp
         </Panel>
       ) : (
         <Stack gap="md">
+          {notice}
           {data && data.warnings.length > 0 && <Warnings warnings={data.warnings} />}
           <Panel
             title="Final figures"

@@ -20,11 +20,13 @@ import { inShort, summaryOf } from '../lib/experiments'
 import { dateTime, plural } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import { lazily } from '../lib/lazily'
+import { painted } from '../lib/painted'
 import { SeedsButton } from '../workbench/SeedsButton'
 
-const ExperimentDetails = lazily(
-  async () => (await import('../components/ExperimentDetails')).ExperimentDetails,
-)
+const ExperimentDetails = lazily(async () => {
+  await painted()
+  return (await import('../components/ExperimentDetails')).ExperimentDetails
+})
 const DETAILS_HEIGHT = 1_400
 
 export function ExperimentPage() {

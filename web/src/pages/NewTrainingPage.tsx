@@ -384,7 +384,11 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
 
 /** A training whose name nobody has chosen is called by its settings, whatever they become. */
 function useSuggestedName({ values, set }: Form): void {
-  const suggested = suggestedName(valueAt(values, ['training']) ?? null)
+  const arena = (key: string) => valueAt(values, ['training', 'task', 'arena', key])
+  const imported = arena('name') === 'imported'
+  const { data: arenas } = $api.useQuery('get', '/api/arenas', undefined, { enabled: imported })
+  const place = imported ? arenas?.find(({ key }) => key === arena('sha256'))?.title : undefined
+  const suggested = suggestedName(valueAt(values, ['training']) ?? null, place)
   const name = valueAt(values, NAME)
   const [last, setLast] = useState(suggested)
   useEffect(() => {

@@ -8,7 +8,7 @@ import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import type { Checkpoint, CheckpointPage, RunDetail } from '../api/types'
 import { LinkedCharts } from '../charts/LinkedCharts'
-import { sharedX } from '../charts/view'
+import { sharedX, useKeptZoom } from '../charts/view'
 import { Below } from '../components/Below'
 import { CheckpointEpisodes } from '../components/CheckpointEpisodes'
 import { CheckpointTable } from '../components/CheckpointTable'
@@ -80,6 +80,7 @@ export function RunPage() {
 function LoadedRun({ run }: { run: RunDetail }) {
   const init = { params: { path: { run_id: run.id } } }
   const curves = useRunCurves(run)
+  const keptZoom = useKeptZoom(curves.view, curves.onView)
   const arena = useArenaTitle(run.training.task.arena)
   const [page, setPage] = useState(1)
   const checkpoints = $api.useQuery('get', '/api/runs/{run_id}/checkpoints', checkpointsOf(run.id, page), {
@@ -93,7 +94,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
   })
   const way = steps.data?.items ?? []
   // Of very many, the slider has some only; a row of the table may be any.
-  const shown = [...way, ...(checkpoints.data?.items ?? [])].find((each) => each.step === watched) ?? null
+  const shown = nearest([...way, ...(checkpoints.data?.items ?? [])], watched)
   const [episode] = useReplayInAddress()
   const episodes = useRef<HTMLDivElement>(null)
   const view = useRef<HTMLDivElement>(null)
@@ -122,7 +123,7 @@ function LoadedRun({ run }: { run: RunDetail }) {
       }
       actions={<RunActions run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />}
     >
-      <LinkedCharts of={sharedX(curves.view)}>
+      <LinkedCharts of={sharedX(curves.view)} kept={keptZoom}>
         <Stack gap="md">
           <Vitals run={run} best={checkpoints.data?.best ?? null} known={!checkpoints.isPending} />
           {run.error && (
@@ -203,6 +204,13 @@ function LoadedRun({ run }: { run: RunDetail }) {
       {lapse !== null && <LapseDialog runId={run.id} onClose={() => setLapse(null)} />}
     </Page>
   )
+}
+
+/** The checkpoint of a step, or the one that is nearest to it; null where none is asked for, or there is none. */
+function nearest<T extends { step: number }>(checkpoints: readonly T[], step: number | null): T | null {
+  if (step === null) return null
+  const away = (one: T) => Math.abs(one.step - step)
+  return checkpoints.reduce<T | null>((best, one) => (best && away(best) <= away(one) ? best : one), null)
 }
 
 /** Those of a page of the list, below the best of all. */

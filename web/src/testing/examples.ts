@@ -80,6 +80,7 @@ const noneFailed: NonNullable<Estimate['failed']> = {
   seeds: 2,
   at_most: 0.776,
   sentence: 'None of 2 seeds failed: up to 78 % may (one-sided 95 %).',
+  told: true,
 }
 
 const twoSeeds: Estimate = {
@@ -317,6 +318,7 @@ const family = (value: number, evaluation: string | null = null) => ({
   collision: 0.05,
   worst_tenth_spl: value > 0.9 ? 0.62 : 0,
   evaluation,
+  suite_hash: evaluation && 'abc',
 })
 
 export const field: FieldMatrix = {
