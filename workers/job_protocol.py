@@ -305,6 +305,7 @@ class JobClaim(Frozen):
         spec: what to do, imported arenas with their geometry.
         sha256: of the policy's archive; None where it has none.
         lease_seconds: a worker not heard of for this long loses the job.
+        ahead: nobody waits for it: it leaves the processors to what somebody waits for.
     """
 
     id: str
@@ -312,6 +313,7 @@ class JobClaim(Frozen):
     spec: JobSpec
     sha256: str | None
     lease_seconds: float
+    ahead: bool = False
 
 
 class JobReport(Frozen):

@@ -9,7 +9,7 @@ training does, whatever became of the checkpoint.
 
 import logging
 import time
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from sqlalchemy import Select, delete, select, update
@@ -19,6 +19,7 @@ from server.background import kept_up
 from server.checkpoints.hold import removing
 from server.database import tables
 from server.errors import DatabaseAwayError, DatabaseBusyError
+from server.jobs.names import recordings_prefix
 from server.services import Services
 
 logger = logging.getLogger(__name__)
@@ -90,6 +91,12 @@ def remove_archives(services: Services, archive_ids: Collection[str]) -> int:
     with services.database.write() as session:
         LooseArchives(session).forget(archive_ids)
     return len(archive_ids)
+
+
+def forget_recordings(services: Services, sha256s: Iterable[str]) -> None:
+    """Remove what is kept of their episodes, which nobody can ask for any more. Blocks."""
+    for sha256 in sha256s:
+        services.results.forget(recordings_prefix(sha256))
 
 
 def give_up_archives(services: Services, archive_ids: Collection[str]) -> None:

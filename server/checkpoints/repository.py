@@ -204,12 +204,10 @@ class CheckpointRepository:
         )
         return {row[0]: row[1] for row in self._session.execute(query)}
 
-    def ids(self, run_ids: Collection[str] | None = None) -> set[str]:
-        """The ids of the checkpoints of these runs, or of all."""
-        query = select(tables.Checkpoint.id)
-        if run_ids is not None:
-            query = query.where(tables.Checkpoint.run_id.in_(run_ids))
-        return set(self._session.scalars(query))
+    def archives(self, run_ids: Collection[str]) -> dict[str, str]:
+        """The SHA-256 of the archive of each checkpoint of these runs, by its id."""
+        query = select(tables.Checkpoint.id, tables.Checkpoint.sha256).where(tables.Checkpoint.run_id.in_(run_ids))
+        return {row[0]: row[1] for row in self._session.execute(query)}
 
 
 def _whole(run_id: str) -> Select[tables.Checkpoint]:

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.arenas.references import without_geometry
 from server.audit.repository import AuditRepository
-from server.checkpoints.archives import LooseArchives, remove_archives
+from server.checkpoints.archives import LooseArchives, forget_recordings, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.checkpoints.views import success_over_runs
 from server.database import tables
@@ -221,15 +221,16 @@ class ExperimentService:
             repository = ExperimentRepository(session)
             experiment = repository.get(experiment_id, deleted=True)
             run_ids = [run.id for run in experiment.runs]
-            checkpoint_ids = CheckpointRepository(session).ids(run_ids)
+            checkpoints = CheckpointRepository(session).archives(run_ids)
             _note(session, "experiment.removed", experiment)
             repository.delete(experiment)
             session.flush()
-            archive_ids = LooseArchives(session).let_go(checkpoint_ids)
+            archive_ids = LooseArchives(session).let_go(list(checkpoints))
         # Rows first: a row without its file would be a lie, a file without its row is only in the way.
         for run_id in run_ids:
             self._services.links.cut(run_id)
         remove_archives(self._services, archive_ids)
+        forget_recordings(self._services, checkpoints.values())
         self._publish(experiment, "deleted")
 
     def _throw_away(self, find: Callable[[ExperimentRepository], Sequence[tables.Experiment]]) -> None:

@@ -14,9 +14,11 @@ class Asked:
         key: what comes out of it; asked for twice, it is one job.
         title: for people.
         sha256: of the policy's archive, where there is one.
+        ahead: whether nobody waits for it yet: it goes behind everything else, and makes way for it.
     """
 
     spec: JobSpec
     key: str
     title: str
     sha256: str | None = None
+    ahead: bool = False

@@ -30,6 +30,7 @@ class Board:
         self._askers: Counter[str] = Counter()
         self._heard: dict[str, tuple[float, Mapping[str, str | None]]] = {}
         self._progress: dict[str, tuple[int, float]] = {}
+        self._ahead: set[str] = set()
         self._tasks: set[asyncio.Task[object]] = set()
         self.closed = False
 
@@ -80,9 +81,11 @@ class Board:
         """A job waits."""
         self._call(lambda: _set(self._bells))
 
-    def take(self, job_id: str, attempt: int) -> None:
-        """A worker has the job."""
+    def take(self, job_id: str, attempt: int, *, ahead: bool = False) -> None:
+        """A worker has the job; `ahead`: which nobody waits for."""
         self._progress[job_id] = attempt, 0.0
+        if ahead:
+            self._ahead.add(job_id)
 
     def report(self, job_id: str, attempt: int, progress: float) -> None:
         """Its worker says how far it is."""
@@ -92,6 +95,10 @@ class Board:
         """Whether this attempt is known to be under way; False where the database must be asked."""
         return self._progress.get(job_id, (0, 0.0))[0] == attempt
 
+    def is_ahead(self, job_id: str) -> bool:
+        """Whether a worker has the job although nobody waited for it."""
+        return job_id in self._ahead
+
     def progress(self, job_id: str) -> float:
         """Share of a job that is done, 0 to 1."""
         return self._progress.get(job_id, (0, 0.0))[1]
@@ -99,6 +106,7 @@ class Board:
     def leave(self, job_id: str) -> None:
         """No worker has the job any more."""
         self._progress.pop(job_id, None)
+        self._ahead.discard(job_id)
 
     # -- those who ask ----------------------------------------------------------------------------------------------------
 

@@ -16,7 +16,12 @@ OPEN: frozenset[tables.JobState] = frozenset({"queued", "running"})
 _EVALUATE: tuple[JobKind, ...] = ("evaluate",)
 
 LONG = len(KINDS)
-"""Priority of what goes on for minutes: behind everything else."""
+"""Priority of what goes on for minutes: behind everything that takes seconds."""
+
+AHEAD = LONG + 1
+"""Priority of what nobody waits for yet: behind everything else."""
+
+_WATCHED: tuple[JobKind, ...] = ("view", "play")
 
 
 class JobRepository:
@@ -81,6 +86,19 @@ class JobRepository:
     def count_queued(self) -> int:
         """How many wait."""
         return self._session.scalar(select(func.count()).where(tables.Job.state == "queued")) or 0
+
+    def count_ahead(self) -> int:
+        """How many of those that nobody waits for yet are to be done."""
+        query = select(func.count()).where(tables.Job.state == "queued", tables.Job.priority == AHEAD)
+        return self._session.scalar(query) or 0
+
+    def awaited(self, before: float) -> bool:
+        """Whether anything that somebody waits for is queued since before then; not views, which have their own places."""
+        row = tables.Job
+        query = select(row.id).where(
+            row.state == "queued", row.priority < AHEAD, row.kind.not_in(_WATCHED), row.created_at < before
+        )
+        return self._session.scalar(query.limit(1)) is not None
 
     def page(self, window: Window) -> tuple[Sequence[tables.Job], int]:
         """Some of the jobs, those under way first, then those that wait in the order of their turn, then what has ended."""

@@ -19,7 +19,7 @@ from server.ids import new_id
 from server.jobs.asked import Asked
 from server.jobs.names import result_name
 from server.jobs.needed import needed_by, needed_by_each
-from server.jobs.repository import LONG, OPEN, JobRepository
+from server.jobs.repository import AHEAD, LONG, OPEN, JobRepository
 from server.jobs.schemas import JobPage
 from server.jobs.turns import Turn, turns_of
 from server.jobs.views import job_view
@@ -57,6 +57,11 @@ MAX_QUEUED = 200
 """Jobs that may wait; whoever asks for one more is told to come again."""
 KEPT_SECONDS = 24 * 3_600.0
 """Of a job that has ended, for people to look at."""
+MAX_AHEAD = 32
+"""Jobs that nobody waits for yet; more are not put into the queue."""
+
+# What has come since may be taken up by a free place in this moment.
+_MAKE_WAY_SECONDS = 0.5
 
 _COME_AGAIN = 10.0
 
@@ -167,7 +172,7 @@ class JobService:
             self.board.end(job_id)
         if claim is not None:
             self._services.job_leases.renew(claim.id, claim.attempt)
-            self.board.take(claim.id, claim.attempt)
+            self.board.take(claim.id, claim.attempt, ahead=claim.ahead)
         return claim
 
     def _claim(self, session: Session, request: JobClaimRequest, ended: list[str]) -> JobClaim | None:
@@ -178,6 +183,8 @@ class JobService:
         others = [name for name in self.board.workers() if name != request.worker]
         there = {one.name: one.version for one in request.extensions}
         for waiting in repository.queued(request.kinds, MAX_QUEUED, long=request.long):
+            if waiting.priority == AHEAD and repository.awaited(time.time()):
+                return None
             if exhausted(waiting, request.worker) and hopeful(waiting, others):
                 continue
             if missing(needed_by(session, waiting.spec), there):
@@ -202,6 +209,7 @@ class JobService:
             spec=_with_geometry(JOB_SPEC.validate_python(job.spec), self._services.arenas),
             sha256=job.sha256,
             lease_seconds=self._services.settings.lease_seconds,
+            ahead=job.priority == AHEAD,
         )
 
     def report(self, job_id: str, attempt: int, progress: float) -> None:
@@ -212,8 +220,27 @@ class JobService:
         """
         if not self.board.is_current(job_id, attempt):
             self.current(job_id, attempt)
+        if progress < 1.0 and self.board.is_ahead(job_id):
+            self._make_way(job_id, attempt)
         self._services.job_leases.renew(job_id, attempt)
         self.board.report(job_id, attempt, progress)
+
+    def _make_way(self, job_id: str, attempt: int) -> None:
+        """Take back what nobody waits for where somebody waits for its place; or for it, which then goes on with all speed.
+
+        Raises:
+            FencedError: it was taken back.
+        """
+        before = time.time() - _MAKE_WAY_SECONDS
+        with self._services.database.read() as session:
+            job = _unfenced(session.get(tables.Job, job_id), job_id, attempt)
+            if job.priority == AHEAD and not JobRepository(session).awaited(before):
+                return
+        with self._services.database.write() as session:
+            job = _unfenced(session.get(tables.Job, job_id, with_for_update=True), job_id, attempt)
+            _requeue(job)
+        self._told(job)
+        raise FencedError(f"Job {job_id} makes way: somebody waits.")
 
     def archive(self, job_id: str, attempt: int) -> Iterator[bytes]:
         """The archive of the job's policy.
@@ -244,11 +271,14 @@ class JobService:
             FencedError: the attempt is over.
             NotFoundError: it is not kept any more, or the job needs none of that number.
         """
-        spec = JOB_SPEC.validate_python(self.current(job_id, attempt).spec)
+        job = self.current(job_id, attempt)
+        spec = JOB_SPEC.validate_python(job.spec)
         if not isinstance(spec, FilmJob) or not 0 <= number < len(spec.film.policies):
             raise NotFoundError(f"Job {job_id} needs no recording {number}.")
         policy = spec.film.policies[number]
-        path = self._services.results.find(result_name("replay", policy.recording))
+        results = self._services.results
+        look = results.peek if job.priority == AHEAD else results.find
+        path = look(result_name("replay", policy.recording))
         try:
             if path is not None:
                 return path.open("rb")
@@ -346,8 +376,14 @@ class JobService:
 def queue(session: Session, asked: Asked) -> str:
     """Put a job into the queue, in the caller's transaction; see `JobService.ask`."""
     repository = JobRepository(session)
+    priority = AHEAD if asked.ahead else LONG if is_long(asked.spec) else KINDS.index(asked.spec.kind)
     if (job := repository.open_of(asked.key)) is not None:
+        if priority < job.priority:
+            # It was to be made ahead, and is waited for now.
+            job.priority, job.title = priority, asked.title[:200]
         return job.id
+    if asked.ahead and repository.count_ahead() >= MAX_AHEAD:
+        raise BusyError(f"{MAX_AHEAD} jobs that nobody waits for are to be done already.", retry_after=_COME_AGAIN)
     if repository.count_queued() >= MAX_QUEUED:
         raise BusyError(f"{MAX_QUEUED} jobs wait for a worker already. Try again in a moment.", retry_after=_COME_AGAIN)
     job = tables.Job(
@@ -357,7 +393,7 @@ def queue(session: Session, asked: Asked) -> str:
         title=asked.title[:200],
         spec=asked.spec.model_dump(mode="json"),
         sha256=asked.sha256,
-        priority=LONG if is_long(asked.spec) else KINDS.index(asked.spec.kind),
+        priority=priority,
     )
     session.add(job)
     session.flush()

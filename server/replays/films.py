@@ -50,7 +50,7 @@ async def film_of(services: Services, film: EpisodeFilm | LapseFilm, subjects: S
         NoWorkerError: nobody is there to do it.
         BusyError: as much waits as may.
     """
-    asked = Asked(spec=FilmJob(film=film), key=film_key(film), title=_title(subjects))
+    asked = film_asked_for(film, subjects)
     if not await services.lanes.jobs.run(_can_be_made, services, asked.key, subjects):
         await recordings_of(services, subjects)
     try:
@@ -62,6 +62,12 @@ async def film_of(services: Services, film: EpisodeFilm | LapseFilm, subjects: S
         return await result_of(services, asked)
     except JobFailedError as error:
         raise ReplayFailedError(f"The film could not be made: {error.message}") from error
+
+
+def film_asked_for(film: EpisodeFilm | LapseFilm, subjects: Sequence[Subject], *, ahead: bool = False) -> Asked:
+    """The job that makes it; `ahead`: nobody waits for it yet."""
+    title = _title(subjects)
+    return Asked(FilmJob(film=film), film_key(film), f"{title}, made ahead" if ahead else title, ahead=ahead)
 
 
 async def film_progress(services: Services, film: EpisodeFilm) -> FilmProgress:

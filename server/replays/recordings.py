@@ -6,7 +6,7 @@ from pathlib import Path
 
 from server.errors import JobFailedError, ReplayFailedError
 from server.jobs.asked import Asked
-from server.jobs.names import result_name
+from server.jobs.names import recordings_prefix, result_name
 from server.jobs.repository import JobRepository
 from server.jobs.waiting import result_of
 from server.replays.schemas import ReplayProgress
@@ -26,12 +26,7 @@ async def recording_of(services: Services, subject: Subject) -> Recording:
         NoWorkerError: nobody is there to do it.
         BusyError: as much waits as may.
     """
-    asked = Asked(
-        spec=ReplayJob(policy=subject.policy, suite=subject.suite),
-        key=recording_key(subject),
-        title=subject.title,
-        sha256=subject.sha256,
-    )
+    asked = asked_for(subject)
     lane = services.lanes.replays
     try:
         recording = await lane.run(_load, await result_of(services, asked))
@@ -47,6 +42,17 @@ async def recording_of(services: Services, subject: Subject) -> Recording:
             f"The suite {subject.recorded.suite} has changed since this evaluation: its episodes can't be driven again."
         )
     return recording
+
+
+def asked_for(subject: Subject, *, ahead: bool = False) -> Asked:
+    """The job that drives its episodes again; `ahead`: nobody waits for it yet."""
+    return Asked(
+        spec=ReplayJob(policy=subject.policy, suite=subject.suite),
+        key=recording_key(subject),
+        title=f"{subject.title}, made ahead" if ahead else subject.title,
+        sha256=subject.sha256,
+        ahead=ahead,
+    )
 
 
 async def recordings_of(services: Services, subjects: Sequence[Subject]) -> list[Recording]:
@@ -66,7 +72,7 @@ async def recordings_of(services: Services, subjects: Sequence[Subject]) -> list
 
 def recording_key(subject: Subject) -> str:
     """Says what decides how the episodes go: policy, suite, and what drives."""
-    return f"{subject.identity[:32]}-{subject.recorded.suite_hash[:16]}-{simulator()}"
+    return f"{recordings_prefix(subject.identity)}{subject.recorded.suite_hash[:16]}-{simulator()}"
 
 
 async def progress_of(services: Services, subjects: Sequence[Subject]) -> ReplayProgress:

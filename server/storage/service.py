@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from server.audit.repository import AuditRepository
-from server.checkpoints.archives import LooseArchives, remove_archives
+from server.checkpoints.archives import LooseArchives, forget_recordings, remove_archives
 from server.checkpoints.repository import CheckpointRepository
 from server.curve_thinning.repository import rule_of
 from server.database import tables
@@ -189,6 +189,7 @@ class StorageService:
                     details=f"{len(gone)} checkpoints, {size} bytes",
                 )
         remove_archives(self._services, archive_ids)
+        forget_recordings(self._services, [row.sha256 for row in gone])
         self._publish(experiment_id)
         return len(gone)
 

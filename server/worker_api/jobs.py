@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, BinaryIO
 
@@ -16,12 +17,13 @@ from pydantic import ValidationError
 
 from server.errors import CorruptUploadError, NotFoundError, TooLargeError
 from server.jobs.names import result_name
+from server.jobs.repository import AHEAD
 from server.jobs.service import JobService
-from server.replays.ahead import key_of_evaluation
+from server.replays.ahead import draw_ahead, key_of_evaluation
 from server.security.permissions import WORK
 from server.services import Services, ServicesDep
 from server.worker_api.errors import MalformedUploadError
-from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport, Measurement
+from workers.job_protocol import JobClaim, JobClaimRequest, JobEnd, JobOrders, JobReport, Measurement, ReplayJob
 from workers.play_protocol import PlaySeen
 from workers.protocol import MAX_INTEGER
 
@@ -179,8 +181,11 @@ async def put_result(
         if job.kind == "evaluate":
             await lane.run(_keep_evaluation, services, job_id, attempt, torn.read_bytes())
         else:
-            await lane.run(service.current, job_id, attempt)
-            await lane.run(services.results.keep, torn, result_name(job.kind, job.key))
+            job = await lane.run(service.current, job_id, attempt)
+            keep = partial(services.results.keep, torn, result_name(job.kind, job.key), ahead=job.priority == AHEAD)
+            await lane.run(keep)
+            if job.kind == "replay" and job.priority == AHEAD:
+                await lane.run(draw_ahead, services, ReplayJob.model_validate(job.spec))
 
 
 @router.put("/{job_id}/recording", status_code=204, max_body_size=sys.maxsize, dependencies=[WORK])

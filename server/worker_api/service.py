@@ -17,6 +17,7 @@ from server.events.changes import Change, ChangeKind
 from server.experiments.stored import StoredTraining, read_training, training_of
 from server.files import StoredFile
 from server.lineage.starts import start_archive
+from server.replays.ahead import make_ahead
 from server.runs import states
 from server.runs.repository import RunRepository
 from server.runs.service import RunService, takers
@@ -205,6 +206,8 @@ class WorkerService:
             level = logging.INFO if final.outcome in _AS_IT_SHOULD else logging.WARNING
             _say(run.id, level, f"attempt {attempt} ended at step {run.step:,}: {final.outcome}{reason}")
             self._announce(run)
+            if final.outcome == "completed":
+                make_ahead(self._services, run.id)
         return outcomes
 
     def damaged(self, run_id: str) -> str | None:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -140,6 +141,76 @@ def test_what_takes_minutes_leaves_a_place_to_what_takes_seconds(jobs: JobServic
     assert waits.starts_in is not None
     another = jobs.ask(replay("another", EvaluateJob(policy=BaselineName(name="random"))))
     assert place(0, long=False) == another
+
+
+def test_what_nobody_waits_for_goes_last_and_leaves_a_place_to_what_takes_seconds(jobs: JobService) -> None:
+    ahead = jobs.ask(replace(replay(), ahead=True))
+    short = JobClaimRequest(worker="w@host/jobs0", claim_id="1" * 32, kinds=ALL, long=False)
+    assert jobs.claim(short) is None
+    evaluation = jobs.ask(replay("evaluation", EvaluateJob(policy=BaselineName(name="random"))))
+    first, second = claimed(jobs), claimed(jobs, claim_id="2" * 32)
+    assert (first.id, first.ahead) == (evaluation, False)
+    assert (second.id, second.ahead) == (ahead, True)
+
+
+def test_what_nobody_waits_for_makes_way_for_what_somebody_does(
+    jobs: JobService, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs_service, "_MAKE_WAY_SECONDS", 0.0)
+    ahead = jobs.ask(replace(replay(), ahead=True))
+    first = claimed(jobs)
+    # Views have places of their own.
+    jobs.ask(replay("view", ViewJob(policy=ShippedPolicyName(name="simple"))))
+    jobs.report(ahead, first.attempt, 0.4)
+    wanted = jobs.ask(replay("wanted"))
+    # What is done already is brought all the same.
+    jobs.report(ahead, first.attempt, 1.0)
+    with pytest.raises(FencedError, match="somebody waits"):
+        jobs.report(ahead, first.attempt, 0.5)
+    with pytest.raises(FencedError):
+        jobs.end(ahead, first.attempt, JobEnd(outcome="done"))
+    # A place that can't take what is waited for does not begin it again and again.
+    with services.database.write() as session:
+        session.get_one(tables.Job, wanted).lost_by = {"a@host": 3}
+    jobs.board.heard("b@host/0")
+    jobs.cancel(claimed(jobs, claim_id="5" * 32).id)
+    assert claim(jobs, claim_id="6" * 32) is None
+    assert claimed(jobs, "b@host/0", "7" * 32).id == wanted
+    assert claimed(jobs, claim_id="8" * 32) == JobClaim(
+        id=ahead, attempt=2, spec=replay().spec, sha256="0" * 64, lease_seconds=LEASE, ahead=True
+    )
+
+
+def test_what_was_to_be_made_ahead_hurries_once_somebody_asks_for_it(
+    jobs: JobService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs_service, "_MAKE_WAY_SECONDS", 0.0)
+    ahead = jobs.ask(replace(replay(), ahead=True))
+    assert jobs.ask(replay()) == ahead
+    first = claimed(jobs)
+    assert not first.ahead
+    jobs.report(ahead, first.attempt, 0.5)
+    jobs.end(ahead, first.attempt, JobEnd(outcome="done"))
+    # Also where it is under way, at a pace that leaves the processors to others: then it begins anew.
+    again = jobs.ask(replace(replay(), ahead=True))
+    slow = claimed(jobs, claim_id="1" * 32)
+    assert slow.ahead
+    assert jobs.ask(replay()) == again
+    # Asked for ahead once more it is no less urgent.
+    jobs.ask(replace(replay(), ahead=True))
+    with pytest.raises(FencedError):
+        jobs.report(again, slow.attempt, 0.5)
+    quick = claimed(jobs, claim_id="2" * 32)
+    assert (quick.id, quick.attempt, quick.ahead) == (again, 2, False)
+    jobs.report(again, quick.attempt, 0.5)
+
+
+def test_only_so_much_waits_that_nobody_waits_for(jobs: JobService) -> None:
+    for number in range(jobs_service.MAX_AHEAD):
+        jobs.ask(replace(replay(str(number)), ahead=True))
+    with pytest.raises(BusyError, match="nobody waits for"):
+        jobs.ask(replace(replay("more"), ahead=True))
+    jobs.ask(replay("more"))
 
 
 def test_one_place_alone_takes_everything_and_of_two_one_stays_for_what_is_short() -> None:

@@ -22,14 +22,20 @@ from mcap_ros2.decoder import DecoderFactory
 
 from server.app import create_app
 from server.checkpoints.repository import CheckpointRepository
+from server.database import tables
+from server.experiments.service import ExperimentService
 from server.jobs.results import ResultStore
 from server.policies.service import shipped_hash
+from server.replays.ahead import make_ahead
 from server.replays.simulator import simulator
 from server.services import Services
 from server.settings import Settings
+from server.worker_api.ingest import Report
+from server.worker_api.service import WorkerService
 from sim.scan import scan
 from sim.suites import load_suite
 from tests.server.harness import BASE_URL, TOKEN
+from workers.protocol import Batch, Final, Orders
 from workers.reporting import EpisodeResult, EvaluationResult
 from workers.shipped.library import shipped_policy
 
@@ -333,6 +339,107 @@ def test_recordings_that_nobody_looked_at_go_first(
     # The bound is a byte: only the newest stays, whatever its size.
     assert not (kept / "old.npz").exists()
     assert len(list(kept.iterdir())) == 1
+
+
+def test_what_was_made_ahead_goes_before_what_somebody_looked_at(tmp_path: Path) -> None:
+    store = ResultStore(tmp_path / "kept", max_bytes=1_000)
+
+    def keep(name: str, size: int, *, ahead: bool = False) -> None:
+        torn = store.begin()
+        torn.write_bytes(b"x" * size)
+        store.keep(torn, name, ahead=ahead)
+
+    def kept() -> set[str]:
+        return {path.name for path in (tmp_path / "kept").iterdir()}
+
+    keep("seen", 600)
+    keep("a-ahead", 100, ahead=True)
+    os.utime(tmp_path / "kept" / "a-ahead", (1.0, 1.0))
+    keep("b-ahead", 200, ahead=True)
+    # A quarter of the bound is for what nobody has looked at: the oldest of it went.
+    assert kept() == {"seen", "b-ahead"}
+    keep("more", 350)
+    assert kept() == {"seen", "more"}
+    # It pushes nothing out that somebody has looked at.
+    keep("c-ahead", 60, ahead=True)
+    assert kept() == {"seen", "more"}
+    keep("d-ahead", 50, ahead=True)
+    assert store.find("d-ahead") is not None
+    os.utime(tmp_path / "kept" / "seen", (time.time() - 60.0,) * 2)
+    # Looked at, it is like all others.
+    keep("new", 100)
+    assert kept() == {"more", "d-ahead", "new"}
+    store.forget("d-")
+    assert kept() == {"more", "new"}
+
+
+def run_of(services: Services, checkpoint_id: str) -> str:
+    with services.database.read() as session:
+        return CheckpointRepository(session).get(checkpoint_id).run_id
+
+
+def complete(services: Services, run_id: str) -> None:
+    """A worker says that the run is complete."""
+    with services.database.write() as session:
+        run = session.get_one(tables.Run, run_id)
+        run.state, run.attempt = "running", 1
+    (outcome,) = WorkerService(services).receive([Report(run_id, 1, Batch(final=Final(outcome="completed")))])
+    assert isinstance(outcome, Orders), outcome
+
+
+def test_the_episodes_of_a_run_that_is_complete_are_there_before_anybody_looks(
+    client: TestClient, services: Services, checkpoint: str, tmp_path: Path
+) -> None:
+    services.results = ResultStore(tmp_path / "ahead", max_bytes=2**30)
+    run_id = run_of(services, checkpoint)
+    complete(services, run_id)
+    worst, best = (
+        rank(enumerate(RECORDED.episodes), key=lambda each: (each[1].outcome == "arrival", each[1].min_clearance))[0]
+        for rank in (min, max)
+    )
+    assert worst != best
+    deadline = time.monotonic() + 100.0
+    # The recording, and two episodes in two themes.
+    while len(made := [path for path in (tmp_path / "ahead").glob("*") if path.suffix != ".part"]) < 5:
+        assert time.monotonic() < deadline, made
+        time.sleep(0.1)
+    # Nobody has looked at any of it, so that it goes before all that somebody has.
+    assert max(path.stat().st_mtime for path in made) < time.time() - 1e8
+    while any(job["state"] != "done" for job in client.get("/api/jobs").json()["items"]):
+        time.sleep(0.05)
+    # The first look asks nobody for anything.
+    assert client.get(f"/api/checkpoints/{checkpoint}/replays/{worst}").json()["faithful"]
+    for episode in (worst, best):
+        for theme in ("light", "dark"):
+            assert client.get(f"/replays/checkpoint:{checkpoint}/{episode}/{theme}/").status_code == 200
+    assert client.get("/api/jobs").json()["total"] == 5
+    # Nor is it made twice.
+    make_ahead(services, run_id)
+    assert client.get("/api/jobs").json()["total"] == 5
+    # The recording goes with its run.
+    (recording,) = (tmp_path / "ahead").glob("*.npz")
+    experiment_id = client.get(f"/api/runs/{run_id}").json()["experiment_id"]
+    assert client.delete(f"/api/experiments/{experiment_id}").status_code == 204
+    assert recording.exists()
+    ExperimentService(services).remove(experiment_id)
+    assert not recording.exists()
+
+
+def test_nothing_is_made_ahead_of_a_trial_or_of_what_was_not_measured(
+    client: TestClient, services: Services, checkpoint: str
+) -> None:
+    bare = store_checkpoint(client, services, POLICY.archive.read_bytes(), None)
+    make_ahead(services, run_of(services, bare))
+    run_id = run_of(services, checkpoint)
+    services.results = ResultStore(services.settings.replays_dir / "empty", max_bytes=2**30)
+    with services.database.write() as session:
+        experiment = session.get_one(tables.Run, run_id).experiment
+        session.add(tables.Study(id="study", project_id=experiment.project_id, name="A study", spec={}, budget=1))
+        session.flush()
+        experiment.study_id = "study"
+    make_ahead(services, run_id)
+    make_ahead(services, "gone")
+    assert client.get("/api/jobs").json()["total"] == 0
 
 
 def test_a_time_lapse_shows_the_same_scenarios_at_every_checkpoint(

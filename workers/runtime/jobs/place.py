@@ -153,7 +153,10 @@ class Place:
             return JobEnd(outcome="failed", error=str(error))
         ours, theirs = self._context.Pipe()
         process = self._context.Process(
-            target=main, args=(claim.spec.model_dump_json(), str(directory), theirs), daemon=True
+            target=main,
+            args=(claim.spec.model_dump_json(), str(directory), theirs),
+            kwargs={"ahead": claim.ahead},
+            daemon=True,
         )
         try:
             # Under load what it is forked from may still be at its imports.
