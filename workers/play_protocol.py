@@ -15,6 +15,8 @@ from workers.reporting import Figure, Outcome
 
 MAX_OBSTACLES = 300
 """Circles and boxes of a playground's arena together: each is a thing of its own in the picture."""
+MAX_VALUES = 256
+"""That are told ahead: of more steps than are driven between two looks, however fast time goes."""
 MAX_WAY_POINTS = 64
 """Of the way that the robot is about to take."""
 MAX_ARROWS = 400
@@ -126,7 +128,9 @@ class PlaySeen(Frozen):
 
     Attributes:
         revision: of the orders that it knew.
+        sim_time: of the moment that it is of, as in the frames: simulated seconds since the view started.
         value: discounted sum of the rewards that it is about to collect, until its attempt ends or the time looked ahead.
+        values: the same at that moment and after each of the control steps that follow, as far as they are told.
         outcome: how that attempt ends; None where it goes on for longer.
         seconds: until then, simulated.
         way: where it goes meanwhile.
@@ -135,7 +139,9 @@ class PlaySeen(Frozen):
     """
 
     revision: int = Field(0, ge=0)
+    sim_time: Figure = 0.0
     value: Figure
+    values: tuple[Figure, ...] = Field((), max_length=MAX_VALUES)
     outcome: Outcome | None
     seconds: Figure
     way: tuple[Place, ...] = Field((), max_length=MAX_WAY_POINTS)

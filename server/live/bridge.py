@@ -80,11 +80,26 @@ class _DragEnd(msgspec.Struct, tag="TransformControlsDragEndMessage", forbid_unk
     owner: Literal[""] = ""
 
 
+class _Grab(msgspec.Struct, tag="SceneNodeDragMessage", forbid_unknown_fields=True):
+    """Somebody drags the thing itself, or the disc below it."""
+
+    name: Literal["/world/grab", "/world/hold"]
+    phase: Literal["start", "update", "end"]
+    start_position: _Point
+    end_position: _Point
+    start_screen_pos: tuple[_Number, _Number]
+    end_screen_pos: tuple[_Number, _Number]
+    button: Literal["left"]
+    instance_index: None = None
+    modifier: None = None
+    owner: Literal[""] = ""
+
+
 Allowed: TypeAlias = "msgspec.msgpack.Decoder[Any]"
 """What a browser may send."""
 
 WATCH: Allowed = msgspec.msgpack.Decoder(_Watched)
-PLAY: Allowed = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _DragStart | _DragEnd)
+PLAY: Allowed = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _DragStart | _DragEnd | _Grab)
 
 
 async def bridge(browser: WebSocket, view: "View", allowed: Allowed = WATCH) -> None:

@@ -29,6 +29,8 @@ router = APIRouter(tags=["live"])
 _POLICY_VIOLATION = 1008
 
 _DISPLAY_SECONDS = 0.25
+# What a playground's page says beside the picture must not be seen to be behind it.
+_MOMENT_SECONDS = 0.1
 
 
 async def _watched(run_id: str, services: ServicesDep) -> Watched:
@@ -157,17 +159,20 @@ async def stream_display(websocket: WebSocket, run_id: str, theme: Theme, servic
 
 async def _send_scores(websocket: WebSocket, subject: Watched, theme: Theme, services: Services) -> None:
     told = ""
+    pause = _DISPLAY_SECONDS if subject.moment is None else _MOMENT_SECONDS
     while True:
         score = services.live.score(subject.id, theme, _person(subject, websocket))
         if subject.driven is not None and (refusal := services.drivers.refusal(subject.id)) is not None:
             score = score.model_copy(update={"refusal": refusal})
         if subject.id.startswith(CHECKPOINT_PREFIX):
             score = score.model_copy(update={"checkpoint": True})
+        if subject.moment is not None:
+            score = score.model_copy(update={"moment": subject.moment().model_dump(mode="json")})
         text = score.model_dump_json()
         if text != told:
             await websocket.send_text(text)
             told = text
-        await asyncio.sleep(_DISPLAY_SECONDS)
+        await asyncio.sleep(pause)
 
 
 async def _wait_for_the_end(websocket: WebSocket) -> None:

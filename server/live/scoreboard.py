@@ -1,6 +1,6 @@
 """What the live view says in words: how the robots on screen have fared since somebody started to look."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel
@@ -36,6 +36,7 @@ class Score(BaseModel):
         arrivals, collisions, timeouts: attempts of the robots on screen that ended since the view began.
         robots: the first few, or the one that is followed.
         refusal: why nothing can be shown for now, and what to do about it.
+        moment: of a playground, what its page says of the moment that is shown (`server.playground.schemas.Moment`).
     """
 
     state: ViewState = "waiting"
@@ -50,6 +51,7 @@ class Score(BaseModel):
     timeouts: int = 0
     robots: list[RobotLine] = []
     refusal: str | None = None
+    moment: dict[str, Any] | None = None
 
 
 class Scoreboard:

@@ -1,7 +1,9 @@
 """What a live view may be of: a run, a policy under 'policy-NAME' or 'checkpoint-ID', or a playground under 'play-ID'."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from server.arenas.references import with_geometry
@@ -46,12 +48,14 @@ class Watched:
         task: the place, and the geometry of robot and LiDAR.
         driven: the policy that drives after the training; None while its worker sends the frames.
         stage: what a playground draws; None of everything else.
+        moment: what there is to say of what a playground's picture shows; None likewise.
     """
 
     id: str
     task: TaskConfig
     driven: Driven | None
     stage: Stage | None = None
+    moment: Callable[[], BaseModel] | None = None
 
 
 def watched(services: Services, identifier: str) -> Watched:
@@ -62,7 +66,7 @@ def watched(services: Services, identifier: str) -> Watched:
     """
     if identifier.startswith(PLAY_PREFIX):
         ground = services.playgrounds.get(identifier)
-        return Watched(identifier, ground.empty_task, ground.driven, ground)
+        return Watched(identifier, ground.empty_task, ground.driven, ground, ground.shown_moment)
     if identifier.startswith(POLICY_PREFIX):
         policy = find(identifier.removeprefix(POLICY_PREFIX))
         task = with_maps_of(policy.card.training.task, policy.card.seed)

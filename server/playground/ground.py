@@ -6,6 +6,7 @@ Called from the event loop and from the threads of 3D scenes: a lock is held for
 import math
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -13,11 +14,12 @@ import numpy as np
 
 from server.errors import MisplacedError
 from server.live.drivers import Driven
-from server.live.scoreboard import Scoreboard
+from server.live.scoreboard import Score, Scoreboard
 from server.live.settings import RECEIVING_SECONDS
 from server.playground.schemas import (
     AnyChange,
     Choose,
+    Moment,
     Playground,
     PlaygroundSettings,
     PutBox,
@@ -48,6 +50,12 @@ from workers.scene.stage import StagePicture
 
 _T = TypeVar("_T")
 _DECIMALS = 3
+# Of seconds: what a sum of steps may be off by.
+_ROUNDING = 1e-6
+# Frames that are remembered: what the picture may be behind, and twice as much.
+_MOMENTS = 30
+# What was seen coming lately: the picture may be of before the last time.
+_SIGHTS = 4
 
 
 @dataclass
@@ -79,10 +87,13 @@ class Ground:
         self._revision, self._acts, self._settings = 1, tuple[NumberedAct, ...](), PlaygroundSettings()
         self._chosen = Choose()
         self._first = self.arena
-        self._seen: PlaySeen | None = None
         self._frame: Frame | None = None
         self._frame_at = float("-inf")
         self._scores = Scoreboard()
+        # The newest last; the picture shows one of them.
+        self._moments: deque[tuple[Frame, Score]] = deque(maxlen=_MOMENTS)
+        self._sights: deque[PlaySeen] = deque(maxlen=_SIGHTS)
+        self._shown: float | None = None
 
     # -- who watches ------------------------------------------------------------------------------------------------------
 
@@ -110,14 +121,20 @@ class Ground:
     def take_frame(self, frame: Frame) -> None:
         """A moment has arrived."""
         with self._lock:
+            if self._frame is not None and frame.sim_time < self._frame.sim_time:
+                # Another worker has begun anew.
+                self._moments.clear()
+                self._sights.clear()
+                self._shown = None
             self._frame, self._frame_at = frame, time.monotonic()
             self.used_at = self._frame_at
             self._scores.update(frame)
+            self._moments.append((frame, self._scores.score("live", None)))
 
     def take_seen(self, seen: PlaySeen) -> None:
         """What is about to happen has arrived."""
         with self._lock:
-            self._seen = seen
+            self._sights.append(seen)
 
     # -- its owner --------------------------------------------------------------------------------------------------------
 
@@ -154,27 +171,15 @@ class Ground:
         """Everything for the page."""
         with self._lock:
             self.used_at = time.monotonic()
-            frame, seen = self._frame, self._seen
-            score = self._scores.score("live", None)
+            seen = self._sights[-1] if self._sights else None
             return Playground(
+                **self._moment().model_dump(),
                 id=self.id,
                 policy=self.title,
                 geometry=self.arena,
                 settings=self._settings,
                 chosen=self._chosen,
                 driving=time.monotonic() - self._frame_at < RECEIVING_SECONDS,
-                sim_time=round(frame.sim_time, _DECIMALS) if frame else 0.0,
-                robot=self._standing("robot"),
-                target=self._standing("target"),
-                movers=[_mover(row) for row in frame.movers] if frame else [],
-                reward=round(float(frame.rewards[0]), _DECIMALS) if frame else 0.0,
-                arrivals=score.arrivals,
-                collisions=score.collisions,
-                timeouts=score.timeouts,
-                value=round(seen.value, _DECIMALS) if seen else None,
-                outcome=seen.outcome if seen else None,
-                seconds=seen.seconds if seen else None,
-                outdated=seen is None or seen.revision < self._revision,
                 problem=seen.problem if seen else None,
             )
 
@@ -185,18 +190,67 @@ class Ground:
             MisplacedError: nothing has driven yet.
         """
         with self._lock:
-            robot, target = self._standing("robot"), self._standing("target")
-            if robot is None or target is None:
+            if self._frame is None:
                 raise MisplacedError("The robot has not driven yet: wait until it does.")
+            robot, target = _robot(self._frame), _target(self._frame)
             start = Start(x=robot.x, y=robot.y, heading=robot.heading)
             return self.arena.model_copy(update={"start": start, "target": Target(x=target.x, y=target.y)})
 
+    def shown_moment(self) -> Moment:
+        """What there is to say of the moment that the picture shows."""
+        with self._lock:
+            return self._moment()
+
+    def _moment(self) -> Moment:
+        """Of what is shown; of the newest where nothing is."""
+        frame, score = self._shown_frame()
+        seen = self._seen_by(frame)
+        driven = frame.sim_time - seen.sim_time if frame is not None and seen is not None else 0.0
+        step = max(0, int(driven / self.task.control_period + _ROUNDING))
+        values = (seen.values or (seen.value,)) if seen is not None else ()
+        over = seen is not None and seen.outcome is not None and driven > seen.seconds + self.task.control_period
+        return Moment(
+            sim_time=round(frame.sim_time, _DECIMALS) if frame else 0.0,
+            robot=_robot(frame) if frame else None,
+            target=_target(frame) if frame else None,
+            movers=[_mover(row) for row in frame.movers] if frame else [],
+            reward=round(float(frame.rewards[0]), _DECIMALS) if frame else 0.0,
+            arrivals=score.arrivals,
+            collisions=score.collisions,
+            timeouts=score.timeouts,
+            value=round(values[min(step, len(values) - 1)], _DECIMALS) if values else None,
+            outcome=seen.outcome if seen else None,
+            seconds=None
+            if seen is None
+            else seen.seconds
+            if seen.outcome is None
+            else round(max(0.0, seen.seconds - max(0.0, driven)), _DECIMALS),
+            outdated=seen is None or seen.revision < self._revision or over,
+        )
+
+    def _shown_frame(self) -> tuple[Frame | None, Score]:
+        """The newest of the moment that is shown, with how attempts had ended by then."""
+        for frame, score in reversed(self._moments):
+            if self._shown is None or frame.sim_time <= self._shown:
+                return frame, score
+        return self._frame, self._scores.score("live", None)
+
+    def _seen_by(self, frame: Frame | None) -> PlaySeen | None:
+        """What it saw coming then, or last before."""
+        known = [seen for seen in self._sights if frame is None or seen.sim_time <= frame.sim_time + _ROUNDING]
+        return known[-1] if known else self._sights[-1] if self._sights else None
+
     # -- the 3D view ------------------------------------------------------------------------------------------------------
+
+    def shown(self, sim_time: float) -> None:
+        """The picture is of that moment now."""
+        with self._lock:
+            self._shown = sim_time
 
     def picture(self) -> StagePicture:
         """What its stage draws."""
         with self._lock:
-            seen = self._seen
+            seen = self._seen_by(self._shown_frame()[0])
             return StagePicture(
                 circles=np.array([(c.x, c.y, c.radius) for c in self.arena.circles]).reshape(-1, 3),
                 boxes=to_arena(self.arena).boxes,
@@ -308,15 +362,15 @@ class Ground:
             raise MisplacedError(f"There is no {choice.thing} number {choice.index + 1}.")
         return choice
 
-    def _standing(self, thing: Thing) -> Standing | None:
-        frame = self._frame
-        if frame is None:
-            return None
-        if thing == "target":
-            x, y = frame.targets[0].tolist()
-            return Standing(x=round(x, _DECIMALS), y=round(y, _DECIMALS))
-        x, y, heading = frame.poses[0].tolist()
-        return Standing(x=round(x, _DECIMALS), y=round(y, _DECIMALS), heading=round(math.degrees(heading), 1))
+
+def _robot(frame: Frame) -> Standing:
+    x, y, heading = frame.poses[0].tolist()
+    return Standing(x=round(x, _DECIMALS), y=round(y, _DECIMALS), heading=round(math.degrees(heading), 1))
+
+
+def _target(frame: Frame) -> Standing:
+    x, y = frame.targets[0].tolist()
+    return Standing(x=round(x, _DECIMALS), y=round(y, _DECIMALS))
 
 
 def _mover(row: "np.ndarray[tuple[int], np.dtype[np.float32]]") -> Standing:

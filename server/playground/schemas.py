@@ -89,15 +89,9 @@ class Standing(Schema):
     radius: float = 0.0
 
 
-class Playground(Schema):
-    """One of a person's playgrounds, as it is at the moment."""
+class Moment(Schema):
+    """What there is to say of a moment of a playground: of the one that the picture shows, while there is a picture."""
 
-    id: str
-    policy: str = Field(description="For people.")
-    geometry: ArenaFile = Field(description="What stands in it now, and what moves.")
-    settings: PlaygroundSettings
-    chosen: Choose
-    driving: bool = Field(description="Whether a worker drives; it does while somebody watches.")
     sim_time: float = Field(description="Simulated seconds since it began.")
     robot: Standing | None = Field(description="Null until it drives.")
     target: Standing | None
@@ -110,8 +104,20 @@ class Playground(Schema):
     outcome: Outcome | None = Field(description="How its attempt is about to end; null where that takes longer.")
     seconds: float | None = Field(description="Until then, simulated.")
     outdated: bool = Field(
-        description="Whether value, outcome and seconds are of before the last change; new ones follow within a second."
+        description="Whether value, outcome and seconds are of before the last change, or of an attempt that has ended; new "
+        "ones follow within a second."
     )
+
+
+class Playground(Moment):
+    """One of a person's playgrounds, as it is at the moment."""
+
+    id: str
+    policy: str = Field(description="For people.")
+    geometry: ArenaFile = Field(description="What stands in it now, and what moves.")
+    settings: PlaygroundSettings
+    chosen: Choose
+    driving: bool = Field(description="Whether a worker drives; it does while somebody watches.")
     problem: str | None = Field(description="What could not be done.")
 
 

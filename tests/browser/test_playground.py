@@ -54,7 +54,7 @@ def test_the_robot_goes_round_what_is_put_in_its_way(context: BrowserContext) ->
     page.get_by_role("button", name="Add a disc").press("Enter")
     expect(page.get_by_role("combobox", name="Handles on")).to_have_value("Disc 1")
     type_places(page, x=-0.3, y=0.05, Radius=0.4)
-    expect(page.get_by_test_id("outcome")).not_to_contain_text(f"{straight:g} s", timeout=SOON)
+    expect(page.get_by_test_id("outcome")).not_to_contain_text(f" {straight:.1f} s", timeout=SOON)
 
     # It may have arrived before it was paused. The service is asked, not the page: where that draws slowly, too little would
     # be seen of the way.

@@ -7,19 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from server.live.bridge import PLAY, WATCH, may_pass
 from server.live.drivers import PolicyDrivers
 from server.playground.registry import MAX_EACH
-from server.playground.schemas import PutCircle
+from server.playground.schemas import Moment, PutCircle
 from server.services import Services
 from tests.server.harness import BASE_URL
 from tests.server.job_worker import working
 from tests.server.people import Lab
 from tests.server.test_live import CAMERA, connect, receive_until
-from workers.play_protocol import MAX_OBSTACLES
+from workers.frames import Frame
+from workers.play_protocol import MAX_OBSTACLES, PlaySeen
 
 ROOM = {"name": "simple"}
 CLICK: dict[str, Any] = {
@@ -35,6 +37,20 @@ DRAG: dict[str, Any] = {
     "name": "/world/handle",
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (1.0, 2.0, 0.05),
+    "owner": "",
+}
+
+GRAB: dict[str, Any] = {
+    "type": "SceneNodeDragMessage",
+    "phase": "start",
+    "name": "/world/hold",
+    "instance_index": None,
+    "start_position": (0.0, 0.0, 0.0),
+    "start_screen_pos": (0.5, 0.5),
+    "end_position": (0.0, 0.0, 0.0),
+    "end_screen_pos": (0.5, 0.5),
+    "button": "left",
+    "modifier": None,
     "owner": "",
 }
 
@@ -256,6 +272,114 @@ def test_the_bridge_lets_clicks_and_drags_through_to_playgrounds_alone() -> None
     assert passes(DRAG, position=(0.0, 0.0)) == (False, False)
     assert passes({"type": "GuiUpdateMessage", "uuid": "x", "updates": {}}) == (False, False)
     assert passes({"type": "ShareUrlRequest"}) == (False, False)
+
+
+def test_the_bridge_lets_nothing_but_the_things_themselves_be_taken_hold_of() -> None:
+    def passes(**other: Any) -> tuple[bool, bool]:
+        data = msgspec.msgpack.encode({**GRAB, **other})
+        return may_pass(data, WATCH), may_pass(data, PLAY)
+
+    assert passes() == passes(name="/world/grab", phase="end") == (False, True)
+    for wrong in (
+        {"name": "/world/robots"},
+        {"phase": "begin"},
+        {"button": "right"},
+        {"modifier": "shift"},
+        {"instance_index": 3},
+        {"end_position": (0.0, math.nan, 0.0)},
+        {"more": 1},
+    ):
+        assert passes(**wrong) == (False, False), wrong
+
+
+def test_a_thing_is_taken_hold_of_wherever_a_finger_meets_it(client: TestClient, play_worker: None) -> None:
+    ground = opened(client)
+    with connect(client, f"/live/{ground['id']}/light") as browser:
+        when(client, ground, lambda now: now["driving"])
+        settings(client, ground, paused=True)
+        change(client, ground, "put robot", x=-3.0, y=-3.0, heading=0.0)
+        change(client, ground, "put circle", x=2.0, y=2.0, radius=0.5)
+        change(client, ground, "choose", thing="circle", index=0)
+        browser.send_bytes(msgspec.msgpack.encode(CAMERA))
+        receive_until(browser, b"/world/hold")
+
+        def grab(phase: str, x: float, y: float) -> None:
+            # Whatever the height at which it is met, what counts is the floor behind.
+            said = {**GRAB, "phase": phase, "start_position": (2.4, 1.9, 0.0), "end_position": (x, y, 0.0)}
+            browser.send_bytes(msgspec.msgpack.encode(said))
+
+        grab("start", 2.4, 1.9)
+        grab("update", 1.4, 1.4)
+        # It goes as far as the hand, and does not jump under it.
+        when(client, ground, lambda now: now["geometry"]["circles"] == [{"x": 1.0, "y": 1.5, "radius": 0.5}])
+        grab("end", 1.4, 0.4)
+        when(client, ground, lambda now: now["geometry"]["circles"] == [{"x": 1.0, "y": 0.5, "radius": 0.5}])
+        # Let go, it stays.
+        grab("update", 0.0, 0.0)
+        time.sleep(0.5)
+        assert when(client, ground, lambda now: now["driving"])["geometry"]["circles"][0]["x"] == 1.0
+
+
+def moment(sim_time: float, x: float, *, reward: float = 0.0, outcome: int = 0, target: float = 3.0) -> Frame:
+    return Frame(
+        mode="policy",
+        step=0,
+        sim_time=sim_time,
+        speed=1.0,
+        poses=np.array([[x, 0.0, 0.0]], np.float32),
+        targets=np.array([[target, 0.0]], np.float32),
+        ranges=np.ones((1, 30), np.float32),
+        fields_of_view=np.full(1, 360.0, np.float32),
+        rewards=np.full(1, reward, np.float32),
+        outcomes=np.full(1, outcome, np.uint8),
+    )
+
+
+def test_numbers_are_of_the_moment_that_the_picture_shows(client: TestClient, services: Services) -> None:
+    ground = services.playgrounds.get(opened(client)["id"])
+    period = ground.task.control_period
+    values = tuple(float(10 - step) for step in range(11))
+    seen = PlaySeen(revision=1, sim_time=5.0, value=10.0, values=values, outcome="arrival", seconds=10 * period)
+    ground.take_frame(moment(5.0, 0.0))
+    ground.take_seen(seen)
+    # Nothing is shown yet: it is of the newest.
+    assert (ground.view().sim_time, ground.view().value, ground.view().seconds) == (5.0, 10.0, 10 * period)
+    for step in range(1, 5):
+        ground.take_frame(moment(5.0 + step * period, 0.1 * step, reward=step, outcome=step // 4, target=3.0 - step // 4))
+    ground.take_seen(
+        seen.model_copy(update={"sim_time": 5.0 + 4 * period, "value": 77.0, "values": (77.0,), "seconds": 99.0})
+    )
+    # The picture is two steps behind what has come: so are all numbers, and what was foreseen is told for then.
+    ground.shown(5.0 + 2 * period)
+    shown = ground.shown_moment()
+    assert shown.robot is not None
+    assert shown.robot.x == 0.2
+    assert (shown.reward, shown.arrivals, shown.value, shown.outdated) == (2.0, 0, 8.0, False)
+    assert shown.seconds == pytest.approx(8 * period)
+    assert Moment.model_validate(ground.view().model_dump(include=set(Moment.model_fields))) == shown
+    ground.shown(5.0 + 4 * period)
+    assert (ground.shown_moment().arrivals, ground.shown_moment().value) == (1, 77.0)
+    # Behind its attempt what was foreseen is nothing new any more.
+    ground.take_frame(moment(5.0 + 4 * period + 120.0, 0.0))
+    ground.shown(5.0 + 4 * period + 120.0)
+    assert (ground.shown_moment().seconds, ground.shown_moment().outdated) == (0.0, True)
+    # Another worker begins anew.
+    ground.take_frame(moment(0.1, 1.0))
+    assert (ground.view().sim_time, ground.view().value, ground.view().outdated) == (0.1, None, True)
+
+
+def test_the_picture_tells_its_page_the_moment(client: TestClient, play_worker: None) -> None:
+    ground = opened(client)
+    with (
+        connect(client, f"/live/{ground['id']}/light"),
+        connect(client, f"/live/{ground['id']}/light/display") as display,
+    ):
+        when(client, ground, lambda now: now["driving"])
+        settings(client, ground, paused=True)
+        asked = when(client, ground, lambda now: now["robot"] is not None and now["value"] is not None)
+        while (said := display.receive_json())["moment"]["sim_time"] != asked["sim_time"]:
+            asked = when(client, ground, lambda now: now["driving"])
+        assert said["moment"]["robot"] == asked["robot"]
 
 
 def test_a_click_puts_the_target_and_a_drag_moves_what_was_clicked(client: TestClient, play_worker: None) -> None:

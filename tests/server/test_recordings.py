@@ -40,7 +40,7 @@ def test_a_recording_is_read_and_held_beside_policies(client: TestClient, job_wo
     shipped = client.get(f"{URL}/{mine['id']}/beside", params={"shipped": "complex"}).json()
     assert (shipped["policy"], shipped["period"]) == ("Complex arena", 0.2)
     assert len(shipped["times"]) == len(shipped["forwards"]) == 201
-    assert shipped["partings"][0]["share"] >= shipped["partings"][-1]["share"] > 0.25
+    assert shipped["partings"][0]["metres"] >= shipped["partings"][-1]["metres"] > 0.1
     # Somebody's ONNX file of the default task.
     sent = {"name": "Mine", "content": base64.b64encode(graph()).decode(), "task": {}}
     foreign = client.post("/api/uploads", json=sent).json()

@@ -16,7 +16,7 @@ from mcap.writer import CompressionType
 
 from sim.config import TaskConfig
 from tests.workers.robot_bags import Drive, as_db3, as_mcap, header, messages, simulated
-from workers.bags.beside import beside, robots_policy
+from workers.bags.beside import _apart, beside, robots_policy
 from workers.bags.motion import fit_motion
 from workers.bags.read import read_bag
 from workers.bags.reading import tell
@@ -381,11 +381,35 @@ def test_where_policy_and_robot_part_is_found() -> None:
     assert found.partings
     furthest = found.partings[0]
     at = found.times.index(furthest.at)
-    apart = abs(found.forwards[at] - found.did_forwards[at]) / 0.5, abs(found.turning[at] - found.did_turning[at]) / 1.5
-    assert max(apart) > 0.2
-    shares = [parting.share for parting in found.partings]
-    assert shares == sorted(shares, reverse=True)
+    second = slice(at, at + 5)
+    apart = np.abs(np.subtract(found.forwards, found.did_forwards)[second]).mean()
+    turned = np.abs(np.subtract(found.turning, found.did_turning)[second]).mean()
+    # No further than both together can come.
+    assert 0.1 < furthest.metres <= apart + (0.3 + 1.0) * turned + 0.01
+    metres = [parting.metres for parting in found.partings]
+    assert metres == sorted(metres, reverse=True)
+    assert 0.0 < found.partings[-1].share <= furthest.share < 1.0
+    # They tell more from less: few are equal.
+    assert len(set(metres)) > len(metres) / 2
+    moments = sorted(parting.at for parting in found.partings)
+    assert min(np.diff(moments)) > 1.5
     assert "this policy goes 0.25 m/s at most" in found.notes[0]
+
+
+def test_how_far_they_part_is_metres_between_their_noses_a_second_later() -> None:
+    stands = np.zeros((20, 2))
+    straight, turns, circles = (np.full((20, 2), each) for each in ((0.5, 0.0), (0.0, math.pi / 2), (math.pi / 2, math.pi)))
+    # Half a metre a second, for one second; at the end of the recording for as long as it goes on.
+    np.testing.assert_allclose(_apart(straight, stands, 0.2)[:16], 0.5, atol=1e-12)
+    np.testing.assert_allclose(_apart(straight, stands, 0.2)[16:], [0.4, 0.3, 0.2, 0.1], atol=1e-12)
+    # A quarter turn on the spot: the nose, 0.3 m before the middle, is a chord away.
+    np.testing.assert_allclose(_apart(turns, stands, 0.1)[:10], 0.3 * math.sqrt(2.0), atol=1e-12)
+    # Half a circle of half a metre's radius: its middle is a metre to the left, its nose looks back.
+    np.testing.assert_allclose(_apart(circles, stands, 0.05)[0], math.hypot(0.6, 1.0), atol=0.01)
+    # A period that is no part of a second is cut short; one that is longer, too.
+    np.testing.assert_allclose(_apart(straight, stands, 0.3)[:16], 0.5, atol=1e-12)
+    np.testing.assert_allclose(_apart(straight, stands, 2.0), 0.5, atol=1e-12)
+    assert not _apart(circles, circles, 0.2).any()
 
 
 def test_a_lidar_that_sees_too_little_for_a_policy_says_so() -> None:

@@ -118,6 +118,16 @@ def test_the_value_is_the_discounted_reward_of_the_way_ahead() -> None:
     steps = round(foreseen.seconds / PERIOD)
     assert steps == pytest.approx((7.0 - 0.2) / (TOP * PERIOD), abs=1.5)
     assert foreseen.value == pytest.approx(0.2 * (1.0 - 0.99 ** (steps - 1)) / (1.0 - 0.99), rel=1e-5)
+    # What is told of the steps ahead is what is foreseen there.
+    assert len(foreseen.values) == steps + 1
+    assert (foreseen.values[0], foreseen.values[-1]) == (foreseen.value, 0.0)
+    hand.do(Steps(count=1))
+    foreseen = hand.ground.seen()
+    hand.do(Steps(count=4))
+    later = hand.ground.seen()
+    assert later.value == pytest.approx(foreseen.values[4], rel=1e-5)
+    assert later.sim_time == pytest.approx(foreseen.sim_time + 4 * PERIOD)
+    assert later.seconds == pytest.approx(foreseen.seconds - 4 * PERIOD)
 
 
 def test_pushes_go_as_far_as_there_is_room() -> None:

@@ -30,9 +30,13 @@ MAX_COMMANDS = 36_000
 _IDLE = (State.NO_GOAL, State.ARRIVED, State.NO_ODOMETRY, State.STALE_ODOMETRY, State.NO_SCAN, State.STALE_SCAN)
 """What the policy says nothing in."""
 _STATES = tuple(State)
-_SMOOTHED_SECONDS = 1.0
+# How far ahead it is looked where both would be, and how long there is no other parting about one.
+_AHEAD_SECONDS = 1.0
 _AROUND_SECONDS = 1.5
-_PARTED = 0.25
+# Of a robot, metres before its middle: who turns away on the spot parts, too.
+_NOSE = 0.3
+# Nearer to one another than this they do not part, metres.
+_PARTED = 0.1
 _MOST_PARTINGS = 10
 
 
@@ -98,8 +102,8 @@ def beside(bag: Bag, policy: Policy, name: str, progress: Callable[[float], None
     did = _did(bag, times, period)
     states = tuple(_STATES.index(each.state) for each in commands)
     told = np.array([each.state not in _IDLE for each in commands])
-    top = np.maximum((specification.max_linear_speed, specification.max_angular_speed), np.abs(did).max(axis=0))
-    apart = np.where(told, np.abs((would - did) / top).max(axis=1), 0.0)
+    furthest = _AHEAD_SECONDS * (specification.max_linear_speed + float(np.abs(did[:, 0]).max())) + 2.0 * _NOSE
+    apart = _apart(np.where(told[:, None], would, did), did, period)
     return BagBeside(
         policy=name,
         period=period,
@@ -112,7 +116,7 @@ def beside(bag: Bag, policy: Policy, name: str, progress: Callable[[float], None
         states=states,
         reasons=tuple(state.value for state in _STATES),
         driving=tuple(each.state is State.DRIVING for each in commands),
-        partings=tuple(_partings(times, apart, period)),
+        partings=tuple(_partings(times, apart, period, furthest)),
     )
 
 
@@ -188,22 +192,52 @@ def _notes(bag: Bag, specification: Specification) -> list[str]:
     return notes
 
 
-def _partings(times: Reals, apart: Reals, period: float) -> list[Parting]:
-    """The moments about which they were furthest apart for a second or so, none near another; the furthest first."""
-    width = max(1, round(_SMOOTHED_SECONDS / period))
-    smooth = np.convolve(apart, np.ones(width) / width, mode="same") if len(apart) >= width else apart.copy()
+def _apart(would: Reals, did: Reals, period: float) -> Reals:
+    """(n,) metres between the noses of both, a second after each moment: what was commanded from then on, and what was done.
+
+    Both begin where the robot was, and follow their velocities at once. At the end of the recording the second is shorter.
+
+    Args:
+        would: (n, 2) the policy's commands, forwards and turning; what the robot did where it commands nothing.
+        did: (n, 2) the robot's velocities.
+        period: seconds between two of them.
+    """
+    between = _nose_after(would, period) - _nose_after(did, period)
+    return np.hypot(between[:, 0], between[:, 1])
+
+
+def _nose_after(velocities: Reals, period: float) -> Reals:
+    """(n, 2) where the nose of a robot is that stood at the origin a second before, facing along x."""
+    steps = max(1, math.ceil(_AHEAD_SECONDS / period - 1e-9))
+    place, heading = np.zeros((len(velocities), 2)), np.zeros(len(velocities))
+    for step in range(steps):
+        lasts = min(period, _AHEAD_SECONDS - step * period)
+        # Behind the last moment nothing is known of either.
+        then = np.zeros_like(velocities)
+        then[: len(velocities) - step] = velocities[step:]
+        middle = heading + 0.5 * lasts * then[:, 1]
+        place += lasts * then[:, :1] * np.column_stack([np.cos(middle), np.sin(middle)])
+        heading += lasts * then[:, 1]
+    nose: Reals = place + _NOSE * np.column_stack([np.cos(heading), np.sin(heading)])
+    return nose
+
+
+def _partings(times: Reals, apart: Reals, period: float, furthest: float) -> list[Parting]:
+    """The moments from which they come furthest apart, none near another; the furthest first."""
+    left = apart.copy()
     around = max(1, round(_AROUND_SECONDS / period))
     found: list[Parting] = []
-    while len(found) < _MOST_PARTINGS and len(smooth) and smooth.max() > _PARTED:
-        at = int(np.argmax(smooth))
+    while len(found) < _MOST_PARTINGS and len(left) and left.max() > _PARTED:
+        at = int(np.argmax(left))
         start, end = max(0, at - around), min(len(times), at + around + 1)
         found.append(
             Parting(
                 at=round(float(times[at]), 3),
                 start=round(float(times[start]), 3),
                 end=round(float(times[end - 1]), 3),
-                share=min(1.0, round(float(smooth[at]), 3)),
+                metres=round(float(left[at]), 2),
+                share=min(1.0, round(float(left[at]) / furthest, 3)),
             )
         )
-        smooth[max(0, at - 2 * around) : end + around] = 0.0
+        left[max(0, at - 2 * around) : end + around] = 0.0
     return found

@@ -136,17 +136,19 @@ class BagReading(Frozen):
 
 
 class Parting(Frozen):
-    """A while in which policy and robot did most unlike things.
+    """A moment from which policy and robot would have come furthest apart.
 
     Attributes:
-        at: when they were furthest apart.
-        start, end: of the while about it.
-        share: how far, as a share of the larger span of the policy's limits; 1 is as far as it goes.
+        at: the moment.
+        start, end: of the while about it in which there is no other.
+        metres: how far apart their noses would have been a second later, see `workers.bags.beside`.
+        share: of the furthest that two could come apart in that time, one at the policy's top speed and one at the robot's.
     """
 
     at: float
     start: float
     end: float
+    metres: float
     share: float
 
 

@@ -14,7 +14,7 @@ from sim.config import LidarConfig, TaskConfig
 from sim.drivers import Driver
 from sim.engine.world import World
 from workers.live.showcase import along_arc
-from workers.play_protocol import MAX_ARROWS, MAX_WAY_POINTS, Place, PlaySeen
+from workers.play_protocol import MAX_ARROWS, MAX_VALUES, MAX_WAY_POINTS, Place, PlaySeen
 
 Arrow = tuple[float, float, float, float]
 """x, y of a place, and of where it would go from there; metres."""
@@ -60,21 +60,26 @@ def foresee(world: World, driver: Driver, gamma: float) -> PlaySeen:
     ahead, drives = copy_of(world), driver.copy()
     lows, period = np.array(action_layout(world.task.robot).lows, np.float32), world.task.control_period
     limit = max(1, round(AHEAD_SECONDS / period))
-    value, steps, ended = 0.0, 0, 0
+    rewards, ended = list[float](), 0
     way = [ahead.robots.poses[0, :2].tolist()]
-    for steps in range(1, limit + 1):
+    for _ in range(limit):
         ahead.step(np.clip(drives(ahead.robots.observations), lows, 1.0).astype(np.float32))
-        value += gamma ** (steps - 1) * float(ahead.robots.rewards[0])
+        rewards.append(float(ahead.robots.rewards[0]))
         ended = int(ahead.robots.outcomes[0])
         # After a collision or a time-out it stands at another start already.
         if ended < 2:
             way.append(ahead.robots.poses[0, :2].tolist())
         if ended:
             break
+    values = [0.0]
+    for reward in reversed(rewards):
+        values.append(reward + gamma * values[-1])
+    values.reverse()
     return PlaySeen(
-        value=value,
+        value=values[0],
+        values=tuple(values[:MAX_VALUES]),
         outcome=_OUTCOMES[ended - 1] if ended else None,
-        seconds=round(steps * period, _DECIMALS),
+        seconds=round(len(rewards) * period, _DECIMALS),
         way=_thinned(way),
     )
 

@@ -77,14 +77,19 @@ class Playground:
         self._done = max([self._done, *(act.number for act in orders.acts)])
         self._revision = orders.revision
 
+    @property
+    def pace(self) -> float:
+        """Simulated seconds for a second of wall time."""
+        return 0.0 if self._settings.paused else self._settings.speed
+
     def advance(self, seconds: float) -> None:
         """Let wall time pass."""
-        if not self._settings.paused:
-            self._show.advance(self._policy, seconds * self._settings.speed)
+        if self.pace > 0.0:
+            self._show.advance(self._policy, seconds * self.pace)
 
     def frame(self) -> Frame:
         """This moment; blind rays have no length."""
-        frame = self._show.frame(self._training_step, 0.0 if self._settings.paused else self._settings.speed)
+        frame = self._show.frame(self._training_step, self.pace)
         return replace(frame, ranges=np.where(self._policy.rays, np.float32(0.0), frame.ranges))
 
     def seen(self) -> PlaySeen:
@@ -93,7 +98,8 @@ class Playground:
         assert driver is not None
         arrows = field(self._show.world, self._policy) if self._settings.field else ()
         seen = foresee(self._show.world, driver, self._gamma)
-        return seen.model_copy(update={"revision": self._revision, "arrows": arrows, "problem": self._problem})
+        told = {"revision": self._revision, "sim_time": self._show.sim_time, "arrows": arrows, "problem": self._problem}
+        return seen.model_copy(update=told)
 
     def _disturbed(self, settings: PlaySettings) -> TaskConfig:
         """The task with what the settings add to its own disturbances."""

@@ -74,7 +74,11 @@ def play(ground: Playground, orders: "Connection[Any, JobOrders]", audience: Aud
             ground.advance(1.0 / FRAME_RATE)
             audience.frame(ground.frame().encode())
             if now >= seen_due:
+                seen = ground.seen()
                 seen_at, seen_due = now, now + _SEEN_SECONDS
-                audience.seen(ground.seen())
+                if seen.outcome is not None and ground.pace > 0.0:
+                    # With the attempt ends what was foreseen.
+                    seen_due = min(seen_due, now + max(_SOON_SECONDS, seen.seconds / ground.pace))
+                audience.seen(seen)
     except (EOFError, BrokenPipeError):
         return

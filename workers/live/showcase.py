@@ -84,6 +84,11 @@ class Showcase:
         self.look()
 
     @property
+    def sim_time(self) -> float:
+        """Simulated seconds that have passed, as frames say."""
+        return self._sim_time
+
+    @property
     def robots(self) -> int:
         """How many robots drive."""
         return len(self.world)

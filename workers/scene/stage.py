@@ -34,6 +34,9 @@ class Stage(Protocol):
     def picture(self) -> StagePicture:
         """What there is to draw."""
 
+    def shown(self, sim_time: float) -> None:
+        """The moment that is drawn now, as frames say it."""
+
     def put(self, thing: str, index: int, x: float, y: float, heading: float) -> None:
         """Something was dragged; metres and degrees."""
 

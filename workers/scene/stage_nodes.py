@@ -18,6 +18,9 @@ from workers.scene.themes import OUTCOMES, Colours, linear
 HANDLE = "/world/handle"
 """The node with the handles."""
 
+GRABS = ("/world/grab", "/world/hold")
+"""What may be taken hold of beside these: a wide disc on the floor, and the room in which the thing stands."""
+
 _WORLD = "/world"
 OBSTACLE_HEIGHT = 0.45
 _WAY_HEIGHT = 0.03
@@ -26,6 +29,17 @@ _ARROW_HEAD = 0.35
 _HEAD_ANGLE = 2.6
 # What a click may miss something by, metres.
 _REACH = 0.12
+# Of the handles, metres: around the thing, and where that is small, as large as before.
+_HANDLE_SCALE = 0.7
+# A ring to turn by is at that share of the scale.
+_RING = 0.65
+# A finger covers about a third of a metre of a picture that shows a whole arena.
+_GRAB_RADIUS = 0.6
+_GRAB_HEIGHT = 0.02
+_GRAB_OPACITY = 0.16
+_HOLD_HEIGHT = OBSTACLE_HEIGHT + 0.05
+_TARGET_RADIUS = 0.2
+_HOLD_MARGIN = 0.08
 # Heights at which a click's ray is looked at, from the top of an obstacle to the floor, metres.
 _HEIGHTS = np.linspace(OBSTACLE_HEIGHT, 0.0, 10)
 _NAMES: dict[str | None, int] = {None: 0, "arrival": 1, "collision": 2, "timeout": 3}
@@ -54,12 +68,18 @@ class StageNodes:
         self._chosen: tuple[str, int] | None = None
         self._handle: viser.TransformControlsHandle | None = None
         self._dragging = False
+        self._grabs: list[viser.CylinderHandle] = []
+        self._grab_radius = 0.0
+        # From where something was taken hold of to its middle, metres.
+        self._held: tuple[float, float] | None = None
         self._frame: Frame | None = None
         server.scene.on_click()(self._clicked)
 
     def update(self, frame: Frame | None) -> None:
         """Draws how things stand; None where nothing drives yet."""
-        self._frame = frame or self._frame
+        if frame is not None:
+            self._frame = frame
+            self._stage.shown(frame.sim_time)
         picture = self._stage.picture()
         self._draw_obstacles(picture)
         self._draw_lines(picture)
@@ -120,19 +140,22 @@ class StageNodes:
 
     def _draw_handle(self, picture: StagePicture) -> None:
         place = self._place(picture, picture.chosen)
-        if picture.chosen != self._chosen or place is None:
-            if self._handle is not None:
-                self._handle.remove()
-            self._handle, self._dragging = None, False
-            self._chosen = picture.chosen if place is not None else None
+        radius = 0.0 if picture.chosen is None else self._radius(picture, picture.chosen)
+        if picture.chosen != self._chosen or place is None or abs(radius - self._grab_radius) > 1e-3:
+            for node in (self._handle, *self._grabs):
+                if node is not None:
+                    node.remove()
+            self._handle, self._dragging, self._grabs, self._held = None, False, [], None
+            self._chosen, self._grab_radius = picture.chosen if place is not None else None, radius
         if place is None or self._chosen is None or self._dragging:
             return
         x, y, angle = place
         if self._handle is None:
             turns = self._chosen[0] in ("robot", "box")
+            self._add_grabs(radius)
             self._handle = self._server.scene.add_transform_controls(
                 HANDLE,
-                scale=0.7,
+                scale=max(_HANDLE_SCALE, (radius + 2 * _HOLD_MARGIN) / _RING),
                 line_width=4.0,
                 active_axes=(True, True, False),
                 disable_rotations=not turns,
@@ -144,6 +167,32 @@ class StageNodes:
             self._handle.position = position
         if not np.allclose(self._handle.wxyz, turn, atol=1e-3):
             self._handle.wxyz = turn
+        for node in self._grabs:
+            if not np.allclose(node.position[:2], (x, y), atol=1e-3):
+                node.position = (x, y, node.position[2])
+
+    def _add_grabs(self, radius: float) -> None:
+        """The handles are thin: beside them the thing itself and a disc around it can be taken hold of, by fingers too."""
+        shapes = ((max(_GRAB_RADIUS, radius + 0.2), _GRAB_HEIGHT, _GRAB_OPACITY), (radius + _HOLD_MARGIN, _HOLD_HEIGHT, 0.0))
+        for name, (wide, high, opacity) in zip(GRABS, shapes, strict=True):
+            node = self._server.scene.add_cylinder(
+                name, wide, high, self._colours.arrow, radial_segments=32, opacity=opacity, position=(0.0, 0.0, high / 2)
+            )
+            node.on_drag("left")(self._grabbed)
+            self._grabs.append(node)
+
+    def _radius(self, picture: StagePicture, chosen: tuple[str, int]) -> float:
+        """Of the circle around a thing, metres."""
+        thing, index = chosen
+        if thing == "robot":
+            return self._robot_radius
+        if thing == "circle" and index < len(picture.circles):
+            return float(picture.circles[index, 2])
+        if thing == "box" and index < len(picture.boxes):
+            return float(np.hypot(*picture.boxes[index, 2:4]))
+        if thing == "mover" and self._frame is not None and index < len(self._frame.movers):
+            return float(self._frame.movers[index, 2])
+        return _TARGET_RADIUS
 
     def _place(self, picture: StagePicture, chosen: tuple[str, int] | None) -> tuple[float, float, float] | None:
         """x, y and angle of a thing; None where it is not there."""
@@ -175,6 +224,31 @@ class StageNodes:
         x, y, _ = event.target.position
         w, _, _, z = event.target.wxyz
         self._stage.put(*chosen, float(x), float(y), math.degrees(2.0 * math.atan2(float(z), float(w))) % 360.0)
+
+    async def _grabbed(self, event: viser.SceneNodeDragEvent[viser.CylinderHandle]) -> None:
+        """Somebody drags what stands there; asynchronous, so that one move comes after another."""
+        chosen, place = self._chosen, None
+        if chosen is not None:
+            place = self._place(self._stage.picture(), chosen)
+        point = self._on_floor(np.array(event.client.camera.position), np.array(event.end_position))
+        if chosen is None or place is None or point is None:
+            return
+        x, y, angle = place
+        if event.phase == "start":
+            start = self._on_floor(np.array(event.client.camera.position), np.array(event.start_position))
+            self._held = None if start is None else (x - start[0], y - start[1])
+        if self._held is not None:
+            self._stage.put(*chosen, point[0] + self._held[0], point[1] + self._held[1], math.degrees(angle) % 360.0)
+        if event.phase == "end":
+            self._held = None
+
+    def _on_floor(self, eye: NDArray[np.float64], through: NDArray[np.float64]) -> tuple[float, float] | None:
+        """Where somebody sees the floor through a point, in the arena; None where they look past it."""
+        direction = through - eye
+        if not (np.isfinite(eye).all() and np.isfinite(direction).all()) or direction[2] > -1e-6:
+            return None
+        x, y, _ = (eye - eye[2] / direction[2] * direction + self._centre).tolist()
+        return x, y
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)

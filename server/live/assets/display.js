@@ -59,10 +59,23 @@ addEventListener("DOMContentLoaded", () => {
     display.hidden = false;
   };
 
+  // The page around the frame says more of the moment that is shown: it is told with it.
+  const tell = (moment) => {
+    if (moment && parent !== window) parent.postMessage({ playgroundMoment: moment }, location.origin);
+  };
+
+  let drawn = "";
+  const hear = ({ moment, ...score }) => {
+    tell(moment);
+    const text = JSON.stringify(score);
+    if (text !== drawn) draw(score);
+    drawn = text;
+  };
+
   const connect = () => {
     const path = `${location.pathname.replace(/\/$/, "")}/display`;
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${path}`);
-    socket.onmessage = (event) => draw(JSON.parse(event.data));
+    socket.onmessage = (event) => hear(JSON.parse(event.data));
     socket.onclose = () => setTimeout(connect, 1000);
   };
   connect();

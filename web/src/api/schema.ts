@@ -8709,18 +8709,21 @@ export interface components {
         };
         /**
          * Parting
-         * @description A while in which policy and robot did most unlike things.
+         * @description A moment from which policy and robot would have come furthest apart.
          *
          *     Attributes:
-         *         at: when they were furthest apart.
-         *         start, end: of the while about it.
-         *         share: how far, as a share of the larger span of the policy's limits; 1 is as far as it goes.
+         *         at: the moment.
+         *         start, end: of the while about it in which there is no other.
+         *         metres: how far apart their noses would have been a second later, see `workers.bags.beside`.
+         *         share: of the furthest that two could come apart in that time, one at the policy's top speed and one at the robot's.
          */
         Parting: {
             /** At */
             at: number;
             /** End */
             end: number;
+            /** Metres */
+            metres: number;
             /** Share */
             share: number;
             /** Start */
@@ -9072,7 +9075,7 @@ export interface components {
             outcome: ("arrival" | "collision" | "timeout") | null;
             /**
              * Outdated
-             * @description Whether value, outcome and seconds are of before the last change; new ones follow within a second.
+             * @description Whether value, outcome and seconds are of before the last change, or of an attempt that has ended; new ones follow within a second.
              */
             outdated: boolean;
             /**

@@ -13,7 +13,7 @@ import { placeAt, type Reading, ROLES, type Role, stripOf } from '../components/
 import classes from '../components/recordings/recordings.module.css'
 import { Scene } from '../components/recordings/Scene'
 import { Notice, Page, Panel, QueryError } from '../components/ui'
-import { duration, percent, plural, significant } from '../lib/format'
+import { duration, plural, significant } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 
 const FOR_GOOD = { staleTime: Number.POSITIVE_INFINITY, retry: false }
@@ -188,13 +188,14 @@ function Opened({ recordingId, reading }: { recordingId: string; reading: Readin
                             aria-pressed={time === parting.at}
                             onClick={() => setTime(parting.at)}
                           >
-                            {parting.at.toFixed(1)} s: {percent(parting.share)}
+                            {parting.at.toFixed(1)} s: {parting.metres.toFixed(2)} m
                           </Button>
                         </li>
                       ))}
                     </ul>
                     <Text size="xs" c="dimmed" mt={4}>
-                      Of the larger of the policy's limit and the robot's highest speed, over a second.
+                      How far apart the fronts of both robots would be a second later: one that drove as this
+                      one did, and one that did at once what the policy commands.
                     </Text>
                   </div>
                 ) : (

@@ -1,6 +1,6 @@
 /** An open playground: the picture, what time does, what stands where, what the robot perceives and makes of it. */
 import { Button, Group, Text } from '@mantine/core'
-import { useRef } from 'react'
+import { type RefObject, useRef } from 'react'
 import type { Playground } from '../../api/types'
 import { count, significant } from '../../lib/format'
 import { LiveFrame, useWatching, WholeScreen } from '../LiveView'
@@ -10,7 +10,8 @@ import classes from './Ground.module.css'
 import { KeepArena } from './KeepArena'
 import { Perception } from './Perception'
 import { Things } from './Things'
-import { useGround } from './useGround'
+import { type GroundActions, useGround } from './useGround'
+import { useMoment } from './useMoment'
 
 const SPEEDS = [0.1, 0.5, 1, 2, 5]
 
@@ -22,7 +23,7 @@ export function Ground({ ground }: { ground: Playground }) {
   const whole = useRef<HTMLDivElement>(null)
   const { paused, speed } = ground.settings
   return (
-    <div className={classes.ground} data-testid="playground" data-sim-time={ground.sim_time}>
+    <div className={classes.ground} data-testid="playground">
       <div className={classes.stage}>
         <Panel flush>
           <WholeScreen ref={whole}>
@@ -59,52 +60,72 @@ export function Ground({ ground }: { ground: Playground }) {
             </fieldset>
           </WholeScreen>
         </Panel>
-        <Panel title="What it sees coming">
-          <dl className={classes.facts} data-testid="foresight">
-            <div>
-              <dt>Ahead</dt>
-              <dd data-testid="outcome" data-outdated={ground.outdated || undefined}>
-                {ground.seconds === null
-                  ? '–'
-                  : ground.outcome
-                    ? `It ${ENDS[ground.outcome]} in ${significant(ground.seconds, 3)} s`
-                    : `It drives on for more than ${significant(ground.seconds, 3)} s`}
-              </dd>
-            </div>
-            <div>
-              <dt>Value</dt>
-              <dd data-outdated={ground.outdated || undefined}>
-                {ground.value === null ? '–' : significant(ground.value, 4)}
-              </dd>
-            </div>
-            <div>
-              <dt>Reward since the last target</dt>
-              <dd>{significant(ground.reward, 3)}</dd>
-            </div>
-            <div>
-              <dt>So far</dt>
-              <dd data-testid="tally">
-                {count(ground.arrivals)} arrived, {count(ground.collisions)} collided,{' '}
-                {count(ground.timeouts)} timed out
-              </dd>
-            </div>
-          </dl>
-          <Text size="xs" c="dimmed" mt={8}>
-            A copy of this moment is driven ahead: the line in the picture is where it goes if nobody
-            interferes, the value its discounted reward until then.
-          </Text>
-          {ground.problem && (
-            <Notice title="Not done" bad role="alert">
-              {ground.problem}
-            </Notice>
-          )}
-        </Panel>
+        <Foresight asked={ground} picture={whole} />
       </div>
       <div className={classes.stage}>
-        <Things ground={ground} actions={actions} />
+        <ThingsShown asked={ground} picture={whole} actions={actions} />
         <Perception settings={ground.settings} configure={actions.configure} />
         <KeepArena ground={ground} />
       </div>
     </div>
   )
+}
+
+interface ShownProps {
+  /** As the service last said it. */
+  asked: Playground
+  /** Around the picture, which says more of the moment that it shows. */
+  picture: RefObject<HTMLElement | null>
+}
+
+function Foresight({ asked, picture }: ShownProps) {
+  const ground = { ...asked, ...useMoment(picture) }
+  return (
+    <Panel title="What it sees coming">
+      <dl className={classes.facts} data-testid="foresight" data-sim-time={ground.sim_time}>
+        <div>
+          <dt>Ahead</dt>
+          <dd data-testid="outcome" data-outdated={ground.outdated || undefined}>
+            {ground.seconds === null
+              ? '–'
+              : ground.outcome
+                ? `It ${ENDS[ground.outcome]} in ${ground.seconds.toFixed(1)} s`
+                : `It drives on for more than ${ground.seconds.toFixed(0)} s`}
+          </dd>
+        </div>
+        <div>
+          <dt>Value</dt>
+          <dd data-outdated={ground.outdated || undefined}>
+            {ground.value === null ? '–' : significant(ground.value, 4)}
+          </dd>
+        </div>
+        <div>
+          <dt>Reward since the last target</dt>
+          <dd>{significant(ground.reward, 3)}</dd>
+        </div>
+        <div>
+          <dt>So far</dt>
+          <dd data-testid="tally">
+            {count(ground.arrivals)} arrived, {count(ground.collisions)} collided, {count(ground.timeouts)}{' '}
+            timed out
+          </dd>
+        </div>
+      </dl>
+      <Text size="xs" c="dimmed" mt={8}>
+        A copy of this moment is driven ahead: the line in the picture is where it goes if nobody interferes,
+        the value its discounted reward until then.
+      </Text>
+      {ground.problem && (
+        <Notice title="Not done" bad role="alert">
+          {ground.problem}
+        </Notice>
+      )}
+    </Panel>
+  )
+}
+
+/** The things where the picture has them. */
+function ThingsShown({ asked, picture, actions }: ShownProps & { actions: GroundActions }) {
+  const ground = { ...asked, ...useMoment(picture) }
+  return <Things ground={ground} actions={actions} />
 }
