@@ -141,3 +141,39 @@ def test_two_policies_drive_one_scenario_beside_their_charts_below_one_cursor(
     page.reload()
     expect(dialog.get_by_test_id("replay-ends").get_by_role("button")).to_have_count(2, timeout=SOON)
     page.close()
+
+
+def test_three_beside_leave_everything_in_the_window(context: BrowserContext) -> None:
+    prepare(context)
+    found = context.request.get("/api/replays/policy:complex:complex-200/beside", timeout=SOON).json()["items"]
+    others = "".join(f"&with={each['of']}" for each in found[:3])
+    assert others
+    page = context.new_page()
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(f"/policies/complex?suite=complex-200&replay=8{others}")
+    ends = page.get_by_test_id("replay-ends")
+    expect(ends).to_be_visible(timeout=SOON)
+    dialog = page.get_by_role("dialog")
+    for part in (page.get_by_test_id("replay"), ends, dialog.get_by_role("button", name="Next", exact=True)):
+        box = part.bounding_box()
+        assert box is not None
+        assert box["y"] >= 0.0
+        assert box["y"] + box["height"] <= 800.0
+    stage = page.get_by_test_id("replay").bounding_box()
+    assert stage is not None
+    assert stage["height"] > 350.0
+
+
+def test_on_a_phone_nothing_stands_over_the_arena(context: BrowserContext) -> None:
+    prepare(context)
+    page = context.new_page()
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto(f"/replays/{EPISODE}/light/")
+    canvas, card = page.locator("canvas").first, page.locator("#display")
+    expect(canvas).to_be_visible(timeout=SOON)
+    picture, text = canvas.bounding_box(), card.bounding_box()
+    assert picture is not None
+    assert text is not None
+    assert text["y"] + text["height"] <= picture["y"] + 1.0
+    assert picture["y"] + picture["height"] <= 845.0
+    assert picture["height"] > 500.0

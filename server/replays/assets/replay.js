@@ -1,5 +1,6 @@
 // Names for the controls of viser's player, which has none for them, and its look told apart from viser's own panels.
 addEventListener("DOMContentLoaded", () => {
+  if (parent !== window) document.body.dataset.embedded = "";
   const name = () => {
     const slider = document.querySelector(".mantine-Slider-root");
     const bar = slider?.closest(".mantine-Paper-root");

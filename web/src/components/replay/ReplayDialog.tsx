@@ -61,7 +61,14 @@ export function ReplayDialog({ of, episode, order, onReplay, onClose }: ReplayDi
   )
   const place = order.indexOf(episode)
   return (
-    <Modal opened onClose={onClose} size={1440} title={`Episode ${count(episode + 1)}`}>
+    <Modal
+      opened
+      onClose={onClose}
+      size={1440}
+      yOffset="3dvh"
+      title={`Episode ${count(episode + 1)}`}
+      classNames={{ content: classes.dialog ?? '', body: classes.body ?? '' }}
+    >
       <div className={classes.sides}>
         <Stage
           ref={stage}
