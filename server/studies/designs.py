@@ -71,7 +71,8 @@ def _between(space: Space, setting: RangedSetting, share: float, *, closed: bool
     whole = space.is_whole(setting)
     if whole and not closed:
         low, high = low - 0.5 * (1 - 1e-9), high + 0.5 * (1 - 1e-9)
-    value = float(np.exp(np.log(low) + share * (np.log(high) - np.log(low)))) if setting.log else low + share * (high - low)
+    # Of two negative ends the ratio is that of their amounts.
+    value = low * (high / low) ** share if setting.log else low + share * (high - low)
     if whole:
         return int(np.clip(round(value), setting.low, setting.high))
     return float(np.clip(value, setting.low, setting.high))

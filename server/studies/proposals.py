@@ -5,6 +5,7 @@ ours and go round our writes. Every trial is drawn with a seed of its own, made 
 what comes next depends on what is in the rows, and not on how often a server was started meanwhile.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from server.studies.designs import grid_point, quasi_point
-from server.studies.space import ListedSetting, Space, Values
+from server.studies.space import ListedSetting, RangedSetting, Space, Value, Values
 
 if TYPE_CHECKING:
     import optuna
@@ -56,7 +57,8 @@ def propose(space: Space, sampler: SamplerName, seed: int, told: Sequence[Told])
     if sampler == "quasi":
         return quasi_point(space, seed, number)
     study, distributions = _study(space, told if sampler == "tpe" else (), _sampler(sampler, seed, number))
-    return dict(study.ask(distributions).params)
+    params = study.ask(distributions).params
+    return {setting.path: _from_optuna(setting, params[setting.path]) for setting in space.settings}
 
 
 def importances(space: Space, told: Sequence[Told]) -> dict[str, float]:
@@ -107,7 +109,7 @@ def _study(
         study.add_trial(
             create_trial(
                 state=states[one.outcome],
-                params=dict(one.values),
+                params={setting.path: _to_optuna(setting, one.values[setting.path]) for setting in space.settings},
                 distributions=distributions,
                 value=one.score if one.outcome == "complete" else None,
                 intermediate_values=dict(one.rungs),
@@ -127,9 +129,27 @@ def _distributions(space: Space) -> dict[str, "optuna.distributions.BaseDistribu
     found: dict[str, BaseDistribution] = {}
     for setting in space.settings:
         if isinstance(setting, ListedSetting):
-            found[setting.path] = CategoricalDistribution(tuple(setting.values))
-        elif space.is_whole(setting):
-            found[setting.path] = IntDistribution(int(setting.low), int(setting.high), log=setting.log)
+            found[setting.path] = CategoricalDistribution(tuple(_to_optuna(setting, value) for value in setting.values))
+            continue
+        low, high = (-setting.high, -setting.low) if setting.mirrored else (setting.low, setting.high)
+        if space.is_whole(setting):
+            found[setting.path] = IntDistribution(int(low), int(high), log=setting.log)
         else:
-            found[setting.path] = FloatDistribution(setting.low, setting.high, log=setting.log)
+            found[setting.path] = FloatDistribution(low, high, log=setting.log)
     return found
+
+
+def _to_optuna(setting: RangedSetting | ListedSetting, value: Value) -> bool | int | float | str:
+    """A value as Optuna knows it: lists as text, and by its amount what is below 0 on a logarithmic scale."""
+    if isinstance(value, list):
+        return json.dumps(value)
+    if isinstance(setting, RangedSetting) and setting.mirrored and isinstance(value, int | float):
+        return -value
+    return value
+
+
+def _from_optuna(setting: RangedSetting | ListedSetting, param: bool | int | float | str) -> Value:
+    """The other way round."""
+    if isinstance(setting, ListedSetting):
+        return next((value for value in setting.values if _to_optuna(setting, value) == param), param)
+    return _to_optuna(setting, param)

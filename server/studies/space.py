@@ -12,7 +12,7 @@ from sim.config.refusals import to_tell
 from sim.errors import MaplessError
 from workers.config import TrainingConfig
 
-Value = bool | int | float | str
+Value = bool | int | float | str | list[int | float]
 Values = dict[str, Value]
 """Of every searched setting, by its path."""
 
@@ -37,17 +37,25 @@ class RangedSetting(Schema):
 
     kind: Literal["range"]
     path: _Path
-    low: float
-    high: float
-    log: bool = Field(False, description="Whether what counts is how many times as large, as with step sizes.")
+    low: float = Field(allow_inf_nan=False)
+    high: float = Field(allow_inf_nan=False)
+    log: bool = Field(
+        False,
+        description="Whether what counts is how many times as large, as with step sizes; below 0, by the amount.",
+    )
     points: int = Field(5, ge=2, le=MAX_VALUES, description="Values of it in a grid.")
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether it is what is below 0 that counts by ratio: then searched by its amount."""
+        return self.log and self.high < 0
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.low >= self.high:
             raise ValueError(f"the range of {self.path} has to begin below its end")
-        if self.log and self.low <= 0:
-            raise ValueError(f"the range of {self.path} has to begin above 0 for a logarithmic scale")
+        if self.log and self.low <= 0 <= self.high:
+            raise ValueError(f"for a logarithmic scale the range of {self.path} has to keep to one side of 0")
         return self
 
 
@@ -56,11 +64,15 @@ class ListedSetting(Schema):
 
     kind: Literal["list"]
     path: _Path
-    values: list[Value] = Field(min_length=2, max_length=MAX_VALUES)
+    values: list[Value] = Field(
+        min_length=2,
+        max_length=MAX_VALUES,
+        description="Lists of numbers where the setting is one, as the sizes of hidden layers are: [[64, 64], [256]].",
+    )
 
     @model_validator(mode="after")
     def _differ(self) -> Self:
-        if len({(type(value), value) for value in self.values}) < len(self.values):
+        if len({(type(value), str(value)) for value in self.values}) < len(self.values):
             raise ValueError(f"the values of {self.path} have to differ")
         return self
 
@@ -125,10 +137,11 @@ class Space:
                 raise UnusableSettingError(setting.path, "it can be searched only once")
             seen.add(setting.path)
             self._check_kind(setting)
-            values = [setting.low, setting.high] if isinstance(setting, RangedSetting) else setting.values
-            for value in values:
-                whole = isinstance(setting, RangedSetting) and self.is_whole(setting)
-                self._check_value(setting.path, int(value) if whole else value)
+            for value in setting.values if isinstance(setting, ListedSetting) else self._ends(setting):
+                self._check_value(setting.path, value)
+
+    def _ends(self, setting: RangedSetting) -> list[Value]:
+        return [int(end) if self.is_whole(setting) else end for end in (setting.low, setting.high)]
 
     def _check_kind(self, setting: RangedSetting | ListedSetting) -> None:
         path = setting.path
@@ -138,9 +151,14 @@ class Space:
             value = _value_at(self.base, path)
         except (KeyError, IndexError, TypeError, ValueError):
             raise UnusableSettingError(path, "this training has no such setting") from None
-        if isinstance(value, dict | list) or path.rpartition(".")[2] == "name":
-            raise UnusableSettingError(path, "only numbers and choices can be searched")
+        listed = _is_list_of_numbers(value)
+        if (isinstance(value, dict | list) and not listed) or path.rpartition(".")[2] == "name":
+            raise UnusableSettingError(path, "only numbers, choices and lists of numbers can be searched")
         if isinstance(setting, ListedSetting):
+            for one in setting.values:
+                if isinstance(one, list) != listed:
+                    wanted = "is a list of numbers, as 64, 64 is" if listed else "takes single values, no lists of them"
+                    raise UnusableSettingError(path, f"it {wanted}: {_text(one)} does not do")
             return
         # One that is not set has no kind yet: whether it takes numbers is seen as the ends are tried.
         if isinstance(value, bool) or not isinstance(value, int | float | None):
@@ -152,10 +170,10 @@ class Space:
         try:
             self.training({path: value})
         except ValidationError as error:
-            own = [problem for problem in error.errors() if _names(problem["loc"]) & {path.rpartition(".")[2]}]
+            own = [problem for problem in error.errors() if _setting_of(problem["loc"]) == _setting_of(path.split("."))]
             # What others do not go with may go with others: such a trial fails, and says so.
             if own:
-                raise UnusableSettingError(path, f"{value!r} is refused: {wording(error)}") from error
+                raise UnusableSettingError(path, f"{_text(value)} is refused: {wording(error)}") from error
 
 
 def wording(error: ValidationError) -> str:
@@ -163,8 +181,17 @@ def wording(error: ValidationError) -> str:
     return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in to_tell(error.errors()))[:500]
 
 
-def _names(location: tuple[int | str, ...]) -> set[str]:
-    return {str(part) for part in location[-1:]}
+def _text(value: Value) -> str:
+    return ", ".join(map(str, value)) or "none" if isinstance(value, list) else repr(value)
+
+
+def _is_list_of_numbers(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, int | float) for one in value)
+
+
+def _setting_of(place: Sequence[int | str]) -> str:
+    """The last name on the way to a value: of a list's item, the list's."""
+    return next((part for part in reversed(place) if isinstance(part, str) and not part.isdigit()), "")
 
 
 def _value_at(document: Any, path: str) -> Any:

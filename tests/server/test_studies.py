@@ -16,6 +16,9 @@ from tests.server.harness import Reports
 
 LEARNING_RATE = {"kind": "range", "path": "algorithm.learning_rate", "low": 1e-4, "high": 1e-2, "log": True}
 EPOCHS = {"kind": "list", "path": "algorithm.epochs", "values": [2, 4, 8]}
+LAYERS = {"kind": "list", "path": "algorithm.network.hidden_sizes", "values": [[64, 64], [128, 128], [256, 256]]}
+HIDDEN = ["algorithm", "network", "hidden_sizes"]
+TERMS = ["task", "reward", "terms"]
 TRAINING = {"steps": 100_000, "evaluation": {"every_steps": 10_000}}
 
 
@@ -310,18 +313,47 @@ def test_a_deleted_study_leaves_its_trials_in_the_trash(client: TestClient, move
         ({"settings": [{**LEARNING_RATE, "path": "algorithm.epochs"}]}, ["algorithm", "epochs"], "whole numbers"),
         ({"settings": [{**LEARNING_RATE, "path": "algorithm.scale_returns"}]}, ["algorithm", "scale_returns"], "list its"),
         ({"settings": [{**LEARNING_RATE, "path": "algorithm.final_std"}]}, ["algorithm", "final_std"], "is refused"),
+        ({"settings": [{**LAYERS, "values": [[64, 64], 128]}]}, HIDDEN, "it is a list of numbers, as 64, 64 is: 128 does"),
+        ({"settings": [{**LAYERS, "values": [[64], [64, 2]]}]}, HIDDEN, "64, 2 is refused: every hidden layer needs"),
+        ({"settings": [{**LAYERS, "values": [[64], []]}]}, HIDDEN, "none is refused"),
+        ({"settings": [{**LAYERS, "values": [[64], [64.5]]}]}, HIDDEN, "64.5 is refused"),
+        ({"settings": [{**LEARNING_RATE, "path": LAYERS["path"], "low": 8, "high": 64}]}, HIDDEN, "list its values"),
+        ({"settings": [{**EPOCHS, "values": [2, [4]]}]}, ["algorithm", "epochs"], "takes single values, no lists of them"),
+        ({"settings": [{**LAYERS, "path": "task.reward.terms"}]}, ["task", "reward", "terms"], "only numbers"),
+        ({"settings": [{**LEARNING_RATE, "path": "task.reward.terms.7.weight"}]}, [*TERMS, "7", "weight"], "no such"),
         ({"settings": [{**LEARNING_RATE, "path": "start_from"}]}, ["start_from"], "is refused"),
     ],
 )
 def test_what_can_not_be_searched_is_refused_at_its_field(
     client: TestClient, fields: dict[str, Any], where: list[str], why: str
 ) -> None:
-    request = {"name": "Search", "training": TRAINING} | fields
+    training = TRAINING | {"algorithm": {"name": "ppo", "network": {"name": "mlp"}}}
+    request = {"name": "Search", "training": training} | fields
     response = client.post("/api/studies", json=request)
     assert response.status_code == 422, response.text
     (problem,) = response.json()["detail"]
     assert problem["loc"] == ["body", "training", *where]
     assert why in problem["msg"]
+
+
+def test_a_range_across_zero_has_no_logarithmic_scale(client: TestClient) -> None:
+    weight = {"kind": "range", "path": "task.reward.terms.1.weight", "low": -100.0, "high": 10.0, "log": True}
+    refused = client.post("/api/studies", json={"name": "Search", "training": {}, "settings": [weight]})
+    assert refused.status_code == 422
+    assert "has to keep to one side of 0" in refused.json()["detail"][0]["msg"]
+
+
+def test_weights_and_layers_from_the_launch_to_the_trials(client: TestClient, move: Callable[[], int]) -> None:
+    weight = {"kind": "range", "path": "task.reward.terms.1.weight", "low": -400.0, "high": -25.0, "log": True}
+    training = TRAINING | {"algorithm": {"name": "ppo", "network": {"name": "mlp"}}}
+    study = launch(client, training=training, settings=[weight, LAYERS], sampler="grid", at_once=15)
+    assert study["spec"]["settings"][1]["values"] == LAYERS["values"]
+    move()
+    for trial in look(client, study)["results"]:
+        trained = client.get(f"/api/experiments/{trial['experiment_id']}").json()["training"]
+        collision = trained["task"]["reward"]["terms"][1]
+        assert (collision["name"], collision["weight"]) == ("collision", trial["values"][weight["path"]])
+        assert trained["algorithm"]["network"]["hidden_sizes"] == trial["values"][LAYERS["path"]]
 
 
 def test_a_grid_has_no_more_trials_than_points(client: TestClient) -> None:

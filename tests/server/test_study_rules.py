@@ -12,9 +12,10 @@ from server.database.tables import StudyTrial
 from server.studies.designs import grid_point, grid_size, grid_values, quasi_point
 from server.studies.proposals import SamplerName, Told, importances, propose, trial_seed
 from server.studies.rules import hopeless, rungs_of, score
-from server.studies.space import ListedSetting, RangedSetting, Space, Values
+from server.studies.space import ListedSetting, RangedSetting, Space, Value, Values
 from server.studies.views import front
 from workers.config import PpoConfig, TrainingConfig
+from workers.networks.config import MlpNetwork
 from workers.statistics.seeds import interquartile_mean
 
 RATE = RangedSetting(kind="range", path="algorithm.learning_rate", low=1e-4, high=1e-2, log=True, points=3)
@@ -22,13 +23,22 @@ EPOCHS = RangedSetting(kind="range", path="algorithm.epochs", low=2, high=9, poi
 SCHEDULE = ListedSetting(kind="list", path="algorithm.learning_rate_schedule", values=["linear", "constant"])
 
 
+LAYERS = ListedSetting(kind="list", path="algorithm.network.hidden_sizes", values=[[64, 64], [128, 128], [256]])
+COLLISION = RangedSetting(kind="range", path="task.reward.terms.1.weight", low=-400.0, high=-25.0, log=True, points=3)
+
+
 def space(*settings: RangedSetting | ListedSetting) -> Space:
     return Space(TrainingConfig().model_dump(mode="json"), settings)
 
 
+def number(value: Value) -> float:
+    assert isinstance(value, int | float)
+    return float(value)
+
+
 def quality(values: Values) -> float:
     """Highest for five epochs and a constant rate."""
-    return -abs(float(values["algorithm.epochs"]) - 5) - (values["algorithm.learning_rate_schedule"] == "linear")
+    return -abs(number(values["algorithm.epochs"]) - 5) - (values["algorithm.learning_rate_schedule"] == "linear")
 
 
 class Uninterrupted:
@@ -88,7 +98,7 @@ def test_the_sampler_goes_on_where_trials_did_well() -> None:
 def test_importances_name_what_mattered() -> None:
     ours = space(RATE, EPOCHS, SCHEDULE)
     drawn = [quasi_point(ours, 0, number) for number in range(64)]
-    shares = importances(ours, [Told(each, "complete", -abs(float(each[EPOCHS.path]) - 5)) for each in drawn])
+    shares = importances(ours, [Told(each, "complete", -abs(number(each[EPOCHS.path]) - 5)) for each in drawn])
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares[EPOCHS.path] > 0.8
 
@@ -114,7 +124,7 @@ def test_every_proposal_is_within_its_ranges(seed: int, number: int, sampler: Sa
     ours = space(RATE, EPOCHS, SCHEDULE)
     told = [Told({RATE.path: 1e-3, EPOCHS.path: 4, SCHEDULE.path: "linear"}, "failed")] * number
     values = propose(ours, sampler, seed, told)
-    assert 1e-4 <= float(values[RATE.path]) <= 1e-2
+    assert 1e-4 <= number(values[RATE.path]) <= 1e-2
     assert values[EPOCHS.path] in range(2, 10)
     assert type(values[EPOCHS.path]) is int
     assert values[SCHEDULE.path] in ("linear", "constant")
@@ -127,6 +137,31 @@ def test_a_number_that_is_not_set_may_have_a_range() -> None:
     algorithm = falling.training({"algorithm.final_std": 0.1}).algorithm
     assert isinstance(algorithm, PpoConfig)
     assert algorithm.final_std == 0.1
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "random", "quasi", "grid"])
+def test_layers_and_the_weight_of_a_penalty_are_searched_by_every_sampler(sampler: SamplerName) -> None:
+    """By ratio, the weight's: half of it lies between -100 and -25, a quarter each side of -50."""
+    ours = Space(TrainingConfig(algorithm=PpoConfig(network=MlpNetwork())).model_dump(mode="json"), [LAYERS, COLLISION])
+    ours.check()
+    assert grid_values(ours, COLLISION) == pytest.approx([-400.0, -100.0, -25.0])
+    told: list[Told] = []
+    for _ in range(9 if sampler == "grid" else 32):
+        values = propose(ours, sampler, 0, told)
+        algorithm = (training := ours.training(values)).algorithm
+        assert isinstance(algorithm, PpoConfig)
+        assert isinstance(algorithm.network, MlpNetwork)
+        assert list(algorithm.network.hidden_sizes) == values[LAYERS.path]
+        assert -400.0 <= training.task.reward.terms[1].weight <= -25.0
+        told.append(Told(values, "complete", training.task.reward.weight("collision")))
+    tried = [str(one.values[LAYERS.path]) for one in told]
+    assert set(tried) == {"[64, 64]", "[128, 128]", "[256]"}
+    if sampler == "tpe":
+        late = [one.score for one in told[16:] if one.score is not None]
+        assert sum(score > -100.0 for score in late) > len(late) // 2
+    elif sampler != "grid":
+        assert 10 <= sum(one.score is not None and one.score > -100.0 for one in told) <= 22
+    assert importances(ours, told).keys() == ({LAYERS.path, COLLISION.path} if len(told) >= 8 else set())
 
 
 def test_a_grid_takes_every_combination_once_in_a_drawn_order() -> None:
@@ -143,9 +178,9 @@ def test_a_grid_takes_every_combination_once_in_a_drawn_order() -> None:
 def test_quasi_random_points_fill_the_space_evenly() -> None:
     ours = space(RATE, EPOCHS, SCHEDULE)
     points = [quasi_point(ours, 0, number) for number in range(16)]
-    assert sorted(int(point[EPOCHS.path]) for point in points) == [epochs for epochs in range(2, 10) for _ in range(2)]
+    assert sorted(number(point[EPOCHS.path]) for point in points) == [epochs for epochs in range(2, 10) for _ in range(2)]
     assert sum(point[SCHEDULE.path] == "linear" for point in points) == 8
-    assert sum(float(point[RATE.path]) < 1e-3 for point in points) == 8
+    assert sum(number(point[RATE.path]) < 1e-3 for point in points) == 8
 
 
 def test_success_comes_first_then_time() -> None:

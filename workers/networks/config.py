@@ -2,12 +2,16 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from sim.config import ADVANCED, Frozen, OpenUnion
 from sim.extending.discovery import added, complete
 from workers.extending.parts import FormulaNetwork, RecurrentNetwork
 from workers.extending.parts import Network as AddedNetwork
+
+_LEAST_UNITS, _MOST_UNITS = 4, 1024
+# Refused in words of our own; the form knows the limits all the same.
+_Units = Annotated[int, Field(json_schema_extra={"minimum": _LEAST_UNITS, "maximum": _MOST_UNITS})]
 
 
 class NetworkConfig(Frozen):
@@ -39,7 +43,7 @@ class MlpNetwork(NetworkConfig):
     """A plain multi-layer perceptron."""
 
     name: Literal["mlp"] = Field("mlp", title="MLP")
-    hidden_sizes: tuple[int, ...] = Field(
+    hidden_sizes: tuple[_Units, ...] = Field(
         (64, 64),
         min_length=1,
         max_length=4,
@@ -49,11 +53,12 @@ class MlpNetwork(NetworkConfig):
     )
     activation: Literal["relu", "tanh"] = Field("relu", title="Activation", json_schema_extra=ADVANCED)
 
-    @model_validator(mode="after")
-    def _sizes_in_range(self) -> "MlpNetwork":
-        if any(not 4 <= size <= 1024 for size in self.hidden_sizes):
-            raise ValueError("every hidden layer needs between 4 and 1024 units")
-        return self
+    @field_validator("hidden_sizes")
+    @classmethod
+    def _sizes_in_range(cls, sizes: tuple[int, ...]) -> tuple[int, ...]:
+        if any(not _LEAST_UNITS <= size <= _MOST_UNITS for size in sizes):
+            raise ValueError(f"every hidden layer needs between {_LEAST_UNITS} and {_MOST_UNITS} units")
+        return sizes
 
 
 class ConvNetwork(NetworkConfig):

@@ -95,7 +95,8 @@ def search(
         typer.Option("--range", help="A number's range: algorithm.gamma=0.9..0.99; with :log at its end by ratio."),
     ] = None,
     values: Annotated[
-        list[str] | None, typer.Option("--values", help="The values of a setting: algorithm.epochs=3,6,10.")
+        list[str] | None,
+        typer.Option("--values", help="The values of a setting: algorithm.epochs=3,6,10, or lists: [64,64],[256]."),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, help="Choices of the settings to train.")] = 30,
     sampler: Annotated[str, typer.Option(help="tpe, random, quasi or grid.")] = "tpe",
@@ -337,7 +338,12 @@ def _list(text: str) -> dict[str, Any]:
     path, equals, values = text.partition("=")
     if not equals:
         _refuse(f"--values {text}: a setting, an equals sign, values with commas between them.")
-    return {"kind": "list", "path": path, "values": [_read(value) for value in values.split(_COMMA)]}
+    try:
+        # Lists in lists have commas of their own: [64, 64], [256].
+        found = json.loads(f"[{values}]")
+    except ValueError:
+        found = [_read(value) for value in values.split(_COMMA)]
+    return {"kind": "list", "path": path, "values": found}
 
 
 def _read(value: str) -> Any:

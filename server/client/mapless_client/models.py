@@ -67,7 +67,7 @@ class Trial(Model):
 
     number: int
     state: Literal["running", "complete", "pruned", "failed", "stopped"]
-    values: dict[str, bool | int | float | str]
+    values: dict[str, bool | int | float | str | list[int | float]]
     experiment_id: str | None
     progress: float
     success: float | None

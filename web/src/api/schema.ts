@@ -7830,8 +7830,11 @@ export interface components {
              * @description Of the setting in the training, dotted: "algorithm.learning_rate", "task.reward.terms.0.weight".
              */
             path: string;
-            /** Values */
-            values: (boolean | number | string)[];
+            /**
+             * Values
+             * @description Lists of numbers where the setting is one, as the sizes of hidden layers are: [[64, 64], [256]].
+             */
+            values: (boolean | number | string | (number)[])[];
         };
         /**
          * ListedStudy
@@ -10176,7 +10179,7 @@ export interface components {
             kind: "range";
             /**
              * Log
-             * @description Whether what counts is how many times as large, as with step sizes.
+             * @description Whether what counts is how many times as large, as with step sizes; below 0, by the amount.
              * @default false
              */
             log: boolean;
@@ -10208,7 +10211,7 @@ export interface components {
             kind: "range";
             /**
              * Log
-             * @description Whether what counts is how many times as large, as with step sizes.
+             * @description Whether what counts is how many times as large, as with step sizes; below 0, by the amount.
              * @default false
              */
             log: boolean;
@@ -13172,7 +13175,7 @@ export interface components {
             success: number | null;
             /** Values */
             values: {
-                [key: string]: boolean | number | string;
+                [key: string]: boolean | number | string | (number)[];
             };
         };
         /**

@@ -14,6 +14,10 @@ test('a logarithmic axis has powers of ten, or 1, 2 and 5 of one where those are
   expect(axis.ticks.map(({ label }) => label)).toEqual(['0.0001', '0.001', '0.01'])
   expect(axis.place(1e-3)).toBeCloseTo(0.5)
   expect(numbers([2, 8], String, { log: true }).ticks.map(({ label }) => label)).toEqual(['2', '5'])
+  // Penalties: -100 is half-way from -1000 to -10 by ratio.
+  const below = numbers([-1000, -10], String, { log: true })
+  expect([-1000, -100, -10].map(below.place)).toEqual([0, expect.closeTo(0.5), 1])
+  expect(below.ticks.map(({ label }) => label).sort()).toEqual(['-10', '-100', '-1000'])
   expect(factors(300, 40_000)).toEqual([1_000, 10_000])
   expect(factors(1e-12, 1e12)).toEqual([1e-12, 1e-7, 1e-2, 1e3, 1e8])
   expect(factors(6, 8)).toEqual([6, 6.5, 7, 7.5, 8])

@@ -32,7 +32,7 @@ export const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
 /** Steps of round numbers. */
 const ROUND = [1, 2, 5, 10]
 
-/** An axis of numbers that holds all of `values`; logarithmic where asked for and all are above 0. */
+/** An axis of numbers that holds all of `values`; logarithmic where asked for and all are on one side of 0. */
 export function numbers(
   values: readonly number[],
   format: (value: number) => string,
@@ -42,18 +42,26 @@ export function numbers(
   const high = to ?? Math.max(...values)
   if (!Number.isFinite(low) || !Number.isFinite(high)) return { place: () => 0.5, ticks: [] }
   if (low === high) return { place: () => 0.5, ticks: [{ at: 0.5, label: format(low) }] }
-  const isLog = log && low > 0
-  const on = (value: number) => (isLog ? Math.log10(value) : value)
+  const isLog = log && low * high > 0
+  const side = Math.sign(low)
+  // Below 0 it is the amount that counts, the largest first.
+  const on = (value: number) => (isLog ? side * Math.log10(side * value) : value)
   const place = (value: unknown) => (on(Number(value)) - on(low)) / (on(high) - on(low))
-  const marks = isLog ? factors(low, high) : rounds(low, high)
+  const marks = !isLog
+    ? rounds(low, high)
+    : side > 0
+      ? factors(low, high)
+      : factors(-high, -low).map((amount) => -amount)
   return { place, ticks: marks.map((mark) => ({ at: place(mark), label: roundTick(format(mark)) })) }
 }
 
 /** An axis of choices, in their order. */
 export function choices(values: readonly unknown[], label: (value: unknown) => string): Axis {
   const at = (index: number) => (index + 0.5) / values.length
+  // Lists of numbers are choices, too, and each trial brings its own.
+  const texts = values.map((value) => JSON.stringify(value))
   return {
-    place: (value) => at(Math.max(0, values.indexOf(value))),
+    place: (value) => at(Math.max(0, texts.indexOf(JSON.stringify(value)))),
     ticks: values.map((value, index) => ({ at: at(index), label: label(value) })),
   }
 }

@@ -1,13 +1,13 @@
 /** One field of a form, as the control that fits its schema. */
 import { Anchor, Input, NumberInput, Select, Switch, Text, TextInput } from '@mantine/core'
-import { useState } from 'react'
 import { Segments } from '../components/Segments'
 import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
 import { ImportedArenaInput } from './ImportedArenaInput'
 import { type Field, initialOf } from './layout'
+import { NumbersText } from './NumbersText'
 import { problemOf } from './problems'
-import { SearchInput } from './SearchInput'
+import { SearchInput, TryMany } from './SearchInput'
 import { type Json, range, type Schema } from './schema'
 import { freshSearch, useSearched } from './search'
 import { TermsInput } from './TermsInput'
@@ -33,7 +33,7 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
   const value = valueAt(form.values, field.path) ?? null
   const fresh = initialOf(field, form.values, initial)
   const error = problemOf(form.problems, field.key)
-  const search = useSearched(field)
+  const search = useSearched(field, form.values)
   if (search?.searched !== undefined)
     return <SearchInput field={field} searched={search.searched} error={error} onChange={search.set} />
   const common = {
@@ -42,18 +42,7 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
     description: (
       <>
         <Description field={field} value={value} form={form} initial={fresh} />
-        {search && (
-          <Anchor
-            component="button"
-            type="button"
-            inherit
-            ml={6}
-            aria-label={`${field.kind === 'number' ? 'Try a range' : 'Try several'}: ${field.label}`}
-            onClick={() => search.set(freshSearch(field, value))}
-          >
-            {field.kind === 'number' ? 'Try a range' : 'Try several'}
-          </Anchor>
-        )}
+        {search && <TryMany field={field} onClick={() => search.set(freshSearch(field, value))} />}
       </>
     ),
     error,
@@ -239,28 +228,6 @@ function listed(value: Json | undefined): string {
   return (Array.isArray(value) && value.join(', ')) || 'none'
 }
 
-/** "64, 64" -> [64, 64]. What is no number is kept as it was typed: the server says what is wrong with it. */
-export function parseNumbers(text: string): Json[] {
-  return text
-    .split(/[\s,;x×]+/)
-    .filter(Boolean)
-    .map((part) => (Number.isFinite(Number(part)) ? Number(part) : part))
-}
-
-function NumbersInput({ value, onChange, ...common }: NumbersInputProps) {
-  const written = Array.isArray(value) ? value.join(', ') : ''
-  const [text, setText] = useState(written)
-  // Somebody else (a preset) has set the value: show that, and not what was typed before.
-  const shown = sameValue(parseNumbers(text), value) ? text : written
-  return (
-    <TextInput
-      {...common}
-      inputWrapperOrder={['label', 'input', 'error', 'description']}
-      value={shown}
-      onChange={(event) => {
-        setText(event.currentTarget.value)
-        onChange(parseNumbers(event.currentTarget.value))
-      }}
-    />
-  )
+function NumbersInput(props: NumbersInputProps) {
+  return <NumbersText {...props} inputWrapperOrder={['label', 'input', 'error', 'description']} />
 }

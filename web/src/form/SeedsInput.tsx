@@ -1,8 +1,9 @@
 /** How many seeds, and for those who care, which. */
 import { Anchor, NumberInput, Stack, Text, TextInput } from '@mantine/core'
 import { useState } from 'react'
-import { fieldId, parseNumbers } from './FieldInput'
+import { fieldId } from './FieldInput'
 import type { Field } from './layout'
+import { parseNumbers } from './NumbersText'
 import { problemOf } from './problems'
 import type { Json } from './schema'
 import type { Form } from './useForm'

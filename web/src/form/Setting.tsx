@@ -5,16 +5,26 @@ import classes from './form.module.css'
 import type { Json, Schema } from './schema'
 
 interface SettingProps {
+  /** Beside its description. */
+  more?: React.ReactNode
   schema: Schema
   value: Json
   error: string | undefined
   onChange: (value: Json) => void
 }
 
-export function Setting({ schema, value, error, onChange }: SettingProps) {
+export function Setting({ schema, value, error, more, onChange }: SettingProps) {
+  const description = more ? (
+    <>
+      {schema.description}
+      {more}
+    </>
+  ) : (
+    schema.description
+  )
   const common = {
     label: schema.title,
-    description: schema.description,
+    description,
     error,
     size: 'xs' as const,
     inputWrapperOrder: ['label', 'input', 'error', 'description'] as (

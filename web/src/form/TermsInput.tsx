@@ -1,15 +1,18 @@
 /** A list of objects of several kinds, such as a reward's terms: a row for each, with its own few settings. */
 import { ActionIcon, Button, Input, Menu, Text } from '@mantine/core'
+import { useContext } from 'react'
 import { IconTrash } from '../components/icons'
 import { fieldId } from './FieldInput'
 import classes from './form.module.css'
-import type { Field } from './layout'
+import { type Field, settingsInTerms } from './layout'
 import { PresetSelect } from './PresetSelect'
 import { problemOf } from './problems'
+import { SearchInput, TryMany } from './SearchInput'
 import { Setting } from './Setting'
 import { branches, defaults, type Json, resolve, type Schema, withoutNull } from './schema'
+import { freshSearch, SearchContext, searchKey, useSearched } from './search'
 import type { Form } from './useForm'
-import { pathKey, valueAt } from './values'
+import { pathKey, valueAt, withValue } from './values'
 
 interface TermsInputProps {
   field: Field & { kind: 'terms' }
@@ -25,6 +28,8 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
   const kinds = branches(field.item, root)
   const tag = field.item.discriminator?.propertyName ?? 'name'
   const set = (next: Term[]) => form.set(field.path, next)
+  const numbers = settingsInTerms(field, root, form.values).filter(({ kind }) => kind === 'number')
+  const search = useContext(SearchContext)
   const left = kinds.filter(
     ({ tag: kind }) => kind === 'formula' || !terms.some((term) => term[tag] === kind),
   )
@@ -35,6 +40,18 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
     if (!branch) return
     const term = defaults(branch.schema, root) as Term
     set([...terms, 'label' in term ? { ...term, label: freeLabel(String(term.label), terms) } : term])
+  }
+
+  /** A formula is searched by its name: when that changes, the search stays with it. */
+  function takeSearchAlong(index: number, label: Json) {
+    const path = [...field.path, index]
+    const from = searchKey([...path, 'weight'], form.values)
+    const to = searchKey([...path, 'weight'], withValue(form.values, [...path, 'label'], label))
+    const own = terms.filter((term) => term.label === terms[index]?.label).length === 1
+    const searched = search?.searched[from]
+    if (!search || !searched || !own || to in search.searched) return
+    search.set(from, null)
+    search.set(to, searched)
   }
 
   return (
@@ -59,12 +76,16 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
               {Object.entries(kind?.schema.properties ?? {})
                 .filter(([name]) => name !== tag)
                 .map(([name, one]) => (
-                  <Setting
+                  <TermSetting
                     key={name}
+                    setting={numbers.find((each) => each.key === `${key}.${name}`)}
                     schema={withoutNull(resolve(one, root)).schema}
                     value={term[name] ?? null}
-                    error={problemOf(form.problems, `${key}.${name}`)}
-                    onChange={(next) => form.set([...field.path, index, name], next)}
+                    form={form}
+                    onChange={(next) => {
+                      if (name === 'label') takeSearchAlong(index, next)
+                      form.set([...field.path, index, name], next)
+                    }}
                   />
                 ))}
               <ActionIcon
@@ -101,6 +122,37 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
       )}
     </section>
   )
+}
+
+interface TermSettingProps {
+  /** Of a number, as the form knows it, to be searched. */
+  setting: Field | undefined
+  schema: Schema
+  value: Json
+  form: Form
+  onChange: (value: Json) => void
+}
+
+/** A setting of a term: one value, or what a study tries. */
+function TermSetting({ setting, schema, value, form, onChange }: TermSettingProps) {
+  const search = useSearched(setting, form.values)
+  const error = setting && problemOf(form.problems, setting.key)
+  if (setting && search?.searched)
+    return (
+      <SearchInput
+        field={setting}
+        label={schema.title}
+        searched={search.searched}
+        error={error}
+        size="xs"
+        className={classes.searched}
+        onChange={search.set}
+      />
+    )
+  const more = setting && search && (
+    <TryMany field={setting} onClick={() => search.set(freshSearch(setting, value))} />
+  )
+  return <Setting schema={schema} value={value} error={error} more={more} onChange={onChange} />
 }
 
 /** "mine", or "mine_2" where that is taken. */

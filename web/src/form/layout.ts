@@ -99,6 +99,25 @@ function fieldsAt(unresolved: Schema, root: Schema, values: Json, place: Place, 
   }
 }
 
+/** What can be set of each object in a list, such as a reward's terms: "Collision, weight". */
+export function settingsInTerms(field: Field & { kind: 'terms' }, root: Schema, values: Json): Field[] {
+  const list = valueAt(values, field.path)
+  const tag = field.item.discriminator?.propertyName ?? 'name'
+  const kinds = branches(field.item, root)
+  return (Array.isArray(list) ? list : []).flatMap((term, index) => {
+    const kind = kinds.find((one) => one.tag === valueAt(term, [tag]))
+    const own = valueAt(term, ['label'])
+    const label = typeof own === 'string' ? words(own) : kind?.label
+    return Object.entries(kind?.schema.properties ?? {})
+      .filter(([name]) => name !== tag)
+      .flatMap(([name, schema]) => {
+        const place = { path: [...field.path, index, name], trail: field.trail, advanced: field.advanced }
+        return fieldsAt(schema, root, values, place, name)
+      })
+      .map((one) => ({ ...one, label: `${label}, ${one.label.toLowerCase()}` }))
+  })
+}
+
 function properties(
   schema: Schema,
   root: Schema,

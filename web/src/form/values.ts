@@ -16,6 +16,18 @@ export function valueAt(values: Json, path: Path): Json | undefined {
   return value
 }
 
+/**
+ * The path with the names of a list's objects in place of their positions: ["terms", 1, "weight"] -> ["terms", "collision",
+ * "weight"]. So it leads to the same term when others come and go.
+ */
+export function namedPath(values: Json, path: Path): string[] {
+  return path.map((key, depth) => {
+    const list = valueAt(values, path.slice(0, depth))
+    const item = Array.isArray(list) ? valueAt(list, [key]) : undefined
+    return String(valueAt(item ?? null, ['label']) ?? valueAt(item ?? null, ['name']) ?? key)
+  })
+}
+
 /** A copy of `values` with `value` at `path`; what lies beside the path is shared, not copied. */
 export function withValue(values: Json, path: Path, value: Json): Json {
   const [key, ...rest] = path

@@ -17,12 +17,13 @@ import { Segments } from '../components/Segments'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
 import { faultsOf } from '../form/faults'
-import { fieldsOf } from '../form/layout'
+import { type Field, fieldsOf } from '../form/layout'
+import type { Problems } from '../form/problems'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
 import { START_FIELD, StartFromInput } from '../form/StartFromInput'
 import type { Json, Schema } from '../form/schema'
-import { SearchContext, settingsOf, useSearchState } from '../form/search'
+import { SearchContext, searchedFields, searchFaults, settingsOf, useSearchState } from '../form/search'
 import { type Form, useForm } from '../form/useForm'
 import { sameValue, valueAt, withValue } from '../form/values'
 import { HEADS } from '../heads'
@@ -165,6 +166,12 @@ function useCopy(original: Experiment | undefined, start: StartPolicy | undefine
   return copy
 }
 
+/** What is wrong, but for what is not set any more since it is searched. */
+function withoutThose(searched: readonly { field: Field }[], faults: Problems): Problems {
+  const keys = new Set(searched.map(({ field }) => field.key))
+  return Object.fromEntries(Object.entries(faults).filter(([key]) => !keys.has(key)))
+}
+
 /** A training without the policy that it begins with: which preset it is has nothing to do with that. */
 function fresh(training: Json): Json {
   if (training === null || typeof training !== 'object' || Array.isArray(training)) return training
@@ -197,12 +204,14 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
   const state = useForm(kept ?? initial)
   const search = useSearchState(`${draft}:search`)
   const fields = fieldsOf(schema, schema, state.values)
-  const settings = settingsOf(search.searched, fields)
+  const searched = searchedFields(search.searched, fields, schema, state.values)
+  const settings = settingsOf(searched)
   const isStudy = settings.length > 0
-  const typed = fields.filter(
-    (field) => !(field.key in search.searched) && !(isStudy && field.key === 'seeds'),
-  )
-  const faults = faultsOf(typed, schema, state.values)
+  const typed = fields.filter((field) => !(isStudy && field.key === 'seeds'))
+  const faults = {
+    ...withoutThose(searched, faultsOf(typed, schema, state.values)),
+    ...searchFaults(searched),
+  }
   const form = { ...state, problems: { ...state.problems, ...faults } }
   const [pressed, setPressed] = useState(false)
   const faulty = Object.keys(faults).length > 0

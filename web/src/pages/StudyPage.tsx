@@ -50,7 +50,11 @@ export function StudyPage() {
       </Page>
     )
   }
-  const titles = settingTitles(data.spec.settings, form.data?.schema as Schema | undefined)
+  const titles = settingTitles(
+    data.spec.settings,
+    form.data?.schema as Schema | undefined,
+    data.spec.training,
+  )
   const { as, label } = STUDY_STATES[data.state]
   return (
     <Page

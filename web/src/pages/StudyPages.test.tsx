@@ -168,3 +168,83 @@ test('a range in the form makes a study of the training, refused at its field', 
   await user.click(screen.getByRole('button', { name: 'One value of Steps' }))
   expect(screen.getByRole('button', { name: 'Launch' })).toBeVisible()
 })
+
+test('weights of a reward and hidden layers are searched, a weight where its term stands by then', async () => {
+  const server = startServer({
+    'GET /api/training/form': form,
+    'POST /api/studies': refusal(422, [
+      {
+        loc: ['body', 'training', 'task', 'reward', 'terms', '0', 'weight'],
+        msg: 'that is refused',
+        type: 'refused',
+      },
+    ]),
+  })
+  const { user } = open('/new')
+  await user.click(await screen.findByRole('button', { name: /^Advanced/ }))
+  await user.click(screen.getByRole('button', { name: 'Try a range: Progress, weight' }))
+  await user.click(screen.getByRole('button', { name: 'Try several: Hidden layers' }))
+  const second = screen.getByRole('textbox', { name: 'Hidden layers, choice 2' })
+  expect(second).toHaveValue('128, 128')
+  await user.clear(second)
+  await user.type(second, '96, 2')
+  expect(screen.getByText('Each must be 4 to 1 024.')).toBeVisible()
+  await user.click(screen.getByRole('button', { name: 'Launch the study' }))
+  expect(server.changes).toEqual([])
+  await user.clear(second)
+  await user.type(second, '96')
+  await user.click(screen.getByRole('button', { name: 'Another choice of Hidden layers' }))
+  await user.click(screen.getByRole('button', { name: 'Remove choice 4 of Hidden layers' }))
+  // The first term goes: the second is the first now, and still the one that is searched.
+  await user.click(screen.getByRole('button', { name: 'Remove Arrival' }))
+  await user.click(screen.getByRole('button', { name: 'Launch the study' }))
+  expect((await screen.findAllByText(/That is refused/)).length).toBeGreaterThan(1)
+  expect(server.changes[0]?.body).toMatchObject({
+    settings: [
+      { kind: 'range', path: 'task.reward.terms.0.weight', low: 50, high: 5000, log: true },
+      {
+        kind: 'list',
+        path: 'algorithm.network.hidden_sizes',
+        values: [[64, 64], [96], [256, 256]],
+      },
+    ],
+  })
+})
+
+test('a study of weights and layers names both in its charts and its table', async () => {
+  const [weight, layers] = ['task.reward.terms.1.weight', 'algorithm.network.hidden_sizes']
+  const both = (number: number, sizes: number[]) =>
+    trial(number, { values: { [weight]: -50, [layers]: sizes } })
+  startServer({
+    ...routes,
+    'GET /api/studies/st1': {
+      ...study,
+      spec: {
+        ...study.spec,
+        settings: [
+          { kind: 'range', path: weight, low: -400, high: -25, log: true, points: 5 },
+          {
+            kind: 'list',
+            path: layers,
+            values: [
+              [64, 64],
+              [256, 256],
+            ],
+          },
+        ],
+      },
+      results: [both(1, [64, 64]), both(2, [256, 256])],
+    },
+  })
+  open('/studies/st1')
+  const table = await screen.findByRole('table', { name: 'Trials' })
+  expect(within(table).getByRole('columnheader', { name: 'Progress, weight' })).toBeVisible()
+  expect(screen.getAllByTestId('trial')[0]).toHaveTextContent(/−50256, 256/)
+  const layersChart = screen.getByRole('img', { name: 'Success by Hidden layers' })
+  const [first, other] = [...layersChart.querySelectorAll('circle')].map((one) =>
+    Number(one.getAttribute('cx')),
+  )
+  expect(other).toBeGreaterThan(first ?? 0)
+  const weights = screen.getByRole('img', { name: 'Success by Progress, weight' })
+  expect(weights).toHaveTextContent('−100')
+})

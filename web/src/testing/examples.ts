@@ -572,7 +572,8 @@ export const form = {
           name: { type: 'string', const: 'mlp', title: 'MLP', default: 'mlp' },
           hidden_sizes: {
             type: 'array',
-            items: { type: 'integer' },
+            items: { type: 'integer', minimum: 4, maximum: 1024 },
+            minItems: 1,
             title: 'Hidden layers',
             default: [64, 64],
             ...ADVANCED,

@@ -2,8 +2,9 @@
 import { type Axis, choices, numbers } from '../../charts/axis'
 import type { Point } from '../../charts/Scatter'
 import { labelsOf } from '../../form/labels'
-import type { Schema } from '../../form/schema'
+import type { Json, Schema } from '../../form/schema'
 import { settingText } from '../../form/settingText'
+import { namedPath, sameValue } from '../../form/values'
 import { count, duration, percent, significant } from '../../lib/format'
 import type { SearchedSetting, Study, Trial } from './study'
 
@@ -43,13 +44,18 @@ export function settingAxis(setting: SearchedSetting): Axis {
     : numbers([setting.low, setting.high], (value) => significant(value, 3), { log: setting.log ?? false })
 }
 
-/** What a setting is called: "Learning rate"; with its heading where two are called alike. */
-export function settingTitles(settings: readonly SearchedSetting[], schema: Schema | undefined): string[] {
-  const labels = settings.map(({ path }) =>
-    schema ? labelsOf(schema, ['training', ...path.split('.')]) : path.split('.'),
-  )
+/** What a setting is called: "Learning rate"; with its heading where two are called alike, or it is a reward's term's. */
+export function settingTitles(
+  settings: readonly SearchedSetting[],
+  schema: Schema | undefined,
+  training: unknown,
+): string[] {
+  const paths = settings.map(({ path }) => path.split('.'))
+  const named = paths.map((path) => namedPath(training as Json, path))
+  const labels = named.map((path) => (schema ? labelsOf(schema, ['training', ...path]) : path))
   return labels.map((label, index) => {
     const last = label.at(-1) ?? ''
+    if (!sameValue(paths[index], named[index])) return `${label.at(-2)}, ${last.toLowerCase()}`
     const alike = labels.some((other, at) => at !== index && other.at(-1) === last)
     return alike ? label.slice(-2).join(', ') : last
   })
