@@ -124,6 +124,8 @@ class Study(Base):
     suite_hash: Mapped[str | None] = mapped_column(String(64))
     # Share of each setting, by its path; null before there is anything to say.
     importances: Mapped[dict[str, float] | None] = mapped_column(JSON(none_as_null=True))
+    # How sure they are: `trials` that they are of, `spans` of each by its path; null before they were looked at.
+    importance_intervals: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     # The trial whose settings were trained anew with fresh seeds, and that training; no foreign key: it may be deleted.
     judged_trial: Mapped[int | None] = mapped_column(Integer)
     judgement_id: Mapped[str | None] = mapped_column(String(16))

@@ -23,6 +23,7 @@ from server.ids import new_id
 from server.runs import states
 from server.runs.service import RunService, stop_run
 from server.services import Services
+from server.studies.importance_intervals import intervals
 from server.studies.proposals import importances, propose
 from server.studies.repository import StudyRepository
 from server.studies.schemas import JUDGES, StudySpec
@@ -80,6 +81,9 @@ class StudyMover:
         """Do what is due."""
         with self._services.database.read() as session:
             study = StudyRepository(session).get(self._id)
+        if study.state not in ("running", "judging"):
+            self._weigh_late(study)
+            return
         spec = spec_of(study)
         if study.state == "judging":
             self._end_judgement(study)
@@ -147,10 +151,27 @@ class StudyMover:
     def _weigh(self, spec: StudySpec) -> None:
         with self._services.database.read() as session:
             trials = StudyRepository(session).trials(self._id)
-        found = importances(space_of(spec), [told(trial) for trial in trials])
+        space = space_of(spec)
+        found = importances(space, [told(trial) for trial in trials])
         if found:
+            complete = [trial for trial in trials if trial.state == "complete"]
+            spans = intervals(space, [trial.values for trial in complete], [trial.score or 0.0 for trial in complete])
+            sure = {"trials": len(complete), "spans": spans}
             with self._services.database.write() as session:
-                StudyRepository(session).note(self._id, importances=found)
+                StudyRepository(session).note(self._id, importances=found, importance_intervals=sure)
+
+    def _weigh_late(self, study: tables.Study) -> None:
+        """What an older version has ended, or came from another server: once, whatever comes of it."""
+        with self._services.database.write() as session:
+            repository = StudyRepository(session)
+            complete = repository.counts([self._id])[self._id].get("complete", 0)
+            repository.note(self._id, importance_intervals={"trials": complete, "spans": {}})
+        try:
+            self._weigh(spec_of(study))
+        except (ValueError, KeyError):
+            logger.warning(
+                "study %s has settings that this version can't weigh: its importances stay as they were", self._id
+            )
 
     def _ask(self, spec: StudySpec) -> bool:
         """Whether there may be more to ask for."""

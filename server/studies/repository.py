@@ -15,6 +15,10 @@ _Study = tables.Study
 _Trial = tables.StudyTrial
 
 
+# How sure its importances are was never asked: an older version has ended it, or it came from another server.
+_UNWEIGHED = _Study.importances.is_not(None) & _Study.importance_intervals.is_(None)
+
+
 class StudyRepository:
     """Reads and writes studies within the caller's transaction."""
 
@@ -47,7 +51,7 @@ class StudyRepository:
 
     def going_on(self) -> list[str]:
         """The ids of those that have something to do, the oldest first."""
-        query = select(_Study.id).where(_Study.state.in_(("running", "judging"))).order_by(_Study.created_at)
+        query = select(_Study.id).where(_Study.state.in_(("running", "judging")) | _UNWEIGHED).order_by(_Study.created_at)
         return list(self._session.scalars(query))
 
     def trials(self, study_id: str, state: TrialState | None = None) -> Sequence[tables.StudyTrial]:

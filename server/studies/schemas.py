@@ -1,6 +1,6 @@
 """Studies in JSON: what is sent to launch one, and what is read back."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -102,6 +102,23 @@ class ListedStudy(Schema):
     best_success: float | None = Field(description="Of the best trial, by its tuning seeds; null before one is complete.")
 
 
+class Span(Schema):
+    """From where to where."""
+
+    low: float
+    high: float
+
+
+class ImportanceIntervals(Schema):
+    """How sure the importances are: what they might have been, had other trials been drawn."""
+
+    unit: Literal["trials"] = Field("trials", description="What was resampled.")
+    trials: int = Field(description="Complete ones, of which each resample draws as many.")
+    resamples: int = Field(description="By whose importances the ends of the intervals are.")
+    spans: dict[str, Span] = Field(description="Of each setting 95 %, 0 to 1; empty where they can't be told.")
+    told: str = Field(description="What they are over, or why there are none.")
+
+
 class Study(ListedStudy):
     """A study with its trials."""
 
@@ -116,6 +133,7 @@ class Study(ListedStudy):
         description="How much each setting had to do with being among the best (PED-ANOVA), together 1; null before "
         "that can be said."
     )
+    importance_intervals: ImportanceIntervals | None = Field(description="Null where importances are.")
     judgement: Judgement | None = Field(description="Null before all trials are through.")
 
 

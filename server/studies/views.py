@@ -1,14 +1,16 @@
 """Studies' rows as JSON shows them."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from server.checkpoints.views import success_over_runs
 from server.database import tables
 from server.experiments.repository import aggregate_state
 from server.experiments.stored import read_training
 from server.studies.advance import best_of
+from server.studies.importance_intervals import LEAST_FOR_INTERVALS, RESAMPLES
 from server.studies.rules import RULE, rungs_of
-from server.studies.schemas import Judgement, ListedStudy, Study, StudySpec, Trial
+from server.studies.schemas import ImportanceIntervals, Judgement, ListedStudy, Span, Study, StudySpec, Trial
 
 _THROUGH = ("complete", "pruned", "failed")
 
@@ -64,6 +66,7 @@ def study_view(
         best=best.number + 1 if best else None,
         front=front(trials),
         importances=study.importances,
+        importance_intervals=_importance_intervals(study.importance_intervals),
         judgement=_judgement(study, judgement, finals) if judgement else None,
     )
 
@@ -112,6 +115,23 @@ def _seconds_left(
         return None
     left = study.budget - sum(trial.progress for trial in results)
     return left * sum(took) / len(took) / at_once
+
+
+def _importance_intervals(found: Mapping[str, Any] | None) -> ImportanceIntervals | None:
+    if found is None:
+        return None
+    trials = found["trials"]
+    if found["spans"]:
+        told = f"95 % intervals over trials, by {RESAMPLES} bootstrap samples of the {trials} complete ones."
+    elif trials < LEAST_FOR_INTERVALS:
+        told = (
+            f"How sure that is can't be told from {trials} complete trials, of which the best tenth is one or two: "
+            f"from {LEAST_FOR_INTERVALS} on there are intervals."
+        )
+    else:
+        told = "How sure that is can't be told: its trials did alike, or this version can't read their settings."
+    spans = {path: Span(low=low, high=high) for path, (low, high) in found["spans"].items()}
+    return ImportanceIntervals(trials=trials, resamples=RESAMPLES, spans=spans, told=told)
 
 
 def _judgement(study: tables.Study, experiment: tables.Experiment, finals: Mapping[str, tables.Evaluation]) -> Judgement:

@@ -8,9 +8,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.app import create_services
+from server.database import tables
 from server.services import Services
 from server.settings import Settings
 from server.studies.advance import advance, fresh_seeds
+from server.studies.repository import StudyRepository
 from server.studies.schemas import JUDGES
 from tests.server.harness import Reports
 
@@ -289,6 +291,54 @@ def test_trials_stay_out_of_the_table_of_trainings_and_of_leaderboards(
     asked = client.get("/api/experiments", params={"query": f"study = {study['id']}"}).json()["items"]
     assert [(row["name"], row["study_id"]) for row in asked] == [("Search, trial 1", study["id"])]
     assert client.get("/api/leaderboards/hash-a").status_code == 404
+
+
+def weighed(services: Services, study_id: str, trials: int) -> None:
+    """As if so many trials were complete, of which those with a small step size did well."""
+    with services.database.write() as session:
+        for number in range(trials):
+            values = {LEARNING_RATE["path"]: 10 ** (-4 + 2 * number / trials), EPOCHS["path"]: (2, 4, 8)[number % 3]}
+            row = tables.StudyTrial(study_id=study_id, number=number, values=values, rungs={}, state="complete")
+            row.success = row.score = 1.0 - number / trials
+            session.add(row)
+        StudyRepository(session).note(study_id, asked=trials, budget=trials, state="done", importances={"a": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("trials", "told"), [(40, "of the 40 complete ones"), (12, "can't be told from 12 complete trials")]
+)
+def test_importances_that_another_version_left_get_their_intervals_once(
+    client: TestClient, services: Services, database_url: str, move: Callable[[], int], trials: int, told: str
+) -> None:
+    study = launch(client, trials=1)
+    weighed(services, study["id"], trials)
+    assert look(client, study)["importance_intervals"] is None
+    assert move() == 1
+    now = look(client, study)
+    sure = now["importance_intervals"]
+    assert (sure["unit"], sure["trials"]) == ("trials", trials)
+    assert told in sure["told"]
+    share = now["importances"][LEARNING_RATE["path"]]
+    assert share > 0.8
+    if trials == 40:
+        span = sure["spans"][LEARNING_RATE["path"]]
+        assert 0.0 < span["low"] < share <= span["high"] <= 1.0
+    else:
+        assert sure["spans"] == {}
+    # Nothing has changed since: nothing is computed again.
+    assert move() == 0
+
+
+def test_a_study_that_this_version_can_not_read_is_weighed_no_more_than_once(
+    client: TestClient, services: Services, move: Callable[[], int]
+) -> None:
+    study = launch(client, trials=1)
+    weighed(services, study["id"], 40)
+    with services.database.write() as session:
+        row = StudyRepository(session).get(study["id"])
+        row.spec = row.spec | {"settings": [{**LEARNING_RATE, "path": "algorithm.of_another_version"}]}
+    assert (move(), move()) == (1, 0)
+    assert look(client, study)["importance_intervals"]["spans"] == {}
 
 
 def test_a_deleted_study_leaves_its_trials_in_the_trash(client: TestClient, move: Callable[[], int]) -> None:

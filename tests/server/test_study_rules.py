@@ -1,15 +1,18 @@
 """What a study tries next, how good it finds a trial, and when it stops one, by hand."""
 
+import math
 from typing import Any
 
+import numpy as np
 import optuna
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
 from server.database.tables import StudyTrial
 from server.studies.designs import grid_point, grid_size, grid_values, quasi_point
+from server.studies.importance_intervals import LEAST_FOR_INTERVALS, intervals, shares
 from server.studies.proposals import SamplerName, Told, importances, propose, trial_seed
 from server.studies.rules import hopeless, rungs_of, score
 from server.studies.space import ListedSetting, RangedSetting, Space, Value, Values
@@ -31,14 +34,14 @@ def space(*settings: RangedSetting | ListedSetting) -> Space:
     return Space(TrainingConfig().model_dump(mode="json"), settings)
 
 
-def number(value: Value) -> float:
+def as_number(value: Value) -> float:
     assert isinstance(value, int | float)
     return float(value)
 
 
 def quality(values: Values) -> float:
     """Highest for five epochs and a constant rate."""
-    return -abs(number(values["algorithm.epochs"]) - 5) - (values["algorithm.learning_rate_schedule"] == "linear")
+    return -abs(as_number(values["algorithm.epochs"]) - 5) - (values["algorithm.learning_rate_schedule"] == "linear")
 
 
 class Uninterrupted:
@@ -98,9 +101,46 @@ def test_the_sampler_goes_on_where_trials_did_well() -> None:
 def test_importances_name_what_mattered() -> None:
     ours = space(RATE, EPOCHS, SCHEDULE)
     drawn = [quasi_point(ours, 0, number) for number in range(64)]
-    shares = importances(ours, [Told(each, "complete", -abs(number(each[EPOCHS.path]) - 5)) for each in drawn])
+    shares = importances(ours, [Told(each, "complete", -abs(as_number(each[EPOCHS.path]) - 5)) for each in drawn])
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares[EPOCHS.path] > 0.8
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 1000), trials=st.integers(LEAST_FOR_INTERVALS, 120), distinct=st.integers(2, 40))
+def test_importances_on_counts_are_those_of_optuna(seed: int, trials: int, distinct: int) -> None:
+    """Of floats, whole numbers, penalties by ratio and lists; with trials that did alike, which are all among the best."""
+    whole = RangedSetting(kind="range", path="algorithm.robots", low=8, high=512, log=True)
+    ours = Space(
+        TrainingConfig(algorithm=PpoConfig(network=MlpNetwork())).model_dump(mode="json"),
+        [RATE, EPOCHS, SCHEDULE, LAYERS, COLLISION, whole],
+    )
+    drawn = np.random.default_rng(seed)
+    tried = [propose(ours, "random", seed, [Told({}, "failed")] * number) for number in range(trials)]
+    scores = [float(drawn.integers(distinct)) / 40 for _ in tried]
+    optunas = importances(ours, [Told(values, "complete", score) for values, score in zip(tried, scores, strict=True)])
+    if optunas:
+        assert shares(ours, tried, scores) == pytest.approx(optunas, abs=1e-9)
+
+
+def test_an_interval_holds_what_many_trials_say_and_few_trials_tell_none() -> None:
+    ours = space(RATE, EPOCHS, SCHEDULE)
+
+    def some(seed: int, number: int) -> tuple[list[Values], list[float]]:
+        tried = [propose(ours, "random", seed, [Told({}, "failed")] * before) for before in range(number)]
+        return tried, [quality(each) - abs(math.log10(as_number(each[RATE.path])) + 3) for each in tried]
+
+    truth = shares(ours, *some(99, 3_000))
+    held = 0
+    for seed in range(8):
+        found = intervals(ours, *some(seed, 60))
+        assert found == intervals(ours, *some(seed, 60))
+        assert all(0.0 <= low < high <= 1.0 for low, high in found.values())
+        held += sum(low <= truth[path] <= high for path, (low, high) in found.items())
+    assert held >= 20
+    assert intervals(ours, *some(0, LEAST_FOR_INTERVALS - 1)) == {}
+    tried, _ = some(0, 40)
+    assert intervals(ours, tried, [0.5] * 40) == {}
 
 
 def test_of_failed_trials_nothing_is_learned() -> None:
@@ -124,7 +164,7 @@ def test_every_proposal_is_within_its_ranges(seed: int, number: int, sampler: Sa
     ours = space(RATE, EPOCHS, SCHEDULE)
     told = [Told({RATE.path: 1e-3, EPOCHS.path: 4, SCHEDULE.path: "linear"}, "failed")] * number
     values = propose(ours, sampler, seed, told)
-    assert 1e-4 <= number(values[RATE.path]) <= 1e-2
+    assert 1e-4 <= as_number(values[RATE.path]) <= 1e-2
     assert values[EPOCHS.path] in range(2, 10)
     assert type(values[EPOCHS.path]) is int
     assert values[SCHEDULE.path] in ("linear", "constant")
@@ -178,9 +218,9 @@ def test_a_grid_takes_every_combination_once_in_a_drawn_order() -> None:
 def test_quasi_random_points_fill_the_space_evenly() -> None:
     ours = space(RATE, EPOCHS, SCHEDULE)
     points = [quasi_point(ours, 0, number) for number in range(16)]
-    assert sorted(number(point[EPOCHS.path]) for point in points) == [epochs for epochs in range(2, 10) for _ in range(2)]
+    assert sorted(as_number(point[EPOCHS.path]) for point in points) == [epochs for epochs in range(2, 10) for _ in range(2)]
     assert sum(point[SCHEDULE.path] == "linear" for point in points) == 8
-    assert sum(number(point[RATE.path]) < 1e-3 for point in points) == 8
+    assert sum(as_number(point[RATE.path]) < 1e-3 for point in points) == 8
 
 
 def test_success_comes_first_then_time() -> None:

@@ -84,6 +84,22 @@ class Judgement(Model):
     success: Estimate | None
 
 
+class Span(Model):
+    """From where to where."""
+
+    low: float
+    high: float
+
+
+class ImportanceIntervals(Model):
+    """95 % intervals of a study's importances over its complete trials; `told` says of what, or why there are none."""
+
+    unit: Literal["trials"]
+    trials: int
+    spans: dict[str, Span]
+    told: str
+
+
 class Study(Model):
     """A search over settings of a training. `trials` may be had, `asked` were; `best` is a trial's number."""
 
@@ -103,6 +119,7 @@ class Study(Model):
     best_success: float | None
     results: list[Trial]
     importances: dict[str, float] | None
+    importance_intervals: ImportanceIntervals | None = None
     judgement: Judgement | None
 
 

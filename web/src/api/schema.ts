@@ -6950,6 +6950,41 @@ export interface components {
             detail?: components["schemas"]["ValidationError"][];
         };
         /**
+         * ImportanceIntervals
+         * @description How sure the importances are: what they might have been, had other trials been drawn.
+         */
+        ImportanceIntervals: {
+            /**
+             * Resamples
+             * @description By whose importances the ends of the intervals are.
+             */
+            resamples: number;
+            /**
+             * Spans
+             * @description Of each setting 95 %, 0 to 1; empty where they can't be told.
+             */
+            spans: {
+                [key: string]: components["schemas"]["Span"];
+            };
+            /**
+             * Told
+             * @description What they are over, or why there are none.
+             */
+            told: string;
+            /**
+             * Trials
+             * @description Complete ones, of which each resample draws as many.
+             */
+            trials: number;
+            /**
+             * Unit
+             * @description What was resampled.
+             * @default trials
+             * @constant
+             */
+            unit: "trials";
+        };
+        /**
          * ImportedArenaConfig
          * @description An arena from a file. A worker and a checkpoint carry its geometry; the service may leave it to the hash.
          */
@@ -11688,6 +11723,16 @@ export interface components {
             weight: number;
         };
         /**
+         * Span
+         * @description From where to where.
+         */
+        Span: {
+            /** High */
+            high: number;
+            /** Low */
+            low: number;
+        };
+        /**
          * SparedCheckpoint
          * @description A checkpoint that a rule would take, and that stays.
          */
@@ -12083,6 +12128,8 @@ export interface components {
             front: number[];
             /** Id */
             id: string;
+            /** @description Null where importances are. */
+            importance_intervals: components["schemas"]["ImportanceIntervals"] | null;
             /**
              * Importances
              * @description How much each setting had to do with being among the best (PED-ANOVA), together 1; null before that can be said.

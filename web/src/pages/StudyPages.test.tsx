@@ -56,6 +56,7 @@ const study: Study = {
   best: 2,
   front: [2],
   importances: null,
+  importance_intervals: null,
   judgement: null,
 }
 const routes = { 'GET /api/studies/st1': study, 'GET /api/training/form': form }
@@ -82,7 +83,17 @@ test('a study shows its trials, what is left, and the rule by which trials are s
 test('its charts hold the complete trials alone, and importances once they are known', async () => {
   startServer({
     ...routes,
-    'GET /api/studies/st1': { ...study, importances: { [path]: 1 } },
+    'GET /api/studies/st1': {
+      ...study,
+      importances: { [path]: 1 },
+      importance_intervals: {
+        unit: 'trials',
+        trials: 34,
+        resamples: 200,
+        spans: { [path]: { low: 0.62, high: 1 } },
+        told: '95 % intervals over trials, by 200 bootstrap samples of the 34 complete ones.',
+      },
+    },
   })
   open('/studies/st1')
   const history = await screen.findByRole('img', { name: /^Success of each trial/ })
@@ -95,7 +106,21 @@ test('its charts hold the complete trials alone, and importances once they are k
   const [first, second] = [...slices.querySelectorAll('circle')].map((one) => Number(one.getAttribute('cx')))
   expect(((second ?? 0) - (first ?? 0)) / 366).toBeCloseTo(Math.log10(2) / 2, 2)
   expect(screen.getByTestId('parallel').querySelectorAll('polyline')).toHaveLength(2)
-  expect(screen.getByText('100 %', { selector: 'dd' })).toBeVisible()
+  const importance = screen.getByRole('table', { name: 'Importance of each setting' })
+  expect(importance).toHaveTextContent(/Learning rate100 %62\.0\s% to 100 %/)
+  expect(screen.getByText(/intervals over trials, by 200 bootstrap samples of the 34/)).toBeVisible()
+})
+
+test('of few trials it is said that how sure importances are can not be told', async () => {
+  const told = "How sure that is can't be told from 12 complete trials."
+  const none = { unit: 'trials' as const, trials: 12, resamples: 200, spans: {}, told }
+  startServer({
+    ...routes,
+    'GET /api/studies/st1': { ...study, importances: { [path]: 1 }, importance_intervals: none },
+  })
+  open('/studies/st1')
+  expect(await screen.findByText(/can't be told from 12/)).toBeVisible()
+  expect(screen.getByRole('table', { name: 'Importance of each setting' })).toHaveTextContent('100 %–')
 })
 
 test('one that is done says what its best is worth on fresh seeds, and can go on', async () => {

@@ -82,37 +82,55 @@ export function StudyCharts({ study, titles }: { study: Study; titles: readonly 
   )
 }
 
-/** Complete trials below which importances are said to be a guess. */
-const ENOUGH = 30
-
 function Importances({ study, titles }: { study: Study; titles: readonly string[] }) {
-  const { importances, spec } = study
+  const { importances, importance_intervals: sure, spec } = study
   if (importances === null)
     return (
       <Text size="sm" c="dimmed">
         Said once eight trials are complete, and differ.
       </Text>
     )
-  const trials = complete(study).length
   const shares = spec.settings
-    .map(({ path }, index) => ({ path, title: titles[index], share: importances[path] ?? 0 }))
+    .map(({ path }, index) => ({
+      path,
+      title: titles[index],
+      share: importances[path] ?? 0,
+      span: sure?.spans[path],
+    }))
     .sort((a, b) => b.share - a.share)
   return (
     <>
-      <dl className={classes.importances}>
-        {shares.map(({ path, title, share }) => (
-          <div key={path}>
-            <dt>{title}</dt>
-            <dd>
-              <span className={classes.bar} style={{ width: `${share * 100}%` }} />
-              {percent(share)}
-            </dd>
-          </div>
-        ))}
-      </dl>
+      <table className={classes.importances} aria-label="Importance of each setting">
+        <thead>
+          <tr>
+            <th scope="col">Setting</th>
+            <th scope="col">Share</th>
+            <th scope="col">95 % interval</th>
+          </tr>
+        </thead>
+        <tbody>
+          {shares.map(({ path, title, share, span }) => (
+            <tr key={path}>
+              <th scope="row">
+                {title}
+                <span className={classes.scale} aria-hidden>
+                  <span className={classes.bar} style={{ width: `${share * 100}%` }} />
+                  {span && (
+                    <span
+                      className={classes.span}
+                      style={{ left: `${span.low * 100}%`, width: `${(span.high - span.low) * 100}%` }}
+                    />
+                  )}
+                </span>
+              </th>
+              <td>{percent(share)}</td>
+              <td>{span ? `${percent(span.low)} to ${percent(span.high)}` : '–'}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
       <Text size="xs" c="dimmed" mt="sm">
-        How much each had to do with being among the best tenth (PED-ANOVA), an estimate from {trials}{' '}
-        complete trials{trials < ENOUGH ? ': so few may well tell otherwise with others' : ''}.
+        How much each had to do with being among the best tenth (PED-ANOVA). {sure?.told}
       </Text>
     </>
   )
