@@ -8,7 +8,14 @@ from server.security.permissions import LAUNCH, SIGNED_IN, edit
 from server.security.principal import PrincipalDep
 from server.services import ServicesDep
 from server.uploads import service
-from server.uploads.schemas import MAX_UPLOAD_BYTES, PolicyUpload, UploadedPolicy, UploadedPolicyPage
+from server.uploads.schemas import (
+    MAX_UPLOAD_BYTES,
+    PolicyShapes,
+    PolicyTask,
+    PolicyUpload,
+    UploadedPolicy,
+    UploadedPolicyPage,
+)
 
 router = APIRouter(prefix="/api/uploads", tags=["policies"])
 
@@ -17,6 +24,12 @@ router = APIRouter(prefix="/api/uploads", tags=["policies"])
 def upload_policy(upload: PolicyUpload, services: ServicesDep, principal: PrincipalDep) -> UploadedPolicy:
     """Keep an ONNX file, to be measured as any other policy."""
     return service.upload(services, upload, principal)
+
+
+@router.post("/shapes", dependencies=[LAUNCH])
+def get_policy_shapes(wanted: PolicyTask) -> PolicyShapes:
+    """What an ONNX file has to take and give for a robot, its LiDAR and an observation."""
+    return service.shapes(wanted.task)
 
 
 @router.get("", dependencies=[SIGNED_IN])

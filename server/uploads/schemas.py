@@ -26,6 +26,38 @@ class PolicyUpload(Schema):
     )
 
 
+class PolicyTask(Schema):
+    """What a policy is for."""
+
+    task: TaskConfig = Field(description="Its robot, LiDAR, observation and limits.")
+
+
+class ObservedPart(Schema):
+    """A part of an observation."""
+
+    name: str
+    numbers: int = Field(description="Of all its moments.")
+
+
+class ActionRange(Schema):
+    """A number of an action: a fraction of the robot's limit, in the limit's unit."""
+
+    name: str
+    low: float
+    high: float
+    unit: str
+
+
+class PolicyShapes(Schema):
+    """What a file has to take and give to be a task's policy."""
+
+    observation: int = Field(description="Numbers of its input `observation`.")
+    parts: list[ObservedPart] = Field(description="In the order of the newest moment.")
+    actions: list[ActionRange] = Field(
+        description="What the numbers of its output `action` command, from fraction to limit."
+    )
+
+
 class UploadedPolicy(Schema):
     """A policy that was uploaded."""
 

@@ -16,8 +16,18 @@ from server.security.principal import Principal
 from server.services import Services
 from server.uploads.look import problem_of
 from server.uploads.repository import UploadRepository
-from server.uploads.schemas import MAX_FILE_BYTES, PolicyUpload, UploadedPolicy, UploadedPolicyPage
+from server.uploads.schemas import (
+    MAX_FILE_BYTES,
+    ActionRange,
+    ObservedPart,
+    PolicyShapes,
+    PolicyUpload,
+    UploadedPolicy,
+    UploadedPolicyPage,
+)
+from sim.actions import action_layout
 from sim.config import TaskConfig
+from sim.observations import observation_layout
 from workers.packed import UNPACKING_ERRORS
 
 MAX_UPLOADS = 500
@@ -74,6 +84,21 @@ def upload(services: Services, wanted: PolicyUpload, principal: Principal) -> Up
         AuditRepository(session).add("policy.uploaded", target=row.id, name=row.name)
         session.flush()
         return _view(row)
+
+
+def shapes(task: TaskConfig) -> PolicyShapes:
+    """What a file has to take and give to be a task's policy."""
+    numbers: dict[str, int] = {}
+    for block in (layout := observation_layout(task)).blocks:
+        numbers[block.key] = numbers.get(block.key, 0) + len(block.numbers)
+    return PolicyShapes(
+        observation=layout.size,
+        parts=[ObservedPart(name=name, numbers=many) for name, many in numbers.items()],
+        actions=[
+            ActionRange(name=one.name, low=one.low * one.limit, high=one.limit, unit=one.unit.rstrip(","))
+            for one in action_layout(task.robot).components
+        ],
+    )
 
 
 def some(services: Services, window: Window, principal: Principal) -> UploadedPolicyPage:

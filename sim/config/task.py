@@ -24,7 +24,7 @@ class TaskConfig(Frozen):
     robot: AnyRobotConfig = Field(
         default_factory=BurgerConfig,
         title="Robot",
-        description="Its body and its limits; under Advanced each can be changed.",
+        description="Its body and its limits, each of which can be changed.",
     )
     lidar: LidarConfig = Field(default_factory=LidarConfig, title="LiDAR")
     odometry: OdometryConfig = Field(default_factory=OdometryConfig, title="Odometry")

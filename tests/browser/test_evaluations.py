@@ -75,8 +75,16 @@ def test_an_uploaded_onnx_policy_is_measured_in_an_imported_arena(context: Brows
         page.get_by_role("button", name="Upload a policy").click()
     chooser.value.set_files(mine)
     dialog = page.get_by_role("dialog")
-    dialog.get_by_role("combobox", name="Robot, LiDAR and observation as of").fill("complex")
+    # Filled in by hand for another LiDAR it is refused in words; filled in as of the policy it is taken.
+    dialog.get_by_role("textbox", name="Rays", exact=True).fill("60")
+    dialog.get_by_role("button", name="Change: settings of Ranges").click()
+    dialog.get_by_role("textbox", name="Batches").fill("60")
+    expect(dialog.get_by_test_id("shapes")).to_contain_text("ranges 60")
+    dialog.get_by_role("button", name="Upload").click()
+    expect(dialog.get_by_role("alert")).to_contain_text("and this robot, LiDAR and observation make it (n, ")
+    dialog.get_by_role("combobox", name="As of").fill("complex")
     page.get_by_role("option", name=policy.card.title, exact=True).click()
+    expect(dialog.get_by_role("textbox", name="Rays", exact=True)).to_have_value("30")
     dialog.get_by_role("button", name="Upload").click()
     expect(dialog).to_have_count(0)
 

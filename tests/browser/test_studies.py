@@ -18,6 +18,10 @@ def test_a_range_in_the_form_is_a_study_of_real_trainings(context: BrowserContex
     page.get_by_role("textbox", name="Search these settings").fill("learning rate")
     page.get_by_role("button", name="Try a range: Learning rate", exact=True).click()
     page.get_by_role("textbox", name="Learning rate, to").fill("0.02")
+    page.get_by_role("textbox", name="Search these settings").fill("")
+    page.get_by_role("button", name="Try a range: Collision, weight").click()
+    page.get_by_role("button", name="Try several: Hidden layers").click()
+    page.get_by_role("textbox", name="Hidden layers, choice 3").fill("32")
     # So many that it is far from its end when it is stopped.
     page.get_by_label("Trials", exact=True).fill("100")
     page.get_by_label("Trials at once").fill("1")
@@ -30,6 +34,9 @@ def test_a_range_in_the_form_is_a_study_of_real_trainings(context: BrowserContex
     expect(first).to_have_attribute("data-state", "complete", timeout=TRAINED)
     expect(trials.filter(has_text="Trial 2")).to_be_visible()
     expect(page.get_by_text(re.compile(r"Best by its tuning seeds: trial \d+"))).to_be_visible()
+    for title in ("Collision, weight", "Hidden layers"):
+        expect(page.get_by_role("columnheader", name=title)).to_be_visible()
+        expect(page.get_by_role("img", name=f"Success by {title}")).to_be_visible()
     expect(page.get_by_role("img", name="Success of each trial, and the best until then")).to_be_visible()
 
     page.get_by_role("button", name="Stop").click()

@@ -90,6 +90,7 @@ TABLE = {
         POST /api/evaluations
         POST /api/playgrounds/{playground_id}/arena
         POST /api/uploads
+        POST /api/uploads/shapes
         POST /api/recordings
         POST /api/reproduction
         POST /api/studies

@@ -57,6 +57,48 @@ def test_a_policy_of_another_robot_or_none_at_all_is_refused_when_it_comes(clien
     assert client.get("/api/uploads").json()["total"] == 0
 
 
+OTHER_ROBOT = {
+    "robot": {"name": "round", "max_linear_speed": 0.8, "drive": {"name": "omnidirectional", "sideways": 0.5}},
+    "lidar": {"rays": 24, "field_of_view": 270.0, "range": 8.0, "noise": 0.01},
+    "observation": {
+        "parts": [{"name": "ranges", "batches": 24, "frames": 2}, {"name": "distance"}, {"name": "bearing", "frames": 3}]
+    },
+    "control_period": 0.1,
+}
+
+
+def test_a_task_that_was_filled_in_says_what_the_file_has_to_be_and_takes_it(client: TestClient) -> None:
+    shapes = client.post("/api/uploads/shapes", json={"task": OTHER_ROBOT}).json()
+    # 24 ranges at two moments, a distance, a bearing at three.
+    assert shapes["observation"] == 52
+    assert shapes["parts"] == [
+        {"name": "ranges", "numbers": 48},
+        {"name": "distance", "numbers": 1},
+        {"name": "bearing", "numbers": 3},
+    ]
+    assert [(one["name"], one["low"], one["high"], one["unit"]) for one in shapes["actions"]] == [
+        ("linear", -0.8, 0.8, "m/s"),
+        ("lateral", -0.4, 0.4, "m/s"),
+        ("angular", -1.5, 1.5, "rad/s"),
+    ]
+    mine = upload(client, graph(numbers=52, actions=3), task=OTHER_ROBOT)
+    assert (mine["task"]["lidar"]["rays"], mine["task"]["control_period"]) == (24, 0.1)
+    (problem,) = upload(client, graph(numbers=50, actions=3), task=OTHER_ROBOT)["detail"]
+    assert "(n, 50), and this robot, LiDAR and observation make it (n, 52)" in problem["msg"]
+    (problem,) = upload(client, graph(numbers=52, actions=2), task=OTHER_ROBOT)["detail"]
+    assert "'action' is (n, 2), and this robot" in problem["msg"]
+
+
+def test_what_does_not_fit_in_a_task_is_refused_at_its_field(client: TestClient) -> None:
+    task = OTHER_ROBOT | {"lidar": {"rays": 25}}
+    for address, more in (("/api/uploads/shapes", {}), ("/api/uploads", {"name": "Mine", "content": ""})):
+        refused = client.post(address, json={"task": task, **more})
+        assert refused.status_code == 422
+        (problem,) = refused.json()["detail"]
+        assert problem["loc"] == ["body", "task", "observation"]
+        assert "24 does not divide 25" in problem["msg"]
+
+
 def test_a_file_that_takes_for_ever_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.uploads.look._SECONDS", 0.01)
     (problem,) = upload(client, graph(), task={})["detail"]

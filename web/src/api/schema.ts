@@ -2985,6 +2985,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/uploads/shapes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Get Policy Shapes
+         * @description What an ONNX file has to take and give for a robot, its LiDAR and an observation.
+         */
+        post: operations["get_policy_shapes_api_uploads_shapes_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/version": {
         parameters: {
             query?: never;
@@ -3406,6 +3426,20 @@ export interface components {
             done: string[];
             /** Left Out */
             left_out: components["schemas"]["LeftOut"][];
+        };
+        /**
+         * ActionRange
+         * @description A number of an action: a fraction of the robot's limit, in the limit's unit.
+         */
+        ActionRange: {
+            /** High */
+            high: number;
+            /** Low */
+            low: number;
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
         };
         /**
          * ActionsPart
@@ -8503,6 +8537,19 @@ export interface components {
             parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"])[];
         };
         /**
+         * ObservedPart
+         * @description A part of an observation.
+         */
+        ObservedPart: {
+            /** Name */
+            name: string;
+            /**
+             * Numbers
+             * @description Of all its moments.
+             */
+            numbers: number;
+        };
+        /**
          * OdometryConfig
          * @description How the pose that the observation is made from drifts away from the true one, from zero at every new target.
          *
@@ -9315,6 +9362,35 @@ export interface components {
              * @description Seconds since the start; 600 at most.
              */
             times: number[];
+        };
+        /**
+         * PolicyShapes
+         * @description What a file has to take and give to be a task's policy.
+         */
+        PolicyShapes: {
+            /**
+             * Actions
+             * @description What the numbers of its output `action` command, from fraction to limit.
+             */
+            actions: components["schemas"]["ActionRange"][];
+            /**
+             * Observation
+             * @description Numbers of its input `observation`.
+             */
+            observation: number;
+            /**
+             * Parts
+             * @description In the order of the newest moment.
+             */
+            parts: components["schemas"]["ObservedPart"][];
+        };
+        /**
+         * PolicyTask
+         * @description What a policy is for.
+         */
+        PolicyTask: {
+            /** @description Its robot, LiDAR, observation and limits. */
+            task: components["schemas"]["TaskConfig-Input"];
         };
         /**
          * PolicyUpload
@@ -12446,7 +12522,7 @@ export interface components {
             reward?: components["schemas"]["RewardConfig-Input"];
             /**
              * Robot
-             * @description Its body and its limits; under Advanced each can be changed.
+             * @description Its body and its limits, each of which can be changed.
              */
             robot?: components["schemas"]["BurgerConfig-Input"] | components["schemas"]["WaffleConfig-Input"] | components["schemas"]["JackalConfig-Input"] | components["schemas"]["RacecarConfig-Input"] | components["schemas"]["RidgebackConfig-Input"] | components["schemas"]["RoundConfig-Input"] | components["schemas"]["RectangularConfig-Input"];
             /**
@@ -12516,7 +12592,7 @@ export interface components {
             reward: components["schemas"]["RewardConfig-Output"];
             /**
              * Robot
-             * @description Its body and its limits; under Advanced each can be changed.
+             * @description Its body and its limits, each of which can be changed.
              */
             robot: components["schemas"]["BurgerConfig-Output"] | components["schemas"]["WaffleConfig-Output"] | components["schemas"]["JackalConfig-Output"] | components["schemas"]["RacecarConfig-Output"] | components["schemas"]["RidgebackConfig-Output"] | components["schemas"]["RoundConfig-Output"] | components["schemas"]["RectangularConfig-Output"];
             /**
@@ -19967,6 +20043,38 @@ export interface operations {
             401: components["responses"]["Unauthorized"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
+            422: components["responses"]["Refused"];
+            429: components["responses"]["TooManyAttempts"];
+            503: components["responses"]["NotNow"];
+        };
+    };
+    get_policy_shapes_api_uploads_shapes_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PolicyTask"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PolicyShapes"];
+                };
+            };
+            400: components["responses"]["Unreadable"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            408: components["responses"]["TooSlow"];
+            413: components["responses"]["TooLarge"];
             422: components["responses"]["Refused"];
             429: components["responses"]["TooManyAttempts"];
             503: components["responses"]["NotNow"];

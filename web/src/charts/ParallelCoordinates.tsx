@@ -63,6 +63,7 @@ export function ParallelCoordinates({ label, axes, lines, onOpen }: ParallelCoor
             {axis.ticks.map(({ at, label: text }) => (
               <text
                 key={`${at} ${text}`}
+                className={classes.halo}
                 x={across(index) + side * 6}
                 y={up(at) + 4}
                 textAnchor={side === 1 ? 'start' : 'end'}

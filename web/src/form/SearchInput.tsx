@@ -21,16 +21,18 @@ interface SearchInputProps {
 export function TryMany({ field, onClick }: { field: Field; onClick: () => void }) {
   const what = field.kind === 'number' ? 'Try a range' : 'Try several'
   return (
-    <Anchor
-      component="button"
-      type="button"
-      inherit
-      ml={6}
-      aria-label={`${what}: ${field.label}`}
-      onClick={onClick}
-    >
-      {what}
-    </Anchor>
+    <>
+      {' '}
+      <Anchor
+        component="button"
+        type="button"
+        inherit
+        aria-label={`${what}: ${field.label}`}
+        onClick={onClick}
+      >
+        {what}
+      </Anchor>
+    </>
   )
 }
 

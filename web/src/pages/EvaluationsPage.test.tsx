@@ -1,7 +1,7 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import type { AskedEvaluation, Leaderboard, Outcome } from '../api/types'
-import { policy } from '../testing/examples'
+import { experiment, form, policy, listed as trained, training } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -331,6 +331,63 @@ test('an evaluation is deleted after a question', async () => {
   await waitFor(() => expect(server.changes[0]?.route).toBe('DELETE /api/evaluations/ev1'))
 })
 
+test('an ONNX file is uploaded with what it is for: filled in as of a training, changed, and compared by the server', async () => {
+  const shapes = {
+    observation: 16,
+    parts: [
+      { name: 'ranges', numbers: 10 },
+      { name: 'bearing', numbers: 6 },
+    ],
+    actions: [{ name: 'linear', low: -0.125, high: 0.25, unit: 'm/s' }],
+  }
+  const own = { ...training.task, observation: 'paper' }
+  const said = 'The policy can not be used: it is (n, 15).'
+  const server = startServer({
+    ...routes,
+    'GET /api/training/form': form,
+    'GET /api/experiments': { items: [trained], total: 1 },
+    'GET /api/experiments/exp1': { ...experiment, training: { ...training, task: own } },
+    'POST /api/uploads/shapes': shapes,
+    'POST /api/uploads': refusal(422, [{ loc: ['body', 'content'], msg: said, type: 'refused' }]),
+  })
+  const { user } = open('/evaluations')
+  await screen.findByRole('button', { name: 'Upload a policy' })
+  const input = document.querySelector<HTMLInputElement>('input[accept=".onnx,.zip"]') as HTMLInputElement
+  await user.upload(input, new File(['a graph'], 'mine.onnx'))
+  const dialog = within(await screen.findByRole('dialog', { name: 'Upload mine.onnx' }))
+  expect(await dialog.findByTestId('shapes')).toHaveTextContent(
+    'takes “observation” (n, 16): ranges 10, bearing 6; and gives “action” (n, 1) in fractions of linear −0.125 to 0.25 m/s',
+  )
+  expect(dialog.getByRole('radio', { name: 'Improved' })).toBeChecked()
+  // What is paid, and where it drives, is not the policy's.
+  expect(dialog.queryByText('Arena')).toBeNull()
+  expect(dialog.queryByText('Terms')).toBeNull()
+  await user.click(dialog.getByRole('combobox', { name: 'As of' }))
+  await user.click(await screen.findByRole('option', { name: 'Corridor' }))
+  await waitFor(() => expect(dialog.getByRole('radio', { name: 'Paper' })).toBeChecked())
+  await user.click(dialog.getByRole('radio', { name: 'Improved' }))
+  await user.click(dialog.getByRole('button', { name: 'Upload' }))
+  expect(await dialog.findByRole('alert')).toHaveTextContent(said)
+  const sent = server.changes.find(({ route }) => route === 'POST /api/uploads')?.body
+  expect(sent).toMatchObject({ name: 'mine', task: { ...own, observation: 'improved' } })
+})
+
+test('what does not fit in a task is said at its field before anything is uploaded', async () => {
+  const loc = ['body', 'task', 'observation']
+  startServer({
+    ...routes,
+    'GET /api/training/form': form,
+    'POST /api/uploads/shapes': refusal(422, [
+      { loc, msg: 'batches must divide the rays', type: 'value_error' },
+    ]),
+  })
+  const { user } = open('/evaluations')
+  await screen.findByRole('button', { name: 'Upload a policy' })
+  const input = document.querySelector<HTMLInputElement>('input[accept=".onnx,.zip"]') as HTMLInputElement
+  await user.upload(input, new File(['a graph'], 'mine.onnx'))
+  expect(await screen.findByText('Batches must divide the rays')).toBeVisible()
+})
+
 test('an uploaded policy is deleted after a question', async () => {
   const mine = {
     id: 'up1',
@@ -498,6 +555,8 @@ test('what was asked for is called by what it is, and the seeds of a training ar
 test('an ONNX file is uploaded for the robot of a policy, and chosen at once; a refusal stands in the dialog', async () => {
   const server = startServer({
     ...routes,
+    'GET /api/training/form': form,
+    'POST /api/uploads/shapes': { observation: 16, parts: [], actions: [] },
     'POST /api/uploads': refusal(422, [{ loc: ['body', 'content'], msg: 'The file is empty.' }]),
   })
   const { user } = open('/evaluations')
@@ -505,9 +564,8 @@ test('an ONNX file is uploaded for the robot of a policy, and chosen at once; a 
   const input = document.querySelector('input[type=file]') as HTMLInputElement
   await user.upload(input, new File(['abc'], 'mine.onnx'))
   const dialog = await screen.findByRole('dialog', { name: 'Upload mine.onnx' })
-  expect(within(dialog).getByRole('textbox', { name: 'Name' })).toHaveValue('mine')
-  expect(within(dialog).getByRole('button', { name: 'Upload' })).toBeDisabled()
-  await user.click(within(dialog).getByRole('combobox', { name: 'Robot, LiDAR and observation as of' }))
+  expect(await within(dialog).findByRole('textbox', { name: 'Name' })).toHaveValue('mine')
+  await user.click(within(dialog).getByRole('combobox', { name: 'As of' }))
   await user.click(await screen.findByRole('option', { name: 'Crowd' }))
   await user.click(within(dialog).getByRole('button', { name: 'Upload' }))
   expect(await within(dialog).findByText('The file is empty.')).toBeInTheDocument()
