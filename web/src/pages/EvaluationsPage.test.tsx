@@ -1,7 +1,7 @@
 import { screen, waitFor, within } from '@testing-library/react'
 import { expect, test, vi } from 'vitest'
 import type { AskedEvaluation, Leaderboard, Outcome } from '../api/types'
-import { experiment, form, policy, listed as trained, training } from '../testing/examples'
+import { experiment, field, form, policy, listed as trained, training } from '../testing/examples'
 import { open } from '../testing/render'
 import { FakeEventSource, refusal, startServer } from '../testing/server'
 
@@ -579,4 +579,21 @@ test('an ONNX file is uploaded for the robot of a policy, and chosen at once; a 
     task: policy.training.task,
   })
   expect(await screen.findByRole('button', { name: 'Evaluate, 1 time' })).toBeEnabled()
+})
+
+test('families lead to their matrix, below the policies', async () => {
+  startServer({ ...routes, 'GET /api/field': field, 'GET /api/training/form': form })
+  // What is scrolled to before the policies have come is pushed out of sight by them.
+  const scrolled: [string, number][] = []
+  vi.spyOn(Element.prototype, 'scrollIntoView').mockImplementation(function (this: Element) {
+    scrolled.push([this.id, screen.queryAllByTestId('policy').length])
+  })
+  const { router, user } = open('/evaluations')
+  const link = await screen.findByRole('link', { name: 'Families' })
+  expect(link).toHaveAttribute('href', '/policies#families')
+  await user.click(link)
+  expect(router.state.location).toMatchObject({ pathname: '/policies', hash: '#families' })
+  await screen.findByTestId('policy')
+  await waitFor(() => expect(scrolled).toEqual([['families', 1]]))
+  expect(await screen.findByRole('heading', { name: 'Where they have never been' })).toBeInTheDocument()
 })

@@ -30,9 +30,12 @@ export function PoliciesPage() {
   })
   const { hash } = useLocation()
   const families = useRef<HTMLDivElement>(null)
+  const known = data !== undefined
+  const asked = hash === '#families'
+  // Once the policies above it are there, all of them: they would push it out of sight.
   useEffect(() => {
-    if (hash === '#families') families.current?.scrollIntoView?.()
-  }, [hash])
+    if (asked && known) families.current?.scrollIntoView?.()
+  }, [asked, known])
   return (
     <Page {...HEADS.PoliciesPage}>
       {error && !data ? (
@@ -43,7 +46,7 @@ export function PoliciesPage() {
         <ul className={classes.list} aria-busy={!data}>
           {data
             ? data.map((policy) => (
-                <Below key={policy.name} as="li" height={CARD_HEIGHT}>
+                <Below key={policy.name} as="li" height={CARD_HEIGHT} now={asked}>
                   <PolicyCard policy={policy} />
                 </Below>
               ))
