@@ -17,7 +17,7 @@ help:
 	@echo "make format  format everything"
 	@echo "make lock    compile the hash-pinned requirements anew"
 	@echo "make sbom    write what is in each part into build/sbom (CycloneDX)"
-	@echo "make types   generate the pages' types from the server's OpenAPI"
+	@echo "make types   generate the pages' types from the server's OpenAPI, and their words of metrics"
 
 # --- set up --------------------------------------------------------------------------------------------------------
 
@@ -97,6 +97,7 @@ format: .venv/.dev
 
 types: .venv/.dev
 	$(BIN)/python -m server.written.openapi web/openapi.json
+	$(BIN)/python -m server.written.metric_words web/src/charts/metricWords.json
 	$(BIN)/python web/build.py run generate
 
 # The header that uv writes names the command, and nothing in these files names a host.

@@ -14,8 +14,9 @@ from server.evaluations.repository import episodes_of
 from server.evaluations.schemas import EvaluationFigures, ExportedEpisode, ExportedEvaluation
 from server.evaluations.ways import unpacked
 from server.file_names import slug
-from server.printing.tables import NOTHING, PrintedTable, number, percentage
+from server.printing.tables import PrintedTable, number, percentage
 from server.printing.text import latex, markdown
+from server.printing.values import NOTHING
 from server.spreadsheets import csv_rows
 from sim.config import TaskConfig
 from workers.reporting import Outcome

@@ -3,10 +3,17 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from server.comparison.grid import Across
+from server.printing.values import MINUS, NARROW_SPACE, counted, significant
 
 _TICKS = 5
+_AXIS_DIGITS = 3
+_MOST_DECIMALS = 12
+# What is less is written with a power of ten.
+_SMALL = 1e-4
+_LETTERS = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 _MINUTE, _HOUR, _DAY = 60.0, 3_600.0, 86_400.0
 _ROUND_TIMES = (
     *(0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0),
@@ -23,11 +30,13 @@ class Horizontal:
     Attributes:
         title: of the axis.
         text: of a value.
+        texts: of ticks.
         rounds: what may lie between two ticks, ascending; empty for any round number.
     """
 
     title: str
     text: Callable[[float], str]
+    texts: Callable[[Sequence[float]], list[str]]
     rounds: Sequence[float] = ()
 
 
@@ -42,17 +51,61 @@ def elapsed(seconds: float) -> str:
     raise AssertionError("a minute is the least of the units")
 
 
-def _counted(value: float) -> str:
-    # As on the pages: a narrow space between thousands.
-    return (f"{value:,.0f}" if value == round(value) else f"{value:,g}").replace(",", "\N{NARROW NO-BREAK SPACE}")
+def compact(value: float) -> str:
+    """A number in few characters: "1.23M", "0.0123", "2e−05"."""
+    factor, unit = _letter(abs(value))
+    return significant(value / factor, _AXIS_DIGITS) + unit
 
 
-STEPS = Horizontal("Steps", _counted)
+def percent(share: float) -> str:
+    """A share of a logarithmic axis: "0.1 %"."""
+    return f"{significant(100.0 * share, _AXIS_DIGITS)}{NARROW_SPACE}%"
+
+
+def alike(levels: Sequence[float], *, share: bool = False) -> list[str]:
+    """The ticks of a linear axis, all in the unit of the largest and with as many decimals: "0.00", "0.25"; "0", "0.5k"."""
+    largest = max(map(abs, levels), default=0.0)
+    if share:
+        factor, unit = 0.01, f"{NARROW_SPACE}%"
+    elif 0.0 < largest < _SMALL:
+        power = math.floor(math.log10(largest) + 1e-9)
+        factor, unit = 10.0**power, f"e{power}".replace("-", MINUS)
+    else:
+        factor, unit = _letter(largest)
+    values = [level / factor for level in levels]
+    near = 1e-6 * min((abs(b - a) for a, b in pairwise(values)), default=max(map(abs, values), default=1.0))
+    decimals = next(
+        (each for each in range(_MOST_DECIMALS) if all(abs(value - round(value, each)) <= near for value in values)),
+        _MOST_DECIMALS,
+    )
+    return [_in_unit(value, decimals, unit, bare_zero=not share and factor != 1.0) for value in values]
+
+
+def _in_unit(value: float, decimals: int, unit: str, *, bare_zero: bool) -> str:
+    text = f"{abs(value):.{decimals}f}"
+    if float(text) == 0.0:
+        return "0" if bare_zero else text + unit
+    return f"{MINUS if value < 0.0 else ''}{text}{unit}"
+
+
+def _letter(size: float) -> tuple[float, str]:
+    return next(((factor, letter) for factor, letter in _LETTERS if size >= factor), (1.0, ""))
+
+
+def _whole(levels: Sequence[float]) -> list[str]:
+    return [counted(level) if float(level).is_integer() else compact(level) for level in levels]
+
+
+def _of_time(title: str) -> Horizontal:
+    return Horizontal(title, elapsed, lambda seconds: [elapsed(each) for each in seconds], _ROUND_TIMES)
+
+
+STEPS = Horizontal("Steps", counted, _whole)
 ACROSS: Mapping[Across, Horizontal] = {
     "steps": STEPS,
-    "wall": Horizontal("Time under way", elapsed, _ROUND_TIMES),
-    "cpu": Horizontal("CPU time of the trainer", elapsed, _ROUND_TIMES),
-    "episodes": Horizontal("Episodes", _counted),
+    "wall": _of_time("Time under way"),
+    "cpu": _of_time("CPU time of the trainer"),
+    "episodes": Horizontal("Episodes", counted, _whole),
 }
 
 

@@ -7,7 +7,7 @@ from fastapi.responses import HTMLResponse, PlainTextResponse
 
 from server.comparison.endpoints import Base, EveryPair, ExperimentIds, Horizontal, LogarithmicX, Margin
 from server.http.problems import NOT_FOUND
-from server.printing.report import Look
+from server.printing.look import Look, smoothing_of, zoom_of
 from server.printing.service import SUFFIXES, PrintingService, TextFormat, Wanted
 from server.printing.tables import TableName
 from server.security.permissions import view
@@ -30,6 +30,22 @@ Metrics = Annotated[
 LogarithmicY = Annotated[
     list[str],
     Query(alias="ylog", max_length=_MOST_CURVES, description="Metrics whose values are drawn on a logarithmic axis."),
+]
+_NUMBER = r"-?\d{1,18}(\.\d{1,18})?(e[+-]?\d{1,3})?"
+Smoothing = Annotated[
+    list[Annotated[str, Query(pattern=f"^{_NUMBER}~.{{1,64}}$")]],
+    Query(
+        alias="smooth",
+        max_length=_MOST_CURVES,
+        description='How much of the past is in a metric\'s curves, up to 0.99, as "0.8~train/return".',
+    ),
+]
+Hidden = Annotated[
+    list[str], Query(alias="hide", max_length=60, description="Ids of the experiments whose curves are not drawn.")
+]
+Zoom = Annotated[
+    str | None,
+    Query(pattern=f"^{_NUMBER}~{_NUMBER}$", description='What is drawn of x, as "19000~36000"; all of it without.'),
 ]
 
 
@@ -70,10 +86,21 @@ def compare_report(
     across: Horizontal = "steps",
     logarithmic: LogarithmicX = False,
     log_names: LogarithmicY = [],  # noqa: B006
+    smoothing: Smoothing = [],  # noqa: B006
+    hidden: Hidden = [],  # noqa: B006
+    zoom: Zoom = None,
 ) -> HTMLResponse:
     """The whole comparison as one HTML file that needs no script and opens offline."""
     wanted = Wanted(list(dict.fromkeys(experiment_ids)), margin, base, every_pair)
-    look = Look(list(dict.fromkeys(names)), across, logarithmic, list(dict.fromkeys(log_names)))
+    look = Look(
+        list(dict.fromkeys(names)),
+        across,
+        logarithmic,
+        list(dict.fromkeys(log_names)),
+        smoothing_of(smoothing),
+        list(dict.fromkeys(hidden)),
+        zoom_of(zoom),
+    )
     text = PrintingService(services).report(wanted, look, str(request.base_url).rstrip("/"))
     headers = {"Content-Disposition": 'attachment; filename="mapless-comparison.html"'}
     return HTMLResponse(text, headers=headers)

@@ -1,35 +1,11 @@
-"""What metrics and settings are called in print: the words of the pages, not the names of the code."""
+"""What settings are called in print: the words of the launch form, not the names of the code."""
 
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 from server.experiments.form import form_schema
-
-_METRICS = {
-    "eval/success_rate": "Success rate, evaluation",
-    "train/success_rate": "Success rate, training",
-    "train/return": "Return per episode, training",
-    "eval/return": "Return per episode, evaluation",
-    "eval/steps": "Steps to the target, evaluation",
-    "eval/path_efficiency": "Path efficiency, evaluation",
-    "loss/policy": "Policy loss",
-    "loss/value": "Value loss",
-    "policy/kl": "KL divergence",
-    "time/steps_per_second": "Steps per second",
-}
-_GROUPS = {"eval": "evaluation", "train": "training", "optim": ""}
-_SPELLED = {"kl": "KL", "std": "standard deviation"}
-
-
-def metric_words(name: str) -> str:
-    """A metric in words: "eval/collision_rate" is "Collision rate, evaluation"."""
-    if name in _METRICS:
-        return _METRICS[name]
-    group, _, rest = name.rpartition("/")
-    text = _words(rest or name)
-    behind = _GROUPS.get(group, group)
-    return f"{text}, {behind}" if behind else text
+from server.printing.values import spelled_out
 
 
 def setting_words(path: str) -> str:
@@ -51,7 +27,7 @@ def _labels(path: Sequence[str]) -> list[str]:
         # What merely names its object's kind is called as the object.
         if not (key == "name" and labels):
             titles = [title for each in found for title in _titles(each, schema)]
-            labels.append(titles[0] if titles else _words(key))
+            labels.append(titles[0] if titles else spelled_out(key))
         candidates = [branch for each in found for branch in _branches(each, schema)]
     return labels
 
@@ -74,8 +50,3 @@ def _branches(node: dict[str, Any], schema: dict[str, Any]) -> list[dict[str, An
         return [{"properties": {kind: {"$ref": ref} for kind, ref in discriminator["mapping"].items()}}]
     several = node.get("oneOf") or node.get("anyOf")
     return [branch for each in several for branch in _branches(each, schema)] if several else [node]
-
-
-def _words(name: str) -> str:
-    text = " ".join(_SPELLED.get(part, part) for part in name.split("_"))
-    return text[:1].upper() + text[1:]

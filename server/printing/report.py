@@ -1,14 +1,14 @@
 """The whole comparison as one HTML file: no script, nothing to load, opens offline."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from server.comparison.grid import Across
 from server.comparison.schemas import Comparison, Curves, Profiles
 from server.estimates import is_rate
-from server.printing.axes import ACROSS, Horizontal
-from server.printing.names import metric_words
+from server.printing.axes import ACROSS, Horizontal, alike, compact
+from server.printing.look import Look
+from server.printing.metric_words import words_of
 from server.printing.palette import STYLE, looks_of
 from server.printing.svg import Line, can_be_logarithmic, line_chart
 from server.printing.tables import MEASURES, PrintedTable, TableName, printed
@@ -22,32 +22,9 @@ th, td { padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; bo
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr)); gap: 1.5rem; }
 figure { margin: 0; }
 h3 code { font-weight: 400; font-size: .8em; opacity: .75; }
-p.note, figcaption.note { max-width: 90ch; font-size: .87em; opacity: .85; }
+p.note, figcaption.note { max-width: 90ch; font-size: .87em; opacity: .85; overflow-wrap: anywhere; }
 """
 _TABLES: tuple[TableName, ...] = ("figures", "verdicts", "improvements", "differences")
-
-
-@dataclass(frozen=True)
-class Look:
-    """How the curves are looked at, as a page's address says it.
-
-    Attributes:
-        metrics: whose curves there are, in order; empty for those that a page shows at first.
-        across: what x is.
-        log_x: whether it is logarithmic.
-        log_y: the metrics whose values are.
-    """
-
-    metrics: Sequence[str] = ()
-    across: Across = "steps"
-    log_x: bool = False
-    log_y: Collection[str] = ()
-
-    def address(self) -> list[tuple[str, str]]:
-        """As a page's address says it."""
-        across = [] if self.across == "steps" else [("x", str(self.across))]
-        log_x = [("xlog", "1")] if self.log_x else []
-        return [*across, *log_x, *(("ylog", name) for name in self.log_y), *(("panel", name) for name in self.metrics)]
 
 
 @dataclass(frozen=True)
@@ -73,6 +50,7 @@ class Report:
         """The file."""
         names = ", ".join(one.name for one in self.comparison.experiments)
         charts = [self._profile(), *(self._curves(each) for each in self.curves)]
+        said = " ".join([_BANDS, *self._of_the_page()])
         return "\n".join(
             [
                 '<!doctype html><html lang="en"><head><meta charset="utf-8">',
@@ -83,7 +61,7 @@ class Report:
                 *self._warnings(),
                 *(_table(table) for name in _TABLES if (table := printed(self.comparison, name)).rows),
                 *self._reasons(),
-                f'<h2>Charts</h2><p class="note">{_BANDS}</p><div class="charts">{"".join(charts)}</div>',
+                f'<h2>Charts</h2><p class="note">{escape(said)}</p><div class="charts">{"".join(charts)}</div>',
                 "</body></html>",
             ]
         )
@@ -105,6 +83,19 @@ class Report:
             return []
         return ["<h2>Reasons of the verdicts</h2>", f"<ul>{''.join(f'<li>{escape(item)}</li>' for item in items)}</ul>"]
 
+    def _of_the_page(self) -> list[str]:
+        """What is not drawn because the page did not show it."""
+        look = self.look
+        hidden = [one.name for one in self.comparison.experiments if one.id in look.hidden]
+        notes = []
+        if look.zoom is not None:
+            horizontal = ACROSS[look.across]
+            start, end = map(horizontal.text, look.zoom)
+            notes.append(f"{horizontal.title} from {start} to {end} alone, as the page showed its curves.")
+        if hidden:
+            notes.append(f"Curves that were hidden on the page are left out: {', '.join(hidden)}.")
+        return notes
+
     def _profile(self) -> str:
         looks = looks_of(one.id for one in self.profiles.experiments)
         lines = [
@@ -119,35 +110,39 @@ class Report:
 
     def _curves(self, curves: Curves) -> str:
         looks = looks_of(one.id for one in curves.experiments)
-        lines = [
+        all_lines = [
             Line(_label(one.name, max(one.count, default=0)), looks[one.id], one.mean, one.low, one.high)
             for one in curves.experiments
+            if one.id not in self.look.hidden
         ]
+        x, lines = self.look.shown(curves.steps if curves.x is None else curves.x, all_lines, curves.name)
         log_y = curves.name in self.look.log_y
+        words = words_of(curves.name)
         chart = line_chart(
             curves.name,
             ACROSS[curves.across],
-            curves.steps if curves.x is None else curves.x,
+            x,
             lines,
             rate=is_rate(curves.name),
+            share=words.share,
             log_x=self.look.log_x,
             log_y=log_y,
-            vertical=metric_words(curves.name),
+            vertical=words.axis,
+            nothing="No value yet" if all(value is None for one in curves.experiments for value in one.mean) else _NOT_SHOWN,
         )
-        return _figure(
-            metric_words(curves.name),
-            chart,
-            " ".join(_notes(curves, linear=log_y and not can_be_logarithmic(lines))),
-            raw=curves.name,
-        )
+        notes = _notes(curves, linear=log_y and not can_be_logarithmic(lines), strength=self.look.smooth.get(curves.name))
+        title = f"{words.title}, {words.note}" if words.note else words.title
+        return _figure(title, chart, " ".join(notes), raw="" if title == curves.name else curves.name)
 
 
-def _notes(curves: Curves, *, linear: bool) -> list[str]:
+def _notes(curves: Curves, *, linear: bool, strength: float | None) -> list[str]:
     """What has to be known to read the curves."""
     left_out = sum(one.unplaced for one in curves.experiments)
     notes = []
     if curves.across != "steps":
         notes.append("Means end where the first seed is through.")
+    if strength is not None:
+        notes.append(f"Smoothed, {strength:.2f}; thin: what was reported.")
     if left_out:
         notes.append(f"Runs left out, of which x was not counted when they trained: {left_out}.")
     if linear:
@@ -155,7 +150,8 @@ def _notes(curves: Curves, *, linear: bool) -> list[str]:
     return notes
 
 
-_SCORE = Horizontal("Score: path efficiency of an arrival, else 0", lambda value: f"{value:g}")
+_SCORE = Horizontal("Score: path efficiency of an arrival, else 0", compact, alike)
+_NOT_SHOWN = "Nothing of it was shown on the page"
 _BANDS = "Means over seeds; bands are 95 % intervals over seeds (Student's t, of rates on the scale of the logit)."
 
 

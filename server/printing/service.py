@@ -7,7 +7,8 @@ from typing import Literal
 from urllib.parse import urlencode
 
 from server.comparison.service import ComparisonService
-from server.printing.report import Look, Report
+from server.printing.look import Look
+from server.printing.report import Report
 from server.printing.tables import TableName, printed
 from server.printing.text import comma_separated, latex, markdown
 from server.services import Services
@@ -19,6 +20,8 @@ SUFFIXES: dict[TextFormat, str] = {"latex": "tex", "markdown": "md", "csv": "csv
 _WRITERS = {"latex": latex, "markdown": markdown, "csv": comma_separated}
 # Of curves in a report: as many as its charts have room for.
 _POINTS = 240
+# Of those that are smoothed, or a part of which is shown: as many as the page has, where each counts.
+_PAGE_POINTS = 400
 # What the page shows at first.
 _USUAL = ("eval/success_rate", "train/success_rate", "train/return", "eval/steps")
 
@@ -75,12 +78,13 @@ class PrintingService:
             As `ComparisonService.compare`.
         """
         ids = wanted.experiment_ids
+        points = _PAGE_POINTS if look.smooth or look.zoom else _POINTS
         made = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
         return Report(
             comparison=self._comparisons.compare(ids, wanted.margin, wanted.base, every_pair=wanted.every_pair),
             profiles=self._comparisons.profiles(ids),
             curves=[
-                self._comparisons.curves(ids, name, _POINTS, across=look.across, logarithmic=look.log_x)
+                self._comparisons.curves(ids, name, points, across=look.across, logarithmic=look.log_x)
                 for name in look.metrics or _USUAL
             ],
             look=look,

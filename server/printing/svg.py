@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from server.printing.axes import Horizontal, scale, ticks
+from server.printing.axes import Horizontal, alike, compact, percent, scale, ticks
 from server.printing.palette import Look
 
 _WIDTH, _HEIGHT = 570, 280
@@ -19,13 +19,22 @@ Values = Sequence[float | None]
 
 @dataclass(frozen=True)
 class Line:
-    """A curve: its mean, and the interval where it is known; None where there is no value."""
+    """A curve, each value None where there is none.
+
+    Attributes:
+        label: in the legend.
+        look: its colour and dashes.
+        mean: what is drawn.
+        low, high: the ends of its interval.
+        beneath: drawn thin beneath it: what was reported, where the mean is smoothed.
+    """
 
     label: str
     look: Look
     mean: Values
     low: Values
     high: Values
+    beneath: Values = ()
 
 
 def line_chart(
@@ -35,9 +44,11 @@ def line_chart(
     lines: Sequence[Line],
     *,
     rate: bool,
+    share: bool | None = None,
     log_x: bool = False,
     log_y: bool = False,
     vertical: str = "",
+    nothing: str = "No value yet",
 ) -> str:
     """The chart as an `svg` element.
 
@@ -46,14 +57,16 @@ def line_chart(
         horizontal: what x is.
         x: of every value, ascending.
         lines: each as long as `x`.
-        rate: whether y is a share, 0 to 1.
+        rate: whether y is from 0 to 1.
+        share: whether it is written in per cent; as `rate` if not given.
         log_x: whether x is logarithmic; every one is above 0 then.
         log_y: whether y is, where every mean is above 0.
         vertical: what y is.
+        nothing: what stands in place of a chart without a value.
     """
     drawn = [line for line in lines if any(value is not None for value in line.mean)]
     log_y = log_y and can_be_logarithmic(drawn)
-    sides = [(line.mean,) if log_y else (line.mean, line.low, line.high) for line in drawn]
+    sides = [(line.mean, line.beneath) if log_y else (line.mean, line.beneath, line.low, line.high) for line in drawn]
     values = [value for line in sides for side in line for value in side if value is not None]
     height = _HEIGHT + _ROW * len(drawn)
     box = f'viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="{escape(title)}"'
@@ -62,7 +75,7 @@ def line_chart(
         low, high = (0.0, 1.0) if rate and not log_y else _padded(min(values), max(values), log=log_y)
         across = scale(x[0], x[-1], _LEFT, _WIDTH - _RIGHT, logarithmic=log_x)
         up = scale(low, high, _HEIGHT - _BOTTOM, _TOP, logarithmic=log_y)
-        parts += _levels(ticks(low, high, logarithmic=log_y), up, rate=rate)
+        parts += _levels(ticks(low, high, logarithmic=log_y), up, share=rate if share is None else share, logarithmic=log_y)
         parts += _upright(vertical) if vertical else []
         parts += _places(horizontal, ticks(x[0], x[-1], horizontal.rounds, logarithmic=log_x), across)
         for line in drawn:
@@ -71,29 +84,33 @@ def line_chart(
         parts += [_entry(row, line) for row, line in enumerate(drawn)]
     else:
         parts.append(
-            f'<text x="{_WIDTH / 2}" y="{_HEIGHT / 2}" text-anchor="middle" fill="currentColor">No value yet</text>'
+            f'<text x="{_WIDTH / 2}" y="{_HEIGHT / 2}" text-anchor="middle" fill="currentColor">{escape(nothing)}</text>'
         )
     return "\n".join([*parts, "</svg>"])
 
 
 def can_be_logarithmic(lines: Sequence[Line]) -> bool:
     """Whether a logarithmic axis has a place for every mean."""
-    return all(value is None or value > 0.0 for line in lines for value in line.mean)
+    return all(value is None or value > 0.0 for line in lines for value in (*line.mean, *line.beneath))
 
 
-def _levels(levels: Sequence[float], up: Callable[[float], float], *, rate: bool) -> list[str]:
+def _levels(levels: Sequence[float], up: Callable[[float], float], *, share: bool, logarithmic: bool) -> list[str]:
+    # Of a logarithmic axis each is written as it is.
+    text = percent if share else compact
+    texts = [text(level) for level in levels] if logarithmic else alike(levels, share=share)
     parts = []
-    for tick in levels:
+    for tick, written in zip(levels, texts, strict=True):
         level = f"{up(tick):.1f}"
         ends = f'x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{level}" y2="{level}"'
         parts.append(f'<line {ends} stroke="currentColor" stroke-opacity="0.15"/>')
-        parts.append(_text(_LEFT - 6, up(tick) + 4, "end", f"{100 * tick:.3g}%" if rate else f"{tick:g}"))
+        parts.append(_text(_LEFT - 6, up(tick) + 4, "end", written))
     return parts
 
 
 def _places(horizontal: Horizontal, places: Sequence[float], across: Callable[[float], float]) -> list[str]:
     below = _HEIGHT - _BOTTOM
-    parts = [_text(across(tick), below + 16, "middle", horizontal.text(tick)) for tick in places]
+    texts = zip(places, horizontal.texts(places), strict=True)
+    parts = [_text(across(tick), below + 16, "middle", written) for tick, written in texts]
     return [*parts, _text((_LEFT + _WIDTH - _RIGHT) / 2, below + 34, "middle", horizontal.title)]
 
 
@@ -117,6 +134,9 @@ def _line(x: Sequence[float], line: Line, across: Callable[[float], float], up: 
     edge = points(line.high) + points(line.low)[::-1]
     if edge:
         parts.append(f'<polygon points="{" ".join(edge)}" fill="{color}" fill-opacity="0.15"/>')
+    if line.beneath and len(beneath := points(line.beneath)) > 1:
+        look = f'stroke="{color}" stroke-width="1" stroke-opacity="0.4"{line.look.dashes(1)}'
+        parts.append(f'<polyline points="{" ".join(beneath)}" fill="none" {look}/>')
     mean = points(line.mean)
     if len(mean) == 1:
         left, top = mean[0].split(",")

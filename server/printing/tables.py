@@ -1,17 +1,16 @@
 """The tables of a comparison, before they are LaTeX, Markdown, HTML or CSV."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from server.comparison.schemas import Comparison, ComparisonVerdict
 from server.printing.names import setting_words
+from server.printing.values import NOTHING, setting_text
 from server.schemas import Estimate
 
 TableName = Literal["figures", "verdicts", "improvements", "differences"]
 
-NOTHING = "–"
 MEASURES = {"success": "Success", "steps_per_target": "Steps to target"}
 # A p that is less is written so.
 _SMALL_P = 0.001
@@ -144,7 +143,10 @@ def _differences(comparison: Comparison) -> PrintedTable:
         caption="Settings that are not the same in all trainings.",
         heading=("Setting", *(one.name for one in comparison.experiments)),
         rows=[
-            (setting_words(row.path), *(_setting(value, out) for value, out in zip(row.values, row.left_out, strict=True)))
+            (
+                setting_words(row.path),
+                *("left out" if out else setting_text(value) for value, out in zip(row.values, row.left_out, strict=True)),
+            )
             for row in comparison.differences
         ],
         texts=frozenset(range(1 + len(comparison.experiments))),
@@ -192,11 +194,3 @@ def _p(p: float | None) -> str:
     if p is None:
         return NOTHING
     return f"< {_SMALL_P}" if p < _SMALL_P else f"{p:.2g}"
-
-
-def _setting(value: Any, left_out: bool) -> str:
-    if left_out:
-        return "left out"
-    if value is None:
-        return NOTHING
-    return value if isinstance(value, str) else json.dumps(value)

@@ -3,6 +3,7 @@
 import re
 
 from server.printing.tables import PrintedTable
+from server.printing.values import MINUS, NARROW_SPACE
 from server.spreadsheets import csv_rows
 
 _LATEX = {
@@ -20,7 +21,11 @@ _LATEX = {
     ">": r"$>$",
     "–": "--",
     "×": r"$\times$",
+    MINUS: "$-$",
+    NARROW_SPACE: r"\,",
 }
+# For programs: no space within a number, and the minus of ASCII.
+_PLAIN = str.maketrans({NARROW_SPACE: "", MINUS: "-"})
 # What Markdown would take for its own.
 _MARKS = re.compile(r"([\\`*_{}<>|#])")
 # A sign before a number is a minus, not a hyphen.
@@ -56,8 +61,8 @@ def markdown(table: PrintedTable) -> str:
 
 
 def comma_separated(table: PrintedTable) -> str:
-    """The same cells as CSV."""
-    return csv_rows([table.heading, *table.rows]).decode()
+    """The same cells as CSV, with numbers that programs read."""
+    return csv_rows([table.heading, *(tuple(cell.translate(_PLAIN) for cell in row) for row in table.rows)]).decode()
 
 
 def _latex_row(cells: tuple[str, ...]) -> str:
@@ -71,5 +76,10 @@ def _escaped(text: str) -> str:
 
 
 def _markdown_row(cells: tuple[str, ...]) -> str:
-    texts = [_MARKS.sub(r"\\\1", " ".join(cell.split())) for cell in cells]
+    texts = [_MARKS.sub(r"\\\1", _one_line(cell)) for cell in cells]
     return f"| {' | '.join(texts)} |"
+
+
+def _one_line(cell: str) -> str:
+    # The narrow spaces of numbers stay.
+    return NARROW_SPACE.join(" ".join(part.split()) for part in cell.split(NARROW_SPACE))

@@ -15328,6 +15328,8 @@ export interface operations {
                 base?: string | null;
                 /** @description Ids of the experiments, in order. */
                 experiment: string[];
+                /** @description Ids of the experiments whose curves are not drawn. */
+                hide?: string[];
                 /** @description For a logarithmic axis: a grid that is resampled grows by equal factors. */
                 log?: boolean;
                 /** @description Success rates that differ by less are equivalent, 0 to 1. */
@@ -15336,10 +15338,14 @@ export interface operations {
                 name?: string[];
                 /** @description Judge every pair, of 12 experiments at most. */
                 pairs?: boolean;
+                /** @description How much of the past is in a metric's curves, up to 0.99, as "0.8~train/return". */
+                smooth?: string[];
                 /** @description What the grid is of: steps, time under way, CPU time, or episodes. */
                 x?: "steps" | "wall" | "cpu" | "episodes";
                 /** @description Metrics whose values are drawn on a logarithmic axis. */
                 ylog?: string[];
+                /** @description What is drawn of x, as "19000~36000"; all of it without. */
+                zoom?: string | null;
             };
             header?: never;
             path?: never;

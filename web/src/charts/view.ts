@@ -67,6 +67,13 @@ function zoomOf(text: string | null): [number, number] | null {
   return more.length === 0 && Number.isFinite(from) && Number.isFinite(to) && from < to ? [from, to] : null
 }
 
+/** How much a chart is smoothed, as it stands in an address. */
+export const smoothText = (name: string, strength: number): string => `${strength}${BETWEEN}${name}`
+
+/** What is shown of x, likewise. */
+export const zoomText = (zoom: readonly [number, number]): string =>
+  zoom.map((end) => Number(end.toPrecision(6))).join(BETWEEN)
+
 /** The address's query with a view in it; all else stays. */
 export function writtenView(before: URLSearchParams, view: ChartView): URLSearchParams {
   const after = new URLSearchParams(before)
@@ -76,9 +83,9 @@ export function writtenView(before: URLSearchParams, view: ChartView): URLSearch
   for (const name of view.logY) after.append('ylog', name)
   for (const name of view.panels ?? []) after.append('panel', name)
   for (const [name, strength] of Object.entries(view.smooth))
-    after.append('smooth', `${strength}${BETWEEN}${name}`)
+    after.append('smooth', smoothText(name, strength))
   for (const key of view.hidden) after.append('hide', key)
-  if (view.zoom) after.set('zoom', view.zoom.map((end) => Number(end.toPrecision(6))).join(BETWEEN))
+  if (view.zoom) after.set('zoom', zoomText(view.zoom))
   return after
 }
 

@@ -1,7 +1,7 @@
 /** What leaves of a comparison: a table as one would print it, everything as a report or a link. */
 import { ActionIcon, Button, CopyButton, Menu } from '@mantine/core'
-import { MOST_PANELS } from '../charts/panels'
-import type { ChartView } from '../charts/view'
+import { lookOf, MOST_PANELS, USUAL_PANELS } from '../charts/panels'
+import { type ChartView, smoothText, zoomText } from '../charts/view'
 import { at } from '../lib/base'
 import { IconDownload } from './icons'
 
@@ -114,10 +114,16 @@ export function comparisonQuery(
 }
 
 /** What a report is told of how curves are looked at, after another query; nothing where that is as usual. */
-function lookOfReport({ across, logX, logY, panels }: ChartView): string {
+function lookOfReport({ across, logX, logY, panels, smooth, hidden, zoom }: ChartView): string {
   const query = new URLSearchParams((panels ?? []).map((name) => ['name', name]))
   if (across !== 'steps') query.set('x', across)
   if (logX) query.set('log', 'true')
   for (const name of logY.slice(0, MOST_PANELS)) query.append('ylog', name)
+  for (const name of panels ?? USUAL_PANELS) {
+    const strength = smooth[name]
+    if (strength !== undefined && lookOf(name).smoothable) query.append('smooth', smoothText(name, strength))
+  }
+  for (const key of hidden) query.append('hide', key)
+  if (zoom) query.set('zoom', zoomText(zoom))
   return query.size > 0 ? `&${query}` : ''
 }

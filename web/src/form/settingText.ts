@@ -17,8 +17,13 @@ function termText({ name, label, weight, ...rest }: Record<string, unknown>): st
   const more = Object.entries(rest)
     .filter(([, value]) => value !== false)
     .map(([key, value]) => (key === 'formula' ? String(value) : `${key} ${settingText(value)}`))
-  const head = [words(String(label ?? name)), weight !== undefined && settingText(weight)]
+  const called = label ?? name
+  const head = [
+    called !== undefined && words(String(called)),
+    weight !== undefined && weight !== null && settingText(weight),
+  ]
     .filter(Boolean)
     .join(' ')
-  return more.length > 0 ? `${head} (${more.join(', ')})` : head
+  const inside = more.join(', ')
+  return head && inside ? `${head} (${inside})` : head || inside
 }
