@@ -22,7 +22,9 @@ const FAINT_ALPHA = 0.14
 const BAND_ALPHA = 0.14
 /** A point so near to the cursor is pointed at. */
 const NEAR_PX = 8
-/** How uPlot calls what a scale is. */
+/** How uPlot calls a plot that has drawn itself. */
+const READY = 1
+/** How it calls what a scale is. */
 const LINEAR = 1
 const LOGARITHMIC = 3
 
@@ -214,7 +216,8 @@ export function Chart({
     drawnData.current = newest.current
     // Newer values leave a reader where he has zoomed to.
     chart.setData(newest.current, !inside.current)
-    if (inside.current) chart.redraw()
+    // A plot of this very moment draws itself; asked to, it would not know its ends yet, and show nothing.
+    if (inside.current && chart.status === READY) chart.redraw()
   }
   const inSight = useInSight(frame, drawNewest)
   // biome-ignore lint/correctness/useExhaustiveDependencies: what is drawn anew is looked up, and only while one may see it.
