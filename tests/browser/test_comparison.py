@@ -148,6 +148,7 @@ def test_a_chart_leaves_as_numbers_and_as_pictures(compared: tuple[BrowserContex
         found[Path(download.value.suggested_filename).suffix] = download.value.path().read_bytes()
     assert found[".csv"].decode().splitlines()[-1].startswith("3000,0.9")
     assert found[".svg"].startswith(b"<svg ")
+    assert b'rotate(-90)" text-anchor="middle" fill="#3d464d">Share of episodes</text>' in found[".svg"]
     assert found[".png"].startswith(b"\x89PNG")
     assert len(found[".png"]) > 5_000
 
@@ -180,7 +181,7 @@ def test_panels_are_chosen_by_keyboard_kept_in_the_address_and_drawn_when_one_co
     page.keyboard.press("Enter")
     expect(chosen.get_by_role("listitem")).to_have_count(4)
     page.get_by_role("combobox", name="Add a panel").fill("loss")
-    page.get_by_role("option", name="loss/value").click()
+    page.get_by_role("option", name="Value loss").click()
     expect(chosen.get_by_role("listitem")).to_have_count(5)
     page.keyboard.press("Escape")
     expect(chosen).to_have_count(0)

@@ -5,7 +5,7 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { compact, count } from '../lib/format'
 import { useInSight, useNear } from '../lib/near'
-import { factors, fitted, type Horizontal, roundTick, STEPS } from './axis'
+import { alike, factors, fitted, type Horizontal, roundTick, STEPS } from './axis'
 import classes from './Chart.module.css'
 import { useLinkedCharts } from './LinkedCharts'
 import { dashes, lineColor } from './palette'
@@ -16,6 +16,10 @@ import type { HiddenLines } from './view'
 
 const HEIGHT = 220
 const STRIP = 150
+const Y_AXIS = 52
+const Y_GAP = 6
+/** A digit's width, in the font of axes. */
+const DIGIT = 6.2
 const AXIS_FONT = '11px system-ui, sans-serif'
 const THIN_ALPHA = 0.38
 const FAINT_ALPHA = 0.14
@@ -32,6 +36,8 @@ interface ChartProps {
   data: ChartData
   /** What the chart shows, for the legend of screen readers. */
   label: string
+  /** What its values are, with their unit, where nothing above it says so. */
+  y?: string
   format?: (value: number) => string
   /** Fixed ends of the y axis; without them it follows the data. */
   yRange?: readonly [number, number]
@@ -58,6 +64,7 @@ interface ChartProps {
 export function Chart({
   data,
   label,
+  y,
   format = compact,
   yRange,
   logarithmic: wanted = false,
@@ -282,6 +289,7 @@ export function Chart({
       data-points={data.x.length}
       data-step={data.x.at(-1)}
     >
+      {y && <div className={classes.axis}>{y}</div>}
       <div ref={frame} style={{ height }} />
       <div className={classes.below}>
         <dl ref={legend} className={classes.legend}>
@@ -417,10 +425,17 @@ interface Appearance {
   logarithmic: boolean
 }
 
-/** Of a logarithmic axis: round numbers from end to end, and every one written. */
-const BY_FACTORS: uPlot.Axis = {
+/** Of a logarithmic axis: round numbers from end to end, and every one written as it is. */
+const byFactors = (format: (value: number) => string): uPlot.Axis => ({
   splits: (_, __, from, to) => factors(from, to),
   filter: (_, ticks) => ticks,
+  values: (_, ticks) => ticks.map((tick) => roundTick(format(tick))),
+})
+
+/** As wide as its ticks need, and never narrower than others: plots that stand one below the other begin at one place. */
+function widthOf(_: uPlot, ticks: readonly string[] | null): number {
+  const longest = Math.max(0, ...(ticks ?? []).map((tick) => tick.length))
+  return Math.max(Y_AXIS, Math.ceil(longest * DIGIT) + 2 * Y_GAP)
 }
 
 function appearance({
@@ -449,17 +464,18 @@ function appearance({
         labelSize: 16,
         labelGap: 0,
         grid: { show: false },
-        values: (_, ticks) => ticks.map(written),
+        // Times are told in units of their own.
+        values: (_, ticks) => (x.rounds ? ticks.map(written) : alike(ticks, written)),
         space: 64,
-        ...(logX ? BY_FACTORS : {}),
+        ...(logX ? byFactors(written) : {}),
       },
       {
         ...axis,
-        size: 52,
-        gap: 6,
+        size: widthOf,
+        gap: Y_GAP,
         space: 34,
-        values: (_, ticks) => ticks.map((tick) => roundTick(format(tick))),
-        ...(logarithmic ? BY_FACTORS : {}),
+        values: (_, ticks) => alike(ticks, format),
+        ...(logarithmic ? byFactors(format) : {}),
       },
     ],
   }

@@ -10,8 +10,8 @@ import classes from './MetricChart.module.css'
 import { type ChartData, smoothed, within, withoutLines } from './series'
 import { type HiddenLines, type LogSwitch, MOST_SMOOTHING, type SmoothSwitch } from './view'
 
-/** Below a chart, about. */
-const LEGEND_PX = 24
+/** Above and below a plot, about: what its values are, and the legend. */
+const AROUND_PX = 16 + 24
 /** Asked for at once, but nothing waits for it: the page is there before its charts. */
 const code = import('./Chart')
 const Chart = lazily(async () => (await code).Chart)
@@ -20,6 +20,8 @@ interface MetricChartProps {
   title: string
   note?: string
   data: ChartData
+  /** What the values are, with their unit. */
+  y: string
   format?: (value: number) => string
   yRange?: readonly [number, number]
   /** Whether smoothing makes sense: not for a handful of evaluations. */
@@ -47,6 +49,7 @@ export function MetricChart({
   title,
   note,
   data,
+  y,
   smoothable = false,
   smooth,
   lines,
@@ -114,6 +117,7 @@ export function MetricChart({
               title={note ? `${title}, ${note}` : title}
               format={format}
               x={x}
+              y={y}
               yRange={rest.yRange}
               logarithmic={log?.on ?? false}
               logX={logX}
@@ -122,14 +126,15 @@ export function MetricChart({
         </Group>
       </div>
       {data.x.length === 0 ? (
-        <div className={classes.empty} style={{ height: height + LEGEND_PX }}>
+        <div className={classes.empty} style={{ height: height + AROUND_PX }}>
           {empty}
         </div>
       ) : (
         <Chart
-          meanwhile={<div style={{ height: height + LEGEND_PX }} />}
+          meanwhile={<div style={{ height: height + AROUND_PX }} />}
           data={shown}
           label={title}
+          y={y}
           logarithmic={log?.on ?? false}
           logX={logX}
           lines={lines}

@@ -1,5 +1,6 @@
 import { expect, test } from 'vitest'
-import { choices, factors, fitted, numbers, rounds } from './axis'
+import { compact, duration, NARROW_SPACE, percent, significant } from '../lib/format'
+import { alike, choices, factors, fitted, numbers, rounds } from './axis'
 
 test('an axis of numbers has round ticks within its ends', () => {
   expect(rounds(0, 1)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1])
@@ -39,4 +40,32 @@ test('where all values are one, or there are none, they lie in the middle', () =
 test('choices lie side by side in their order', () => {
   const axis = choices(['linear', 'constant'], String)
   expect([axis.place('linear'), axis.place('constant')]).toEqual([0.25, 0.75])
+})
+
+/** With the narrow spaces of the pages. */
+const narrow = (texts: readonly string[]) => texts.map((text) => text.replaceAll(' ', NARROW_SPACE))
+
+test('the ticks of an axis are written alike', () => {
+  expect(alike([0, 0.25, 0.5, 0.75, 1], significant)).toEqual(['0.00', '0.25', '0.50', '0.75', '1.00'])
+  expect(alike([-0.5, 0, 0.5], significant)).toEqual(['−0.5', '0.0', '0.5'])
+  expect(alike([0, 0.1 + 0.2, 0.6], significant)).toEqual(['0.0', '0.3', '0.6'])
+  expect(alike([0, 0.5, 1], percent)).toEqual(narrow(['0 %', '50 %', '100 %']))
+  expect(alike([0.95, 0.975, 1], percent)).toEqual(narrow(['95.0 %', '97.5 %', '100.0 %']))
+  // What lies beyond is written as it is, not as 99.9.
+  expect(alike([0.99, 1, 1.01], percent)).toEqual(narrow(['99 %', '100 %', '101 %']))
+})
+
+test('ticks have the unit of the largest, and tell apart what lies close together', () => {
+  expect(alike([0, 500, 1_000, 1_500], compact)).toEqual(['0', '0.5k', '1.0k', '1.5k'])
+  expect(alike([-500, 0, 500], compact)).toEqual(['−500', '0', '500'])
+  expect(alike([1_234_000, 1_234_500, 1_235_000], compact)).toEqual(['1.2340M', '1.2345M', '1.2350M'])
+  expect(alike([0, 5_000, 10_000], significant)).toEqual(narrow(['0', '5 000', '10 000']))
+  expect(alike([0, 2e-5, 1.5e-5], significant)).toEqual(['0', '2.0e−5', '1.5e−5'])
+})
+
+test('one tick, none, and such as have no unit in common', () => {
+  expect(alike([], significant)).toEqual([])
+  expect(alike([0], significant)).toEqual(['0'])
+  expect(alike([12.5], significant)).toEqual(['12.5'])
+  expect(alike([0, 1_800, 5_400], duration)).toEqual(['0 s', '30 min', '1 h 30 min'])
 })

@@ -1,5 +1,5 @@
 /** Axes of charts: what x is and, where they are drawn point by point, where a value lies and which ticks there are. */
-import { count } from '../lib/format'
+import { count, MINUS, NARROW_SPACE } from '../lib/format'
 
 export interface Axis {
   /** Where a value lies, 0 to 1. */
@@ -29,6 +29,53 @@ const LEAST_ROOM = 1.01
 /** Ticks are round numbers: "75.0 %" -> "75 %". */
 export const roundTick = (text: string): string => text.replace(/\.0(?!\d)/, '')
 
+/** A number as the pages write it: digits, a power of ten, a unit. */
+const WRITTEN = new RegExp(`^(${MINUS}?\\d+(?:${NARROW_SPACE}\\d{3})*(?:\\.\\d+)?)(e${MINUS}?\\d+)?(\\D*)$`)
+/** What has been rounded in the third digit is still seen to be a power of ten times another; a minute, an hour and a day are not. */
+const ROUNDED = 0.01
+const MOST_DECIMALS = 12
+/** From five digits on they stand in threes. */
+const IN_THREES = 1e4
+
+/**
+ * The ticks of a linear axis, all in the unit of the largest and with as many decimals: "0.00", "0.25", "0.50"; "0", "0.5k",
+ * "1.0k". Where they are no numbers with one unit, each is as `format` has it.
+ */
+export function alike(ticks: readonly number[], format: (value: number) => string): string[] {
+  const scale = scaleOf(ticks, format)
+  if (!scale) return ticks.map(format)
+  const { factor, unit } = scale
+  const values = ticks.map((tick) => tick / factor)
+  const gap = Math.min(...values.slice(1).map((value, index) => Math.abs(value - (values[index] ?? 0))))
+  const near = 1e-6 * (Number.isFinite(gap) ? gap : Math.abs(values[0] ?? 1))
+  let decimals = 0
+  const isExact = (value: number) => Math.abs(value - Number(value.toFixed(decimals))) <= near
+  while (decimals < MOST_DECIMALS && !values.every(isExact)) decimals++
+  const inThrees = values.some((value) => Math.abs(value) >= IN_THREES)
+  return values.map((value) => {
+    const text = Math.abs(value).toFixed(decimals)
+    if (Number(text) === 0 && factor !== 1 && !unit.endsWith('%')) return '0'
+    const [whole = '', part] = text.split('.')
+    const digits = inThrees ? count(Number(whole)) : whole
+    const sign = value < 0 && Number(text) !== 0 ? MINUS : ''
+    return `${sign}${part === undefined ? digits : `${digits}.${part}`}${unit}`
+  })
+}
+
+/** The unit of the largest tick of which it is a number, and what it is worth. */
+function scaleOf(
+  ticks: readonly number[],
+  format: (value: number) => string,
+): { factor: number; unit: string } | null {
+  for (const tick of [...ticks].sort((a, b) => Math.abs(b) - Math.abs(a))) {
+    const [, digits = '', power = '', unit = ''] = WRITTEN.exec(format(tick)) ?? []
+    const worth = Math.log10(tick / Number(digits.replaceAll(NARROW_SPACE, '').replace(MINUS, '-')))
+    if (Math.abs(worth - Math.round(worth)) < ROUNDED)
+      return { factor: 10 ** Math.round(worth), unit: power + unit }
+  }
+  return null
+}
+
 /** Steps of round numbers. */
 const ROUND = [1, 2, 5, 10]
 
@@ -52,7 +99,8 @@ export function numbers(
     : side > 0
       ? factors(low, high)
       : factors(-high, -low).map((amount) => -amount)
-  return { place, ticks: marks.map((mark) => ({ at: place(mark), label: roundTick(format(mark)) })) }
+  const labels = isLog ? marks.map((mark) => roundTick(format(mark))) : alike(marks, format)
+  return { place, ticks: marks.map((mark, index) => ({ at: place(mark), label: labels[index] ?? '' })) }
 }
 
 /** An axis of choices, in their order. */

@@ -1,5 +1,6 @@
 /** The metrics of a run: which belong in one chart, and how they are called. */
 import { compact, percent, significant } from '../lib/format'
+import { wordsOf } from './words'
 
 export interface ChartSpec {
   title: string
@@ -17,6 +18,11 @@ export function nameOf({ title, note, metrics, prefix }: ChartSpec): string {
   const [only, ...more] = metrics
   if (only && more.length === 0 && prefix === undefined) return only.name
   return note ? `${title}, ${note}` : title
+}
+
+/** What a chart's values are, with their unit: all its metrics are of one kind. */
+export function axisOf({ metrics, prefix }: ChartSpec): string {
+  return wordsOf(metrics[0]?.name ?? `${prefix}*`).axis
 }
 
 const rate = { format: percent, yRange: [0, 1.02] as const }

@@ -1,9 +1,10 @@
 /** Panels: any metric that was reported, as a chart of its own. */
-import { percent, significant, words } from '../lib/format'
+import { percent, significant } from '../lib/format'
 import { type ChartSpec, MAIN_CHARTS, SECTIONS } from './metrics'
+import { wordsOf } from './words'
 
-/** How a metric's panel looks; as a chart's, less its metrics. */
-export type PanelLook = Omit<ChartSpec, 'metrics' | 'prefix'>
+/** How a metric's panel looks: as a chart, less its metrics. */
+export type PanelLook = Omit<ChartSpec, 'metrics' | 'prefix'> & { y: string }
 
 /** What is looked at where nobody has chosen. */
 export const USUAL_PANELS: readonly string[] = [
@@ -28,35 +29,43 @@ export function panelsOf(names: readonly string[]): readonly string[] | null {
 
 const RATE = { format: percent, yRange: [0, 1.02] as const }
 const EVALUATION = 'eval/'
-const REWARD = 'reward/'
+/** Of metrics that no section knows. */
+export const OTHERS = 'Others'
 
-/** Those that are looked at usually have titles as short as they can be. */
-const SHORT: Record<string, PanelLook> = {
-  'eval/success_rate': { title: 'Success rate', note: 'evaluation', ...RATE },
-  'train/success_rate': { title: 'Success rate', note: 'training', smoothable: true, ...RATE },
-  'train/return': { title: 'Return', note: 'per episode, training', smoothable: true },
-  'eval/steps': { title: 'Steps to the target', note: 'evaluation' },
-}
-
-/** A metric's panel: as its chart on a run's page where there is one, else as its name says. */
+/** A metric's panel: its own words, and all else as its chart on a run's page has it, where there is one. */
 export function lookOf(name: string): PanelLook {
-  return SHORT[name] ?? inCharts(name) ?? byName(name)
-}
-
-function inCharts(name: string): PanelLook | undefined {
-  for (const spec of [...MAIN_CHARTS, ...SECTIONS.flatMap(({ charts }) => charts)]) {
-    const metric = spec.metrics.find((one) => one.name === name)
-    if (!metric) continue
-    const { metrics, prefix: _, note: __, title, ...look } = spec
-    return { ...look, title: metrics.length > 1 ? `${title}: ${metric.label}` : title, note: name }
+  const { title, axis, note, share } = wordsOf(name)
+  const spec = CHARTS.find((one) => shows(one, name))
+  const { format, yRange } = spec ?? (share ? RATE : { format: significant })
+  return {
+    title,
+    y: axis,
+    ...(note ? { note } : {}),
+    ...(format ? { format } : {}),
+    ...(yRange ? { yRange } : {}),
+    smoothable: !name.startsWith(EVALUATION) && (spec ? spec.smoothable === true : true),
   }
-  return undefined
 }
 
-function byName(name: string): PanelLook {
-  const smoothable = !name.startsWith(EVALUATION)
-  if (name.startsWith(REWARD))
-    return { title: `Reward: ${words(name.slice(REWARD.length)).toLowerCase()}`, note: name, smoothable }
-  const isRate = name.endsWith('_rate') && !name.endsWith('learning_rate')
-  return { title: name, smoothable, ...(isRate ? RATE : { format: significant }) }
+/** Metrics by the sections of a run's page, each in the order in which it came: first those that a section shows, then their kin. */
+export function grouped(names: readonly string[]): { group: string; names: readonly string[] }[] {
+  const groups = new Map<string, string[]>(
+    [...SECTIONS.map(({ title }) => title), OTHERS].map((one) => [one, []]),
+  )
+  for (const name of names) groups.get(groupOf(name))?.push(name)
+  return [...groups].flatMap(([group, some]) => (some.length > 0 ? [{ group, names: some }] : []))
 }
+
+function groupOf(name: string): string {
+  const begins = name.slice(0, name.indexOf('/') + 1)
+  const kin = ({ metrics }: ChartSpec) => begins !== '' && metrics.some((one) => one.name.startsWith(begins))
+  const section =
+    SECTIONS.find(({ charts }) => charts.some((one) => shows(one, name))) ??
+    SECTIONS.find(({ charts }) => charts.some(kin))
+  return section?.title ?? OTHERS
+}
+
+const CHARTS = [...MAIN_CHARTS, ...SECTIONS.flatMap(({ charts }) => charts)]
+
+const shows = ({ metrics, prefix }: ChartSpec, name: string): boolean =>
+  metrics.some((one) => one.name === name) || (prefix !== undefined && name.startsWith(prefix))

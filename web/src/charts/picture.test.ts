@@ -4,7 +4,12 @@ import { csvOf, heightOf, svgOf } from './picture'
 import type { ChartData } from './series'
 
 const text = (value: number) => String(value)
-const look = { title: 'Success <rate>', x: { title: 'Steps', format: text }, format: text }
+const look = {
+  title: 'Success <rate>',
+  x: { title: 'Steps', format: text },
+  y: 'Share of <all>',
+  format: text,
+}
 
 const data: ChartData = {
   x: [0, 100],
@@ -28,6 +33,11 @@ test('a chart as SVG: lines, bands, a single point as a dot, axes and legend', (
   expect(svg).toContain('<circle cx="70.0" cy="174.0"')
   expect(svg).toContain('Success &lt;rate&gt;')
   expect(svg).toContain('>Steps</text>')
+  // Upright, in the middle of the axis; the ticks with as many decimals.
+  expect(svg).toContain(
+    '<text transform="translate(16 174) rotate(-90)" text-anchor="middle" fill="#3d464d">Share of &lt;all&gt;</text>',
+  )
+  for (const tick of ['0.0', '0.2', '0.8', '1.0']) expect(svg).toContain(`>${tick}</text>`)
   expect(svg).toContain('=One, 2 seeds</text>')
   expect(new DOMParser().parseFromString(svg, 'image/svg+xml').querySelector('parsererror')).toBeNull()
   expect(svg).toContain(`height="${heightOf(data)}"`)

@@ -1,5 +1,5 @@
 /** A chart as it leaves the page: SVG that needs nothing else, and the numbers as CSV. */
-import { factors, type Horizontal, rounds } from './axis'
+import { alike, factors, type Horizontal, rounds, roundTick } from './axis'
 import { dashes, lineColor } from './palette'
 import { aboveZero, allPositive, type ChartData, type Line, type Values } from './series'
 
@@ -16,6 +16,8 @@ const SAMPLE = 28
 export interface PictureOptions {
   title: string
   x: Horizontal
+  /** What the values are, with their unit. */
+  y: string
   format: (value: number) => string
   yRange?: readonly [number, number] | undefined
   /** What has to be known of the curves, behind the title. */
@@ -28,7 +30,7 @@ export interface PictureOptions {
 
 /** The chart in its light colours, with title, axes and legend; as high as `heightOf` says. */
 export function svgOf(whole: ChartData, options: PictureOptions): string {
-  const { title, note, x, format, yRange, logX = false } = options
+  const { title, note, x, y, format, yRange, logX = false } = options
   const data = logX ? aboveZero(whole) : whole
   const logarithmic = options.logarithmic === true && allPositive(data.lines)
   const bend = logarithmic ? Math.log10 : straight
@@ -46,19 +48,23 @@ export function svgOf(whole: ChartData, options: PictureOptions): string {
   const up = (value: number) => rise(logarithmic ? bend(Math.max(value, 10 ** low)) : value)
   const yTicks = logarithmic ? factors(10 ** low, 10 ** high) : ticks(low, high)
   const xTicks = logX && end > start ? factors(start, end) : ticks(start, end, x.rounds)
+  const yTexts = logarithmic ? yTicks.map((tick) => roundTick(format(tick))) : alike(yTicks, format)
+  const xTexts = logX || x.rounds ? xTicks.map(x.format) : alike(xTicks, x.format)
+  const middle = (TOP + HEIGHT - BOTTOM) / 2
   const ink = 'fill="#3d464d"'
   const legend = data.lines.filter((line) => line.label !== undefined)
   return [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${WIDTH}" height="${heightOf(data)}" viewBox="0 0 ${WIDTH} ${heightOf(data)}" font-family="system-ui, sans-serif" font-size="12">`,
     `<rect width="100%" height="100%" fill="#fff"/>`,
     `<text x="${LEFT}" y="20" font-size="14" font-weight="600" ${ink}>${escaped(title)}${note ? `<tspan font-size="12" font-weight="400"> · ${escaped(note)}</tspan>` : ''}</text>`,
+    `<text transform="translate(16 ${middle}) rotate(-90)" text-anchor="middle" ${ink}>${escaped(y)}</text>`,
     ...yTicks.map(
-      (tick) =>
-        `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(format(tick))}</text>`,
+      (tick, index) =>
+        `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(yTexts[index] ?? '')}</text>`,
     ),
     ...xTicks.map(
-      (tick) =>
-        `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(x.format(tick))}</text>`,
+      (tick, index) =>
+        `<text x="${fixed(across(tick))}" y="${HEIGHT - BOTTOM + 18}" text-anchor="middle" ${ink}>${escaped(xTexts[index] ?? '')}</text>`,
     ),
     `<text x="${(LEFT + WIDTH - RIGHT) / 2}" y="${HEIGHT - BOTTOM + 38}" text-anchor="middle" ${ink}>${escaped(x.title)}</text>`,
     ...data.lines.map((line) => curve(data.x, line, across, up)),

@@ -46,6 +46,7 @@ export function ComparisonDistributions({ comparison, query }: ComparisonDistrib
           title="Performance profile"
           note="share of attempts that score more"
           data={chart}
+          y="Share of attempts"
           format={percent}
           yRange={[0, 1.02]}
           x={SCORE}

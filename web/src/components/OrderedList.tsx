@@ -30,18 +30,22 @@ export function OrderedList({ label, items, titleOf, least = 0, extra, onMove, o
         <li key={item}>
           <span title={item}>{titleOf(item)}</span>
           {extra?.(item, place)}
-          <SmallButton label={`Move ${item} up`} disabled={place === 0} onClick={() => move(place, -1)}>
+          <SmallButton
+            label={`Move ${titleOf(item)} up`}
+            disabled={place === 0}
+            onClick={() => move(place, -1)}
+          >
             <IconArrowUp size={14} />
           </SmallButton>
           <SmallButton
-            label={`Move ${item} down`}
+            label={`Move ${titleOf(item)} down`}
             disabled={place === items.length - 1}
             onClick={() => move(place, 1)}
           >
             <IconArrowDown size={14} />
           </SmallButton>
           <SmallButton
-            label={`Remove ${item}`}
+            label={`Remove ${titleOf(item)}`}
             disabled={items.length <= least}
             onClick={() => onRemove(place)}
           >

@@ -6,10 +6,11 @@ import { ACROSS, placed } from '../charts/across'
 import { curvesOf, useCurves } from '../charts/following'
 import { MetricChart } from '../charts/MetricChart'
 import grid from '../charts/MetricChart.module.css'
-import { type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
+import { axisOf, type ChartSpec, MAIN_CHARTS, nameOf, SECTIONS } from '../charts/metrics'
 import { lookOf, PANELS_AT_ONCE, USUAL_PANELS } from '../charts/panels'
 import { chartOf } from '../charts/shape'
 import { type ChangeView, type ChartView, hiddenOf, logOf, smoothOfChart, useChartView } from '../charts/view'
+import { wordsOf } from '../charts/words'
 import { Below } from './Below'
 import { ChartControls } from './ChartControls'
 import { PanelsButton } from './PanelsButton'
@@ -115,10 +116,7 @@ export function AllCurves({ curves }: { curves: RunCurves }) {
 }
 
 function OwnChart({ name, curves }: { name: string; curves: RunCurves }) {
-  const spec = useMemo(
-    () => ({ ...lookOf(name), metrics: [{ name, label: name.slice(name.indexOf('/') + 1) }] }),
-    [name],
-  )
+  const spec = useMemo(() => ({ ...lookOf(name), metrics: [{ name, label: wordsOf(name).title }] }), [name])
   return <SpecChart spec={spec} height={180} curves={curves} />
 }
 
@@ -140,6 +138,7 @@ const Drawn = memo(function Drawn({ spec, height, series, view, onView, empty }:
   return (
     <MetricChart
       {...look}
+      y={axisOf(spec)}
       data={data}
       x={ACROSS[view.across]}
       logX={view.logX}

@@ -1,7 +1,7 @@
 /** Numbers, times and sizes as the pages write them. */
 
-const NARROW_SPACE = '\u202f'
-const MINUS = '\u2212'
+export const NARROW_SPACE = '\u202f'
+export const MINUS = '\u2212'
 
 /** 1234567 -> "1 234 567" with narrow spaces, which no locale reads as a decimal separator. */
 export function count(value: number): string {

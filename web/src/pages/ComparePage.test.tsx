@@ -212,10 +212,18 @@ test('any metric that was reported becomes a panel, and the address keeps them i
 
   await user.click(screen.getByRole('button', { name: 'Panels' }))
   const search = await screen.findByRole('combobox', { name: 'Add a panel' })
-  await user.type(search, 'kl')
-  await user.click(await screen.findByRole('option', { name: 'policy/kl' }))
-  await user.click(screen.getByRole('button', { name: 'Move policy/kl up' }))
-  await user.click(screen.getByRole('button', { name: 'Remove train/return' }))
+  // By their words, under the headings of a run's page; by their names in the code, too.
+  await user.type(search, 'steps target')
+  const metrics = within(await screen.findByRole('listbox'))
+  expect(metrics.getAllByRole('option').map(({ textContent }) => textContent)).toEqual([
+    'Steps to the target, evaluationeval/steps',
+  ])
+  expect(metrics.getByText('Evaluation')).toBeInTheDocument()
+  await user.clear(search)
+  await user.type(search, 'policy/k')
+  await user.click(await screen.findByRole('option', { name: /^KL divergence, old to new policy/ }))
+  await user.click(screen.getByRole('button', { name: 'Move KL divergence, old to new policy up' }))
+  await user.click(screen.getByRole('button', { name: 'Remove Return, per episode, training' }))
   expect(router.state.location.search).toBe(
     '?experiment=exp1&experiment=exp2&panel=policy%2Fkl&panel=loss%2Fvalue',
   )
@@ -226,8 +234,8 @@ test('any metric that was reported becomes a panel, and the address keeps them i
     '/api/compare/report?experiment=exp1&experiment=exp2&margin=0.02&name=policy%2Fkl&name=loss%2Fvalue',
   )
 
-  await user.click(screen.getByRole('button', { name: 'Remove policy/kl' }))
-  expect(screen.getByRole('button', { name: 'Remove loss/value' })).toBeDisabled()
+  await user.click(screen.getByRole('button', { name: 'Remove KL divergence, old to new policy' }))
+  expect(screen.getByRole('button', { name: 'Remove Value loss' })).toBeDisabled()
   await user.click(screen.getByRole('button', { name: 'Usual' }))
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
   expect((await screen.findAllByRole('figure', { name: 'Success rate' })).length).toBe(2)

@@ -7,6 +7,7 @@ import type { CampaignRow, PaperFigure, Reproduction } from '../../api/types'
 import { MetricChart } from '../../charts/MetricChart'
 import charts from '../../charts/MetricChart.module.css'
 import { chartOfCurves } from '../../charts/shape'
+import { wordsOf } from '../../charts/words'
 import { compact } from '../../lib/format'
 import { isActive } from '../states'
 import { Panel } from '../ui'
@@ -85,6 +86,7 @@ function Figure({ figure, metric, active, rows }: FigureProps) {
     <MetricChart
       title={figure.title}
       data={chart}
+      y={wordsOf(metric).axis}
       format={compact}
       smoothable
       empty={error && !data ? 'Could not be loaded' : 'No value yet'}
