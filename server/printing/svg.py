@@ -11,6 +11,8 @@ _WIDTH, _HEIGHT = 570, 280
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 22, 12, 48
 # Pixels of a row of the legend.
 _ROW = 18
+# Of the title of y: as long as its axis is.
+_MOST_LETTERS = 36
 # Of a line in the legend: as long as shows its dashes.
 _SAMPLE = 28
 
@@ -115,6 +117,8 @@ def _places(horizontal: Horizontal, places: Sequence[float], across: Callable[[f
 
 
 def _upright(title: str) -> list[str]:
+    # A metric without words is called by its name, which may be longer; the chart's heading has all of it.
+    title = title if len(title) <= _MOST_LETTERS else f"{title[: _MOST_LETTERS - 1]}…"
     middle = (_TOP + _HEIGHT - _BOTTOM) / 2
     place = f'transform="translate(12 {middle:.1f}) rotate(-90)" text-anchor="middle"'
     return [f'<text {place} fill="currentColor">{escape(title)}</text>']

@@ -143,6 +143,8 @@ def test_a_line_chart_in_numbers() -> None:
     alone = line_chart("t", STEPS, [5], [Line("one", Look(0), [2.0], [None], [None])], rate=False)
     assert '<circle cx="306.0" cy="122.0" r="3"' in alone
     assert "No value yet" in line_chart("t", STEPS, [], [], rate=True)
+    # A name that is longer than the axis ends in time.
+    assert f">{'a' * 35}…</text>" in line_chart("t", STEPS, [0, 50, 100], [line], rate=True, vertical="a" * 64)
 
 
 def test_logarithmic_axes_of_a_chart_in_numbers() -> None:

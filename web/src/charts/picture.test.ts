@@ -72,3 +72,8 @@ test('a logarithmic x begins above 0: a tenth of the way is half of two decades'
   expect(svg).toContain('<polyline points="70.0,312.0 387.0,174.0 704.0,36.0"')
   for (const power of ['1', '10', '100']) expect(svg).toContain(`>${power}</text>`)
 })
+
+test('a name that is longer than the axis ends in time', () => {
+  const svg = svgOf(data, { ...look, y: 'a'.repeat(64) })
+  expect(svg).toContain(`>${'a'.repeat(39)}…</text>`)
+})

@@ -10,6 +10,8 @@ const RIGHT = 16
 const TOP = 36
 const BOTTOM = 48
 const ROW = 18
+/** Of the title of y: as long as its axis is. */
+const MOST_LETTERS = 40
 /** Of a line, in the legend: as long as shows its dashes. */
 const SAMPLE = 28
 
@@ -57,7 +59,7 @@ export function svgOf(whole: ChartData, options: PictureOptions): string {
     `<svg xmlns="http://www.w3.org/2000/svg" width="${WIDTH}" height="${heightOf(data)}" viewBox="0 0 ${WIDTH} ${heightOf(data)}" font-family="system-ui, sans-serif" font-size="12">`,
     `<rect width="100%" height="100%" fill="#fff"/>`,
     `<text x="${LEFT}" y="20" font-size="14" font-weight="600" ${ink}>${escaped(title)}${note ? `<tspan font-size="12" font-weight="400"> · ${escaped(note)}</tspan>` : ''}</text>`,
-    `<text transform="translate(16 ${middle}) rotate(-90)" text-anchor="middle" ${ink}>${escaped(y)}</text>`,
+    `<text transform="translate(16 ${middle}) rotate(-90)" text-anchor="middle" ${ink}>${escaped(shortened(y))}</text>`,
     ...yTicks.map(
       (tick, index) =>
         `<line x1="${LEFT}" x2="${WIDTH - RIGHT}" y1="${fixed(up(tick))}" y2="${fixed(up(tick))}" stroke="#e2e6e8"/><text x="${LEFT - 8}" y="${fixed(up(tick) + 4)}" text-anchor="end" ${ink}>${escaped(yTexts[index] ?? '')}</text>`,
@@ -150,6 +152,10 @@ function ticks(low: number, high: number, steps?: readonly number[]): number[] {
 
 const straight = (value: number) => value
 const fixed = (value: number) => value.toFixed(1)
+
+/** A metric without words is called by its name, which may be longer than the axis; the chart's title has all of it. */
+const shortened = (text: string) =>
+  text.length > MOST_LETTERS ? `${text.slice(0, MOST_LETTERS - 1)}…` : text
 
 function escaped(text: string): string {
   return text.replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;')
