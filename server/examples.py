@@ -75,6 +75,7 @@ BODIES: dict[str, Any] = {
         "suites": [{"by": "name", "name": "simple-200"}],
     },
     "POST /api/uploads": {"name": "From elsewhere", "content": _ONNX, "task": {"arena": {"name": "complex"}}},
+    "POST /api/uploads/shapes": {"task": {"lidar": {"rays": 60, "field_of_view": 360.0}}},
     "PUT /api/experiments/{experiment_id}/thinning": {"rule": {"last": 5, "every": 10, "best": True}},
     "PUT /api/experiments/{experiment_id}/curve-thinning": {"rule": {"points": 1_000, "after_days": 30}},
 }

@@ -41,6 +41,7 @@ def test_checkpoints_are_listed_with_what_they_achieve(client: TestClient, repor
                 "seeds": 1,
                 "at_most": pytest.approx(0.95),
                 "sentence": "One seed alone: of others up to 95 % may fail (one-sided 95 %).",
+                "told": True,
             },
         },
         # Of the four that arrived; the six collisions would make a bad policy look quick.

@@ -31,6 +31,7 @@ DONE_AT_ONCE = (
     "POST /api/arenas/reviews",
     "POST /api/playgrounds",
     "POST /api/suites",
+    "POST /api/uploads/shapes",
     "POST /api/reproduction",
     "POST /api/worker-tokens",
     "POST /api/alerts/rules",

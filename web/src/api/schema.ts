@@ -20063,6 +20063,16 @@ export interface operations {
         };
         requestBody: {
             content: {
+                /**
+                 * @example {
+                 *       "task": {
+                 *         "lidar": {
+                 *           "rays": 60,
+                 *           "field_of_view": 360
+                 *         }
+                 *       }
+                 *     }
+                 */
                 "application/json": components["schemas"]["PolicyTask"];
             };
         };
