@@ -101,7 +101,7 @@ def test_evaluate_tells_what_several_seeds_say_together(tmp_path: Path, checkpoi
     *each, together = result.output.splitlines()
     assert len(each) == 4
     assert re.search(r"success \[\d+\.\d%, \d+\.\d%\] over 3 seeds on simple-200 \(.*%, .*%, .*%\)\. ", together)
-    assert "of 3 seeds failed" in together or "All 3 seeds failed" in together
+    assert re.search("of 3 seeds failed|All 3 seeds failed|Even the best of 3 seeds arrives in", together)
 
 
 def test_export_writes_onnx(tmp_path: Path, checkpoint: Path) -> None:
