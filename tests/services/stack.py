@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -155,7 +156,8 @@ class Service:
         for process in self.processes:
             if process.poll() is None:
                 for member in tree(process.pid):
-                    member.kill()
+                    with suppress(psutil.NoSuchProcess):  # it ended meanwhile
+                        member.kill()
                 process.wait()
         self.api.close()
 
