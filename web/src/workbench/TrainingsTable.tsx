@@ -48,6 +48,7 @@ export function TrainingsTable(props: TrainingsTableProps) {
   const narrow = useMediaQuery('(max-width: 620px)') ?? false
   const scroll = useRef<HTMLDivElement>(null)
   const [active, setActive] = useState(0)
+  const wanted = useRef<number | null>(null)
   const virtual = useVirtualizer({
     count: rows.length,
     getScrollElement: () => scroll.current,
@@ -73,14 +74,31 @@ export function TrainingsTable(props: TrainingsTableProps) {
   const tick = (id: string) => onTick(here.has(id) ? ticked.filter((one) => one !== id) : [...ticked, id])
   const go = (index: number) => {
     const next = Math.max(0, Math.min(rows.length - 1, index))
+    wanted.current = next
     setActive(next)
     virtual.scrollToIndex(next)
-    requestAnimationFrame(() =>
-      scroll.current?.querySelector<HTMLElement>(`[data-index="${next}"]`)?.focus({ preventScroll: true }),
-    )
   }
+  // A row far away is drawn some pictures after it was scrolled to, and has the focus from then on.
+  useEffect(() => {
+    if (wanted.current === null) return
+    const row = scroll.current?.querySelector<HTMLElement>(`[data-index="${wanted.current}"]`)
+    if (!row) return
+    wanted.current = null
+    row.focus({ preventScroll: true })
+  })
+  // What comes is gone to as it comes, until somebody wants to be elsewhere.
+  const toEnd = useRef(false)
+  const stay = () => {
+    toEnd.current = false
+    wanted.current = null
+  }
+  // biome-ignore lint/correctness/useExhaustiveDependencies: once for all rows that have come.
+  useEffect(() => {
+    if (toEnd.current) go(rows.length - 1)
+  }, [rows.length])
   const onKeyDown = (event: KeyboardEvent<HTMLElement>, index: number, row: Row) => {
     if (event.target !== event.currentTarget) return
+    toEnd.current = event.key === 'End'
     const page = Math.floor((scroll.current?.clientHeight ?? 0) / ROW_PX) - 2
     const steps: Record<string, number> = {
       ArrowDown: index + 1,
@@ -119,6 +137,8 @@ export function TrainingsTable(props: TrainingsTableProps) {
       aria-multiselectable
       data-testid="experiments"
       tabIndex={-1}
+      onWheel={stay}
+      onPointerDown={stay}
     >
       {headed && (
         // biome-ignore lint/a11y/useFocusableInteractive: its buttons are.
