@@ -10,9 +10,10 @@ import type { ArenaSummary, ArenaView } from '../api/types'
 import { arenaFacts, drawOn, trainOn } from '../lib/arenas'
 import classes from './ArenaCard.module.css'
 import { ArenaDrawing } from './ArenaDrawing'
+import { DeleteButton } from './DeleteButton'
 import { AddToSuite } from './evaluations/AddToSuite'
 import { evaluate, suiteInArena } from './evaluations/choices'
-import { IconPencil, IconPlus, IconRefresh, IconTrash } from './icons'
+import { IconPencil, IconPlus, IconRefresh } from './icons'
 
 interface ArenaCardProps {
   arena: ArenaSummary
@@ -69,16 +70,7 @@ function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
               <IconPlus size={16} stroke={1.6} />
             </ActionIcon>
           </Tooltip>
-          <Tooltip label={`Delete ${arena.title}`}>
-            <ActionIcon
-              variant="subtle"
-              color="gray"
-              aria-label={`Delete ${arena.title}`}
-              onClick={() => onDelete(arena)}
-            >
-              <IconTrash size={16} stroke={1.6} />
-            </ActionIcon>
-          </Tooltip>
+          <DeleteButton name={arena.title} onClick={() => onDelete(arena)} />
           {adding && <AddToSuite title={arena.title} sha256={arena.key} onClose={() => setAdding(false)} />}
         </>
       }

@@ -1,11 +1,11 @@
 /** What robots recorded: upload a recording, open one that was uploaded. */
-import { ActionIcon, Anchor, Skeleton, Stack, Table, VisuallyHidden } from '@mantine/core'
+import { Anchor, Skeleton, Stack, Table, VisuallyHidden } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../api/client'
+import { DeleteButton } from '../components/DeleteButton'
 import { DeleteDialog } from '../components/DeleteDialog'
 import table from '../components/ExperimentTable.module.css'
-import { IconTrash } from '../components/icons'
 import { Pager } from '../components/Pager'
 import { useChange } from '../components/people/useChange'
 import { RecordingUpload } from '../components/recordings/RecordingUpload'
@@ -69,14 +69,7 @@ export function RecordingsPage() {
                       </Table.Td>
                       <Table.Td title={dateTime(each.created_at)}>{age(each.created_at, now)}</Table.Td>
                       <Table.Td ta="right">
-                        <ActionIcon
-                          variant="subtle"
-                          color="gray"
-                          aria-label={`Delete ${each.name}`}
-                          onClick={() => setGoing(each)}
-                        >
-                          <IconTrash size={16} />
-                        </ActionIcon>
+                        <DeleteButton name={each.name} onClick={() => setGoing(each)} />
                       </Table.Td>
                     </Table.Tr>
                   ))}

@@ -1,12 +1,12 @@
 /** Suites of one's own: what each has, the way to measure on it, and to be rid of it. */
-import { ActionIcon, Button, Group, Table, Text, Tooltip } from '@mantine/core'
+import { Button, Group, Table, Text } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../../api/client'
 import { plural } from '../../lib/format'
+import { DeleteButton } from '../DeleteButton'
 import { DeleteDialog } from '../DeleteDialog'
 import table from '../ExperimentTable.module.css'
-import { IconTrash } from '../icons'
 import { useChange } from '../people/useChange'
 import { Panel } from '../ui'
 import { evaluate, suiteOfOnesOwn } from './choices'
@@ -53,16 +53,7 @@ export function OwnSuites() {
                         Evaluate
                       </Button>
                     )}
-                    <Tooltip label="Delete">
-                      <ActionIcon
-                        variant="subtle"
-                        color="gray"
-                        aria-label={`Delete ${name}`}
-                        onClick={() => setDeleted({ id, name })}
-                      >
-                        <IconTrash size={16} stroke={1.6} />
-                      </ActionIcon>
-                    </Tooltip>
+                    <DeleteButton name={name} onClick={() => setDeleted({ id, name })} />
                   </Group>
                 </Table.Td>
               </Table.Tr>

@@ -1,12 +1,12 @@
 /** Policies from elsewhere: each can be measured and deleted. */
-import { ActionIcon, Button, Group, Table, Tooltip } from '@mantine/core'
+import { Button, Group, Table } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../../api/client'
 import { fileSize } from '../../lib/format'
+import { DeleteButton } from '../DeleteButton'
 import { DeleteDialog } from '../DeleteDialog'
 import table from '../ExperimentTable.module.css'
-import { IconTrash } from '../icons'
 import { Pager } from '../Pager'
 import { useChange } from '../people/useChange'
 import { Panel } from '../ui'
@@ -52,16 +52,7 @@ export function UploadedPolicies() {
                     >
                       Evaluate
                     </Button>
-                    <Tooltip label="Delete">
-                      <ActionIcon
-                        variant="subtle"
-                        color="gray"
-                        aria-label={`Delete ${name}`}
-                        onClick={() => setDeleted({ id, name })}
-                      >
-                        <IconTrash size={16} stroke={1.6} />
-                      </ActionIcon>
-                    </Tooltip>
+                    <DeleteButton name={name} onClick={() => setDeleted({ id, name })} />
                   </Group>
                 </Table.Td>
               </Table.Tr>
