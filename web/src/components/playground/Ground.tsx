@@ -21,7 +21,7 @@ export function Ground({ ground }: { ground: Playground }) {
   const watching = useWatching()
   const actions = useGround(ground)
   const whole = useRef<HTMLDivElement>(null)
-  const { paused, speed } = ground.settings
+  const { paused, speed } = actions.settings
   return (
     <div className={classes.ground} data-testid="playground">
       <div className={classes.stage}>
@@ -64,7 +64,7 @@ export function Ground({ ground }: { ground: Playground }) {
       </div>
       <div className={classes.stage}>
         <ThingsShown asked={ground} picture={whole} actions={actions} />
-        <Perception settings={ground.settings} configure={actions.configure} />
+        <Perception settings={actions.settings} configure={actions.configure} />
         <KeepArena ground={ground} />
       </div>
     </div>
