@@ -282,7 +282,13 @@ function RunActions({ run, best, known }: OfRun) {
           Download the best
         </Button>
       )}
-      {!known && <Skeleton width={178} height={36} />}
+      {!known && (
+        <Skeleton w="auto">
+          <Button disabled aria-hidden leftSection={<IconDownload size={16} />}>
+            Download the best
+          </Button>
+        </Skeleton>
+      )}
       <Button
         variant="default"
         leftSection={<IconCopy size={16} />}
