@@ -38,7 +38,7 @@ export function Setting({ schema, value, error, more, onChange }: SettingProps) 
     return (
       <Switch
         label={schema.title}
-        description={schema.description}
+        description={description}
         error={error}
         size="xs"
         className={classes.part}

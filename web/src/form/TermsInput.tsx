@@ -28,7 +28,7 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
   const kinds = branches(field.item, root)
   const tag = field.item.discriminator?.propertyName ?? 'name'
   const set = (next: Term[]) => form.set(field.path, next)
-  const numbers = settingsInTerms(field, root, form.values).filter(({ kind }) => kind === 'number')
+  const settings = settingsInTerms(field, root, form.values)
   const search = useContext(SearchContext)
   const left = kinds.filter(
     ({ tag: kind }) => kind === 'formula' || !terms.some((term) => term[tag] === kind),
@@ -78,7 +78,7 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
                 .map(([name, one]) => (
                   <TermSetting
                     key={name}
-                    setting={numbers.find((each) => each.key === `${key}.${name}`)}
+                    setting={settings.find((each) => each.key === `${key}.${name}`)}
                     schema={withoutNull(resolve(one, root)).schema}
                     value={term[name] ?? null}
                     form={form}
@@ -125,7 +125,7 @@ export function TermsInput({ field, form, root }: TermsInputProps) {
 }
 
 interface TermSettingProps {
-  /** Of a number, as the form knows it, to be searched. */
+  /** As the form knows it: what is wrong with it, and whether it can be searched. */
   setting: Field | undefined
   schema: Schema
   value: Json

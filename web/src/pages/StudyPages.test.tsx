@@ -194,7 +194,7 @@ test('a range in the form makes a study of the training, refused at its field', 
   expect(screen.getByRole('button', { name: 'Launch' })).toBeVisible()
 })
 
-test('weights of a reward and hidden layers are searched, a weight where its term stands by then', async () => {
+test('settings of a reward and hidden layers are searched, a term where it stands by then', async () => {
   const server = startServer({
     'GET /api/training/form': form,
     'POST /api/studies': refusal(422, [
@@ -208,6 +208,7 @@ test('weights of a reward and hidden layers are searched, a weight where its ter
   const { user } = open('/new')
   await user.click(await screen.findByRole('button', { name: /^Advanced/ }))
   await user.click(screen.getByRole('button', { name: 'Try a range: Progress, weight' }))
+  await user.click(screen.getByRole('button', { name: 'Try several: Progress, exponential' }))
   await user.click(screen.getByRole('button', { name: 'Try several: Hidden layers' }))
   const second = screen.getByRole('textbox', { name: 'Hidden layers, choice 2' })
   expect(second).toHaveValue('128, 128')
@@ -227,6 +228,7 @@ test('weights of a reward and hidden layers are searched, a weight where its ter
   expect(server.changes[0]?.body).toMatchObject({
     settings: [
       { kind: 'range', path: 'task.reward.terms.0.weight', low: 50, high: 5000, log: true },
+      { kind: 'list', path: 'task.reward.terms.0.exponential', values: [true, false] },
       {
         kind: 'list',
         path: 'algorithm.network.hidden_sizes',
