@@ -75,11 +75,11 @@ export function MetricChart({
   return (
     <div className={classes.metric}>
       <div className={classes.head}>
-        <Title order={3}>
+        <Title order={3} className={classes.title} title={note && `${title}, ${note}`}>
           {title}
           {note && <span className={classes.note}>{note}</span>}
         </Title>
-        <Group gap="sm">
+        <Group gap="sm" wrap="nowrap">
           {smoothable && (
             <div className={classes.smoothing}>
               <span aria-hidden>Smoothing</span>

@@ -29,7 +29,7 @@ export function RunTable({ runs }: { runs: readonly Run[] }) {
         <Table.Tbody>
           {runs.map((run) => (
             <Table.Tr key={run.id} data-testid="run">
-              <Table.Td fw={550}>
+              <Table.Td fw={550} style={{ whiteSpace: 'nowrap' }}>
                 <Anchor component={Link} to={`/runs/${run.id}`} inherit>
                   Seed {run.seed}
                 </Anchor>

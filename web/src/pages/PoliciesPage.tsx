@@ -53,11 +53,13 @@ export function PoliciesPage() {
             : [0, 1, 2, 3].map((key) => <Skeleton key={key} height={CARD_HEIGHT} />)}
         </ul>
       )}
-      <div className={classes.matrix} id="families" ref={families}>
-        <Below height={500}>
-          <FieldMatrix />
-        </Below>
-      </div>
+      {(known || error) && (
+        <div className={classes.matrix} id="families" ref={families}>
+          <Below height={500}>
+            <FieldMatrix />
+          </Below>
+        </div>
+      )}
     </Page>
   )
 }
