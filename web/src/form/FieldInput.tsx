@@ -1,5 +1,5 @@
 /** One field of a form, as the control that fits its schema. */
-import { Anchor, Input, NumberInput, Select, Switch, Text, TextInput } from '@mantine/core'
+import { Anchor, Input, NumberInput, Select, Text, TextInput } from '@mantine/core'
 import { Segments } from '../components/Segments'
 import { count, significant, words } from '../lib/format'
 import classes from './form.module.css'
@@ -8,6 +8,7 @@ import { type Field, initialOf } from './layout'
 import { NumbersText } from './NumbersText'
 import { problemOf } from './problems'
 import { SearchInput, TryMany } from './SearchInput'
+import { SwitchInput } from './SwitchInput'
 import { type Json, range, type Schema } from './schema'
 import { freshSearch, useSearched } from './search'
 import { TermsInput } from './TermsInput'
@@ -74,13 +75,13 @@ export function FieldInput({ field, form, root, initial }: FieldInputProps) {
       return <Choice {...common} options={field.options} value={String(value)} onChange={set} />
     case 'boolean':
       return (
-        <Switch
+        <SwitchInput
           id={common.id}
           label={field.label}
           description={common.description}
           error={error}
           checked={value === true}
-          onChange={(event) => set(event.currentTarget.checked)}
+          onChange={set}
           className={classes.switch}
         />
       )

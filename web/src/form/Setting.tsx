@@ -1,7 +1,8 @@
 /** One setting of an object in a list, such as a reward's term or an observation's part, as a small control. */
-import { NumberInput, Select, Switch, TextInput } from '@mantine/core'
+import { NumberInput, Select, TextInput } from '@mantine/core'
 import { words } from '../lib/format'
 import classes from './form.module.css'
+import { SwitchInput } from './SwitchInput'
 import type { Json, Schema } from './schema'
 
 interface SettingProps {
@@ -36,14 +37,14 @@ export function Setting({ schema, value, error, more, onChange }: SettingProps) 
   }
   if (schema.type === 'boolean')
     return (
-      <Switch
+      <SwitchInput
         label={schema.title}
         description={description}
         error={error}
         size="xs"
         className={classes.part}
         checked={value === true}
-        onChange={(event) => onChange(event.currentTarget.checked)}
+        onChange={onChange}
       />
     )
   if (schema.enum)
