@@ -141,8 +141,9 @@ export function ProblemSummary({ fields, problems, root }: ProblemSummaryProps) 
       <Notice bad title="Not launched: some values were refused" role="alert" data-testid="problems">
         <ul style={{ margin: 0, paddingLeft: 18 }}>
           {entries.map(([path, message]) => {
+            // Of a list and a setting of what is in it, the setting.
             const field =
-              fields.find((one) => isAt(one, path)) ??
+              fields.findLast((one) => isAt(one, path)) ??
               fields.find((one) => path !== '' && parentOf(one) === path)
             return (
               <li key={path}>

@@ -6,6 +6,7 @@ import { SwitchInput } from './SwitchInput'
 import type { Json, Schema } from './schema'
 
 interface SettingProps {
+  id?: string | undefined
   /** Beside its description. */
   more?: React.ReactNode
   schema: Schema
@@ -14,7 +15,7 @@ interface SettingProps {
   onChange: (value: Json) => void
 }
 
-export function Setting({ schema, value, error, more, onChange }: SettingProps) {
+export function Setting({ id, schema, value, error, more, onChange }: SettingProps) {
   const description = more ? (
     <>
       {schema.description}
@@ -24,6 +25,7 @@ export function Setting({ schema, value, error, more, onChange }: SettingProps) 
     schema.description
   )
   const common = {
+    id,
     label: schema.title,
     description,
     error,
@@ -38,6 +40,7 @@ export function Setting({ schema, value, error, more, onChange }: SettingProps) 
   if (schema.type === 'boolean')
     return (
       <SwitchInput
+        id={id}
         label={schema.title}
         description={description}
         error={error}

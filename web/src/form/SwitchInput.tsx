@@ -4,7 +4,7 @@ import { type ReactNode, useId } from 'react'
 import classes from './form.module.css'
 
 interface SwitchInputProps {
-  id?: string
+  id?: string | undefined
   label: string | undefined
   description: ReactNode
   error: string | undefined

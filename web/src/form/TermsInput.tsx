@@ -152,7 +152,16 @@ function TermSetting({ setting, schema, value, form, onChange }: TermSettingProp
   const more = setting && search && (
     <TryMany field={setting} onClick={() => search.set(freshSearch(setting, value))} />
   )
-  return <Setting schema={schema} value={value} error={error} more={more} onChange={onChange} />
+  return (
+    <Setting
+      id={setting && fieldId(setting.key)}
+      schema={schema}
+      value={value}
+      error={error}
+      more={more}
+      onChange={onChange}
+    />
+  )
 }
 
 /** "mine", or "mine_2" where that is taken. */

@@ -99,6 +99,14 @@ function fieldsAt(unresolved: Schema, root: Schema, values: Json, place: Place, 
   }
 }
 
+/** The fields, and behind each list of objects what can be set of these. */
+export function withSettingsInTerms(fields: readonly Field[], root: Schema, values: Json): Field[] {
+  return fields.flatMap((field) => [
+    field,
+    ...(field.kind === 'terms' ? settingsInTerms(field, root, values) : []),
+  ])
+}
+
 /** What can be set of each object in a list, such as a reward's terms: "Collision, weight". */
 export function settingsInTerms(field: Field & { kind: 'terms' }, root: Schema, values: Json): Field[] {
   const list = valueAt(values, field.path)

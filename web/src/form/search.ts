@@ -2,7 +2,7 @@
 import { createContext, useCallback, useContext, useState } from 'react'
 import type { components } from '../api/schema'
 import { faultOf } from './faults'
-import { type Field, settingsInTerms } from './layout'
+import { type Field, withSettingsInTerms } from './layout'
 import type { Problems } from './problems'
 import type { Json, Schema } from './schema'
 import { namedPath, pathKey, sameValue } from './values'
@@ -163,12 +163,10 @@ export function searchedFields(
   root: Schema,
   values: Json,
 ): SearchedField[] {
-  return fields
-    .flatMap((field) => [field, ...(field.kind === 'terms' ? settingsInTerms(field, root, values) : [])])
-    .flatMap((field) => {
-      const one = isSearchable(field) ? searched[searchKey(field.path, values)] : undefined
-      return one === undefined ? [] : [{ field, searched: one }]
-    })
+  return withSettingsInTerms(fields, root, values).flatMap((field) => {
+    const one = isSearchable(field) ? searched[searchKey(field.path, values)] : undefined
+    return one === undefined ? [] : [{ field, searched: one }]
+  })
 }
 
 /** What is sent of a search. */

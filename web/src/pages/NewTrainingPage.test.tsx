@@ -232,6 +232,9 @@ test('what the server refuses of a term stands in its row', async () => {
   await user.click(await screen.findByRole('button', { name: 'Launch' }))
   const progress = await screen.findByRole('listitem', { name: 'Progress' })
   expect(await within(progress).findByText('Too much')).toBeInTheDocument()
+  const summary = screen.getByTestId('problems')
+  await user.click(within(summary).getByRole('button', { name: 'Progress, weight' }))
+  expect(within(progress).getByRole('textbox', { name: 'Weight' })).toHaveFocus()
 })
 
 test('what was typed is there again after a look elsewhere, until one starts over', async () => {

@@ -17,7 +17,7 @@ import { Segments } from '../components/Segments'
 import { FIRST_CHOICES, StudySettings } from '../components/studies/StudySettings'
 import { Page, Panel, QueryError } from '../components/ui'
 import { faultsOf } from '../form/faults'
-import { type Field, fieldsOf } from '../form/layout'
+import { type Field, fieldsOf, withSettingsInTerms } from '../form/layout'
 import type { Problems } from '../form/problems'
 import { AdvancedFields, FieldGrid, ProblemSummary } from '../form/SchemaForm'
 import { SeedsInput } from '../form/SeedsInput'
@@ -294,7 +294,11 @@ function LaunchForm({ draft, schema, defaults, initial, presets }: LaunchFormPro
               </Anchor>
             </Text>
           )}
-          <ProblemSummary fields={[...fields, START_FIELD]} problems={refused} root={schema} />
+          <ProblemSummary
+            fields={[...withSettingsInTerms(fields, schema, state.values), START_FIELD]}
+            problems={refused}
+            root={schema}
+          />
           <Panel>
             <Stack gap="lg">
               <FieldGrid fields={name} {...shared} />
