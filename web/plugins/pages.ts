@@ -1,7 +1,7 @@
 /**
  * An HTML for each page (`dist/pages`), and which address opens which (`routes.json`, for `server/http/pages.py`). In it are the
- * header with its styles, painted before anything else has come, and links to all code and styles of the page, so that the
- * browser asks for them at once and not one after another.
+ * header with its styles, painted before anything else has come, links to all styles of the page, and a template with links to
+ * its code: once the header is painted, the browser asks for all of it together and not one after another (public/frame.js).
  */
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs'
 import { join } from 'node:path'
@@ -17,6 +17,7 @@ const STYLE_SHEET = /^\s*<link rel="stylesheet"[^>]*>\n?/gm
 const ENTRY = /^\s*<script type="module"[^>]* src="([^"]+)"><\/script>\n?/m
 const FRAME = '<div id="frame">'
 const ROOT = '<div id="root">'
+const LAST = '</template>'
 
 export function pages(): Plugin {
   const style = readFileSync(join(import.meta.dirname, '../src/frame.css'), 'utf8')
@@ -35,7 +36,7 @@ export function pages(): Plugin {
         if (!entry) throw new Error('index.html has no entry')
         return framed
           .replace(STYLE_SHEET, '')
-          .replace(ENTRY, `${link('modulepreload', entry)}\n`)
+          .replace(ENTRY, `<template id="code">${link('modulepreload', entry)}${LAST}\n`)
           .replace('<script src="/frame.js">', `<script src="/frame.js" data-entry="${entry}">`)
           .replace(ROOT, `${sheets.join('')}${ROOT}`)
       },
@@ -57,7 +58,7 @@ export function pages(): Plugin {
             .map((file) => link(rel, `/${file}`))
             .join('')
         const page = html
-          .replace('</head>', `${links('modulepreload', code)}</head>`)
+          .replace(LAST, `${links('modulepreload', code)}${LAST}`)
           .replace(ROOT, `${links('stylesheet', styles)}${ROOT}`)
           .replace(new RegExp(`${FRAME}.*`), frameHtml(path.replace(/\/:.*/, ''), head, named))
           .replace('<title>Mapless', `<title>${head ? `${head.title} – ` : ''}Mapless`)

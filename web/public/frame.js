@@ -48,14 +48,20 @@ document.addEventListener('DOMContentLoaded', async () => {
   Object.assign(early, { title, about })
 })
 
-// The application starts when the page is read and the frame's first picture drawn, which a tab in the background never is.
+// The application's code is asked for, and started, once the frame's first picture is seen, which in a tab in the background
+// never is: it would take the line and the processor from that picture.
 const { entry } = document.currentScript.dataset
 if (entry) {
   document.addEventListener('DOMContentLoaded', () => {
-    const patience = setTimeout(start, 300)
-    requestAnimationFrame(() => setTimeout(start))
+    let patience = setTimeout(start, 300)
+    if (PerformanceObserver.supportedEntryTypes?.includes('paint'))
+      new PerformanceObserver(start).observe({ type: 'paint', buffered: true })
+    else requestAnimationFrame(() => setTimeout(start))
     function start() {
+      if (patience === undefined) return
       clearTimeout(patience)
+      patience = undefined
+      document.head.append(document.getElementById('code').content)
       import(entry)
     }
   })

@@ -34,10 +34,12 @@ interface AdvancedFieldsProps extends FieldGridProps {
   refused: Problems
 }
 
-/** Everything else, by heading; opens by itself where something inside was refused. */
+/** Everything else, by heading; made when it is first opened, which it is by itself where something inside was refused. */
 export function AdvancedFields({ fields, refused, ...rest }: AdvancedFieldsProps) {
   const { form, initial } = rest
   const [open, setOpen] = useState<string | null>(null)
+  const [made, setMade] = useState(false)
+  if (open !== null && !made) setMade(true)
   const [search, setSearch] = useState('')
   const troubled = fields.some((field) =>
     Object.keys(refused).some((path) => isAt(field, path) || path === parentOf(field)),
@@ -74,7 +76,7 @@ export function AdvancedFields({ fields, refused, ...rest }: AdvancedFieldsProps
               None of these settings is called so.
             </Text>
           )}
-          {grouped(found).map(([heading, some]) => (
+          {grouped(made ? found : []).map(([heading, some]) => (
             <section key={heading} className={classes.group}>
               <Title order={2} size="h3" className={classes.heading}>
                 {heading}
