@@ -25,6 +25,7 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
     TrailPart,
+    WayPart,
     part_key,
 )
 from sim.config.observation import part_size
@@ -172,6 +173,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return (ObservationNumber("heading deviation", f"|bearing| / pi, {_BEARING}", 0.0, 1.0, "pi rad"),)
         case TrailPart():
             return tuple(_trail(part, task))
+        case WayPart():
+            return tuple(_way(task))
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -205,6 +208,15 @@ def _trail(part: TrailPart, task: TaskConfig) -> Iterator[ObservationNumber]:
             yield ObservationNumber(f"{name} {k}", formula, 0.0, 1.0)
     half = 160 if is_long else 40
     yield ObservationNumber("trail length", f"n / (n + {half}), n = crumbs dropped in this attempt", 0.0, 1.0)
+
+
+def _way(task: TaskConfig) -> Iterator[ObservationNumber]:
+    free = (
+        f"f = {near_distance(task):g} m on both sides of it no reading ends for so far, at most the LiDAR's range, "
+        f"l = distance to the target - {task.arrival_distance:g} m"
+    )
+    yield ObservationNumber("free way", f"min(f, l) / l, {free}; 1 where l is 0", 0.0, 1.0)
+    yield ObservationNumber("way is free", "1 where f >= l, else 0", 0.0, 1.0)
 
 
 def pack_parts(task: TaskConfig) -> dict[str, object]:

@@ -50,6 +50,7 @@ from sim.config.observation import (
     RangesPart,
     SpeedsPart,
     TrailPart,
+    WayPart,
     part_key,
     preset_parts,
 )
@@ -171,6 +172,7 @@ __all__ = [
     "TrailPart",
     "WaffleConfig",
     "Walker",
+    "WayPart",
     "Waypoint",
     "part_key",
     "preset_parts",

@@ -144,6 +144,13 @@ class TrailPart(Frozen):
     frames: int = _frames()
 
 
+class WayPart(Frozen):
+    """How much of the straight way to the target its scan sees to be free, and whether all of it is."""
+
+    name: Literal["way"] = Field("way", title="Straight way to the target")
+    frames: int = _frames()
+
+
 class AddedObservationPart(AddedPart):
     """A part that an extension has added."""
 
@@ -165,6 +172,7 @@ BuiltInPart = (
     | HeadingPart
     | DeviationPart
     | TrailPart
+    | WayPart
 )
 
 if TYPE_CHECKING:
@@ -278,7 +286,7 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return part.batches * scanners
         case SpeedsPart() | ActionsPart():
             return actions
-        case BearingPart(encoding="sine_cosine"):
+        case BearingPart(encoding="sine_cosine") | WayPart():
             return 2
         case TrailPart():
             return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1

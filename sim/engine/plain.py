@@ -29,12 +29,14 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
     TrailPart,
+    WayPart,
 )
 from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
 from sim.engine.plain_trail import PlainTrail
+from sim.engine.plain_way import seen_way
 from sim.engine.rewards import constants, evaluate, parameters_of, program_of
 from sim.extending.observing import Sight
 from sim.extending.parts import RewardTerm as AddedTerm
@@ -196,6 +198,8 @@ class PlainWorld:
                 return np.array([abs(bearing) / math.pi])
             case TrailPart():
                 return self._trail.seen(ranges, (*self.body.position, heading), part)
+            case WayPart():
+                return seen_way(ranges, bearing, self.distance, task)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import RandomisationConfig, TaskConfig, TrailPart
+from sim.config import RandomisationConfig, TaskConfig, TrailPart, WayPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -174,6 +174,7 @@ class World:
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
         sees_trail = bool(trails)
+        sees_ways = any(isinstance(part, TrailPart | WayPart) for part in task.observation.parts)
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -210,7 +211,7 @@ class World:
         starts_anew = restart == "same step" and not self._looks_back
         self._parameters = pack_parameters(task, arrival_ends=arrival_ends, starts_anew=starts_anew)
         usual_drive = task.robot.drive.name == "differential" and not self._parameters[0]["mounted"]
-        self._is_usual = usual_drive and not sees_trail
+        self._is_usual = usual_drive and not sees_ways
         self._action_size = action_size
         self._parameters["replica_stride"] = len(self.arenas)
         own_pace = fastest_way(task.robot, spans[MAX_LINEAR, 1], spans[MAX_ANGULAR, 1])

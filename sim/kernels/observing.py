@@ -16,9 +16,11 @@ from sim.kernels.records import (
     RANGES_PART,
     SPEEDS_PART,
     TRAIL_PART,
+    WAY_PART,
 )
 from sim.kernels.sensing import FAST, nearest_of
 from sim.kernels.trail import see_trail
+from sim.kernels.way import see_way
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -121,9 +123,9 @@ def observe(i, robots, geometry, p):
 
 
 @kernel(fastmath=FAST)
-def observe_trail(i, robots, geometry, p):
-    """Write what robot i sees of its trail now; apart from `observe`, which it would slow for all who see none."""
-    if p.part_places[TRAIL_PART] < 0:
+def observe_ways(i, robots, geometry, p):
+    """Write what robot i sees of its trail and its way ahead; apart from `observe`, which it would slow for all others."""
+    if p.part_places[TRAIL_PART] < 0 and p.part_places[WAY_PART] < 0:
         return
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
@@ -132,7 +134,12 @@ def observe_trail(i, robots, geometry, p):
         x += np.float32(robots.drift[i, 0])
         y += np.float32(robots.drift[i, 1])
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
-    see_trail(i, x, y, heading, robots, geometry, p)
+    if p.part_places[TRAIL_PART] >= 0:
+        see_trail(i, x, y, heading, robots, geometry, p)
+    if p.part_places[WAY_PART] >= 0:
+        dx = robots.targets[i, 0] - x
+        dy = robots.targets[i, 1] - y
+        see_way(i, bearing_of(dx, dy, heading), np.float32(math.sqrt(dx * dx + dy * dy)), robots, geometry, p)
 
 
 @kernel(fastmath=FAST, inline="always")

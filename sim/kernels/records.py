@@ -10,7 +10,7 @@ CELL = 0.1
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
 
-PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation", "trail")
+PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation", "trail", "way")
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
 (
@@ -23,6 +23,7 @@ PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing",
     HEADING_PART,
     DEVIATION_PART,
     TRAIL_PART,
+    WAY_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2

@@ -8,7 +8,7 @@ import numpy as np
 from sim.kernels.commands import twist
 from sim.kernels.disturbances import begin_episode, drift, find_itself, perceive
 from sim.kernels.footprint import moving_rectangle_clearance, swept_rectangle_clearance
-from sim.kernels.observing import observe, observe_trail, repeat_first
+from sim.kernels.observing import observe, observe_ways, repeat_first
 from sim.kernels.options import kernel
 from sim.kernels.random import uniform
 from sim.kernels.records import (
@@ -186,7 +186,7 @@ def reset_robots(which, poses, targets, robots, geometry, parameters, state):
         if p.perceives:
             perceive(i, robots, p)
         observe(i, robots, geometry, p)
-        observe_trail(i, robots, geometry, p)
+        observe_ways(i, robots, geometry, p)
         repeat_first(i, robots, p)
 
 
@@ -319,7 +319,8 @@ def _steps(*, usual: bool) -> Any:
     What drives and mounts of other robots need costs the usual one a fifth of its rate where it only stands beside it.
 
     Args:
-        usual: whether the drive is differential and the only LiDAR looks ahead from the body's middle.
+        usual: whether the drive is differential, the only LiDAR looks ahead from the body's middle, and neither its trail
+            nor its way is seen.
     """
 
     @kernel(fastmath=FAST)
@@ -421,7 +422,7 @@ def _steps(*, usual: bool) -> Any:
                 find_itself(i, robots)
             observe(i, robots, geometry, p)
             if not usual:
-                observe_trail(i, robots, geometry, p)
+                observe_ways(i, robots, geometry, p)
             if ended:
                 for k in range(robots.observations.shape[1]):
                     robots.final_observations[i, k] = robots.observations[i, k]
@@ -438,7 +439,7 @@ def _steps(*, usual: bool) -> Any:
                     perceive(i, robots, p)
                 observe(i, robots, geometry, p)
                 if not usual:
-                    observe_trail(i, robots, geometry, p)
+                    observe_ways(i, robots, geometry, p)
                 repeat_first(i, robots, p)
             if overwritten:
                 placed[count] = i

@@ -26,6 +26,7 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
     TrailPart,
+    WayPart,
     preset_parts,
 )
 from sim.engine.plain import PlainWorld
@@ -194,6 +195,7 @@ parts = st.tuples(
     st.builds(HeadingPart, scaling=st.sampled_from(["signed", "turn"]), frames=frames),
     st.builds(DeviationPart, frames=frames),
     st.builds(TrailPart, sectors=st.sampled_from([4, 30]), frames=frames),
+    st.builds(WayPart, frames=frames),
 )
 
 

@@ -31,6 +31,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from sim.actions import ActionComponent
 from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
+from workers.export.ros2.mapless_navigator.observation import ray_angles
 from workers.export.ros2.mapless_navigator.policy import Forward, Part, Specification
 from workers.export.tracing import trace
 from workers.kernels.constants import LEAKY_SLOPE
@@ -78,7 +79,7 @@ def scan_inputs(specification: Specification) -> dict[str, int]:
     """The inputs of a scan graph, and how many columns each has: what this policy's observation is made of."""
     kinds = {part.kind for part in specification.parts}
     actions = len(specification.action_limits)
-    inputs = {RANGES: specification.scan_size} if kinds & {"ranges", "inverse_ranges"} else {}
+    inputs = {RANGES: specification.scan_size} if kinds & {"ranges", "inverse_ranges", "way"} else {}
     brought = {part.kind: part.size for part in specification.parts if part.brought}
     if kinds - brought.keys() - {"ranges", "inverse_ranges", "speeds", "actions"}:
         inputs |= {POSE: 3, TARGET: 2}
@@ -183,6 +184,7 @@ class _Graph:
             "heading": lambda: self._node("Div", heading, pi),
             "heading_turn": lambda: self._part_of_turn(heading),
             "deviation": lambda: self._node("Div", self._node("Abs", bearing), pi),
+            "way": lambda: self._free_way(specification, bearing, distance),
         }
 
     def _seen(self, specification: Specification, part: Part) -> str:
@@ -194,6 +196,30 @@ class _Graph:
             return self._node("Div", nearest, self._number(specification.range))
         near = self._number(specification.near)
         return self._node("Div", near, self._node("Max", nearest, near))
+
+    def _free_way(self, specification: Specification, bearing: str, distance: str) -> str:
+        """How much of the straight way is free, and whether all of it is."""
+        scan, limit = self._node("Min", RANGES, self._number(specification.range)), self._number(specification.range)
+        mounts = np.repeat(np.array(specification.mounts), specification.rays, axis=0)
+        angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
+        x, y = (
+            self._node("Add", self._node("Mul", scan, self._numbers(turned)), self._numbers(place))
+            for turned, place in ((np.cos(angles), mounts[:, 0]), (np.sin(angles), mounts[:, 1]))
+        )
+        cos, sin = self._node("Cos", bearing), self._node("Sin", bearing)
+        along = self._node("Add", self._node("Mul", x, cos), self._node("Mul", y, sin))
+        across = self._node("Sub", self._node("Mul", y, cos), self._node("Mul", x, sin))
+        beside = self._node("Less", self._node("Abs", across), self._number(specification.near))
+        ahead = self._node("GreaterOrEqual", along, self._number(0.0))
+        meets = self._node("And", self._node("And", beside, ahead), self._node("Less", scan, limit))
+        nearest = self._node("ReduceMin", self._node("Where", meets, along, limit), axes=[1], keepdims=1)
+        left = self._node("Sub", distance, self._number(specification.arrival_distance))
+        length = self._node("Max", left, self._number(0.0))
+        free = self._node("Min", length, nearest, limit)
+        share = self._node("Div", free, self._node("Max", length, self._number(_TINY)))
+        is_left = self._node("Greater", length, self._number(0.0))
+        whole = self._node("Cast", self._node("GreaterOrEqual", free, length), to=TensorProto.FLOAT)
+        return self._node("Concat", self._node("Where", is_left, share, self._number(1.0)), whole, axis=1)
 
     def _direction(self, offset: str, distance: str) -> str:
         """atan2(dy, dx), which ONNX lacks, as 2 atan(dy / (d + dx)), or 2 atan((d - dx) / dy) where d + dx would cancel."""
@@ -260,6 +286,9 @@ class _Graph:
 
     def _number(self, value: float) -> str:
         return self._constant(np.float32(value))
+
+    def _numbers(self, values: NDArray[np.float64]) -> str:
+        return self._constant(values.astype(np.float32))
 
     def _constant(self, values: NDArray[np.generic] | np.generic) -> str:
         name = f"constant_{len(self._arrays)}"

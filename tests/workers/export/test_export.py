@@ -30,6 +30,7 @@ from sim.config import (
     SpeedsPart,
     TaskConfig,
     TrailPart,
+    WayPart,
 )
 from workers.checkpoints import read_policy
 from workers.config import ConvNetwork, GruNetwork, MlpNetwork, Network, ResBlockNetwork
@@ -74,6 +75,11 @@ TASKS = [
     TaskConfig(observation=ObservationConfig(parts=(SpeedsPart(), RangesPart()))),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(sectors=8, frames=2)))),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(sectors=8, memory="long")))),
+    TaskConfig(
+        robot=JackalConfig(),
+        lidar=LidarConfig(rays=12, mount=TWO),
+        observation=ObservationConfig(parts=(SpeedsPart(), RangesPart(batches=6), WayPart(frames=2))),
+    ),
 ]
 
 
@@ -94,6 +100,7 @@ TASKS = [
         "no target",
         "trail",
         "long trail",
+        "way",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:

@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.config import ArenaConfig, BearingPart, LidarConfig, ObservationConfig, RangesPart, TaskConfig, TrailPart
+from sim.config import (
+    ArenaConfig,
+    BearingPart,
+    DoubleMount,
+    LidarConfig,
+    ObservationConfig,
+    RangesPart,
+    TaskConfig,
+    TrailPart,
+    WayPart,
+)
 from sim.envs.vector import NavigationVectorEnv
 from sim.lidar import ray_angles as simulated_ray_angles
 from workers.export.bundle import export_checkpoint
@@ -110,6 +120,35 @@ def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path], part: T
     assert ways > 1
     with pytest.raises(PolicyFileError, match="sees its trail"):
         observe(exported.specification, *known)
+
+
+@pytest.mark.parametrize(
+    "lidar",
+    [LidarConfig(), LidarConfig(rays=60, field_of_view=360.0), LidarConfig(rays=20, mount=DoubleMount())],
+    ids=["half", "full circle", "two"],
+)
+def test_a_way_is_the_simulators(make_checkpoint: Callable[..., Path], lidar: LidarConfig) -> None:
+    parts = (RangesPart(batches=10), WayPart())
+    task = TaskConfig(arena=ArenaConfig(name="complex"), lidar=lidar, observation=ObservationConfig(parts=parts))
+    exported = export_checkpoint(make_checkpoint(task=task))
+    env = NavigationVectorEnv(task, 1, seed=5)
+    observations, _ = env.reset(seed=5)
+    rng = np.random.default_rng(5)
+    seen = np.empty((300, 2))
+    unequal = 0
+    for step in range(300):
+        made = observe(exported.specification, env.ranges, env.poses, env.targets, np.zeros((1, 2)))
+        # What a ray meets at the very edge of the way falls on either side.
+        unequal += int(np.abs(made - observations).max() > 1e-4)
+        scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets}
+        by_scan = run_graph(exported.by_scan, {name: np.array(array, np.float32) for name, array in scene.items()})
+        unequal += int(np.abs(by_scan["observation"] - made).max() > 1e-4)
+        seen[step] = made[0, -2:]
+        observations, _, _, _, _ = env.step(rng.uniform((0.3, -1.0), (1.0, 1.0), (1, 2)).astype(np.float32))
+    assert unequal <= 3
+    # The way was free at times, and at times it was not.
+    assert 0.0 < seen[:, 1].mean() < 1.0
+    assert np.ptp(seen[:, 0]) > 0.5
 
 
 @pytest.mark.parametrize("name", TASKS)

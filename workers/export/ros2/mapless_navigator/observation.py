@@ -15,6 +15,7 @@
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
+| `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
@@ -100,6 +101,8 @@ def observe(
     }
     told |= {kind: np.asarray(numbers, np.float64) for kind, numbers in (added or {}).items()}
     scan = np.asarray(ranges, np.float64)
+    if any(part.kind == "way" for part in specification.parts):
+        told["way"] = free_way(specification, scan, bearing, distance)
     columns = [
         _seen(specification, part, scan) if part.kind in ("ranges", "inverse_ranges") else told[part.kind]
         for part in specification.parts
@@ -128,6 +131,32 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
                 f"{part.kind.partition('.')[0]!r} makes, which is not in this program (manifest.json "
                 "explains extension and numbers): give them to observe(added=...), or to Navigator(make_added=...)"
             )
+
+
+def free_way(specification: Specification, scan: Reals, bearing: Reals, distance: Reals) -> Reals:
+    """How much of the straight way to where it has arrived a robot sees to be free, and whether all of it is.
+
+    In the way is what a ray meets less than `near` aside of it; beyond the range nothing is known to be free.
+
+    Args:
+        specification: the policy's.
+        scan: (n, scan) metres.
+        bearing: (n,) radians, of the target against the heading.
+        distance: (n,) metres.
+
+    Returns:
+        (n, 2) from 0 to 1, and 0 or 1.
+    """
+    mounts = np.repeat(np.asarray(specification.mounts, np.float64), specification.rays, axis=0)
+    angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
+    x, y = mounts[:, 0] + scan * np.cos(angles), mounts[:, 1] + scan * np.sin(angles)
+    cos, sin = np.cos(bearing)[:, None], np.sin(bearing)[:, None]
+    along, across = x * cos + y * sin, y * cos - x * sin
+    meets = (scan < specification.range) & (along >= 0.0) & (np.abs(across) < specification.near)
+    length = np.maximum(distance - specification.arrival_distance, 0.0)
+    free = np.minimum(np.where(meets, along, specification.range).min(axis=1), np.minimum(length, specification.range))
+    share = np.divide(free, length, out=np.ones_like(length), where=length > 0.0)
+    return np.stack((share, free >= length), axis=1)
 
 
 def _seen(specification: Specification, part: Part, scan: Reals) -> Reals:

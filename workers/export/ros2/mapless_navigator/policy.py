@@ -41,6 +41,7 @@ KINDS = (
     "deviation",
     "trail",
     "long_trail",
+    "way",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
