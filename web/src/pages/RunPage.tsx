@@ -251,7 +251,7 @@ function RunActions({ run, best, known }: OfRun) {
     params: { path: { experiment_id: run.experiment_id } },
   })
   return (
-    <Group gap={6}>
+    <Group gap={6} className={classes.actions}>
       {canStop([run.state]) && (
         <Button
           variant="default"
