@@ -15,7 +15,7 @@ from workers.errors import ArchiveIntegrityError
 from workers.export.bundle import export_checkpoint
 from workers.policy import torch_policy
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
-from workers.shipped.build import BestCheckpoint, build, main
+from workers.shipped.build import BestCheckpoint, Progress, build, main
 from workers.shipped.figures import figures
 from workers.shipped.library import FOLDER, ShippedPolicy, baselines, shipped_policies, shipped_policy
 from workers.shipped.recipes import RECIPES, Recipe, recipe
@@ -136,6 +136,17 @@ def test_the_best_checkpoint_arrives_most_often_then_soonest() -> None:
     ):
         best.checkpoint(step, Path(f"{step}.zip"), evaluation)
     assert (best.step, best.archive) == (3, Path("3.zip"))
+
+
+def test_a_long_training_says_twice_a_minute_how_far_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    seconds = iter([0.0, 10.0, 60.0, 70.0, 120.0])
+    best = BestCheckpoint(Progress(4_000, clock=lambda: next(seconds)))
+    for step in (500, 1_000, 1_100, 2_000):
+        best.metrics(step, {"train/success_rate": 0.25} if step > 1_000 else {})
+    assert capsys.readouterr().err.splitlines() == [
+        "step 1,000 of 4,000, 3 min left",
+        "step 2,000 of 4,000, 25.0% arrive, 2 min left",
+    ]
 
 
 def test_the_same_recipe_gives_the_same_files(tmp_path: Path) -> None:

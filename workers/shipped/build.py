@@ -10,6 +10,7 @@ The same recipe gives the same files on the same machine; another processor roun
 import argparse
 import shutil
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -62,16 +63,46 @@ _COMMAND = "python -m workers.shipped.build"
 _DECIMALS = 4  # of lengths and rewards in the files: tenths of a millimetre
 
 
+_EVERY_SECONDS = 30.0
+
+
+class Progress:
+    """Says twice a minute how far a training is, on the standard error: some recipes take an hour.
+
+    Args:
+        steps: of the training.
+        clock: seconds.
+    """
+
+    def __init__(self, steps: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._steps, self._clock = steps, clock
+        self._begun = self._told = clock()
+
+    def at(self, step: int, success_rate: float | None) -> None:
+        """A training has come to a step; of its attempts so many arrived of late, 0 to 1."""
+        now = self._clock()
+        if now - self._told < _EVERY_SECONDS or step <= 0:
+            return
+        self._told = now
+        left = (now - self._begun) * max(0, self._steps - step) / step
+        arrived = "" if success_rate is None else f", {success_rate:.1%} arrive"
+        sys.stderr.write(f"step {step:,} of {self._steps:,}{arrived}, {left / 60:.0f} min left\n")
+        sys.stderr.flush()
+
+
 class BestCheckpoint:
     """A reporter that remembers the best of a training's checkpoints: most arrivals, then fewest steps, then the newest."""
 
-    def __init__(self) -> None:
+    def __init__(self, progress: Progress | None = None) -> None:
+        self._progress = progress
         self.archive: Path | None = None
         self.step = 0
         self._merit = (-1.0, 0.0)
 
     def metrics(self, step: int, values: Mapping[str, float]) -> None:
-        """Not of interest."""
+        """Tells how far it is."""
+        if self._progress:
+            self._progress.at(step, values.get("train/success_rate"))
 
     def event(self, step: int, level: EventLevel, message: str) -> None:
         """Not of interest."""
@@ -105,7 +136,7 @@ def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> 
     seed = made_from.seed if seed is None else seed
     target = folder / made_from.name
     with TemporaryDirectory() as scratch:
-        best = BestCheckpoint()
+        best = BestCheckpoint(Progress(made_from.training.steps))
         train(made_from.training, seed, best, Path(scratch))
         assert best.archive is not None  # every training ends with an evaluation
         shutil.rmtree(target, ignore_errors=True)
