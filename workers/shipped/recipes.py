@@ -23,6 +23,7 @@ from sim.config import (
     TaskConfig,
     TimeoutTerm,
     TrailPart,
+    WayPart,
 )
 from workers.config import EvaluationConfig, MlpNetwork, PpoConfig, TrainingConfig
 from workers.presets import COMPLEX, DEFAULT
@@ -48,8 +49,8 @@ class Recipe(Frozen):
     suites: tuple[str, ...]
 
 
-def _with_trail(batches: int, memory: Literal["short", "long"] = "short") -> ObservationConfig:
-    """What a policy sees that is to know where it has been."""
+def _with_trail(batches: int, memory: Literal["short", "long"] = "short", *, way: bool = False) -> ObservationConfig:
+    """What a policy sees that is to know where it has been; with `way` also whether it could go straight on."""
     return ObservationConfig(
         parts=(
             RangesPart(batches=batches, inverse=True),
@@ -57,6 +58,7 @@ def _with_trail(batches: int, memory: Literal["short", "long"] = "short") -> Obs
             DistancePart(scaling="saturating"),
             BearingPart(encoding="sine_cosine"),
             TrailPart(sectors=30, memory=memory),
+            *((WayPart(),) if way else ()),
         )
     )
 
@@ -139,12 +141,12 @@ RECIPES: tuple[Recipe, ...] = (
         name="rooms",
         title="Through rooms and mazes",
         description="Trained on 4,096 maps of seven families, for buildings that it has never seen: it drops crumbs on its "
-        "way and sees its trail, which tells it what it has tried; half an hour on one core.",
+        "way and sees its trail, which tells it what it has tried, and whether its way is free; half an hour on one core.",
         training=TrainingConfig(
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="intricate", difficulty=1.0, maps=4096, seed=0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0),
-                observation=_with_trail(batches=120, memory="long"),
+                observation=_with_trail(batches=120, memory="long", way=True),
                 reward=RewardConfig(
                     terms=(
                         # Worth a risk beside an obstacle, which a collision's price alone would not let it take.
