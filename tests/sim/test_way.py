@@ -51,8 +51,8 @@ def test_where_it_has_arrived_nothing_is_left_to_be_free() -> None:
 
 
 def test_what_the_robot_would_pass_at_less_than_its_distance_is_in_the_way() -> None:
-    # The end of the wall is at y = 1. Towards (4, 2.7) the straight way is 0.22 m away from its upper edges, towards
-    # (4, 2.5) 0.13 m; a collision is at 0.2 m.
+    # The nearest corner of the wall is at (1.95, 1): 0.26 m aside of the straight way to the first target, 0.17 m of that
+    # to the second; a collision is at 0.2 m.
     assert way((2.6, 1.75))[1] == 1.0
     assert way((2.6, 1.6))[1] == 0.0
 

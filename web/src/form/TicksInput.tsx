@@ -94,6 +94,7 @@ export function TicksInput({ field, form, root }: TicksInputProps) {
                 settings.map(([name, one]) => (
                   <Setting
                     key={name}
+                    id={fieldId(`${place}.${name}`)}
                     schema={withoutNull(resolve(one, root)).schema}
                     value={part[name] ?? null}
                     error={problemOf(form.problems, `${place}.${name}`)}

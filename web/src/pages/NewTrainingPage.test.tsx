@@ -385,6 +385,8 @@ test('what can be set of a part is told in a line, shown when asked for, and nev
   ])
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(within(part).getByRole('textbox', { name: 'Weight' })).toBeInvalid())
+  await user.click(within(screen.getByTestId('problems')).getByRole('button', { name: 'Progress, weight' }))
+  expect(within(part).getByRole('textbox', { name: 'Weight' })).toHaveFocus()
 })
 
 test('what is wrong with a value is said beside it as it is typed, and keeps it from being launched', async () => {
