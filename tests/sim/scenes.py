@@ -1,9 +1,10 @@
-"""Random arenas for the property tests."""
+"""Random arenas for the property tests, and LiDARs of every kind."""
 
 import numpy as np
 from hypothesis import strategies as st
 
 from sim.arenas import Arena
+from sim.config import DoubleMount, LidarConfig
 
 
 def random_arena(seed: int) -> Arena:
@@ -28,3 +29,11 @@ def random_arena(seed: int) -> Arena:
 
 
 arenas = st.integers(0, 2**32 - 1).map(random_arena)
+
+LIDARS = {
+    "full circle": LidarConfig(rays=120, field_of_view=360.0),
+    "half": LidarConfig(rays=30),
+    "three rays": LidarConfig(rays=3, field_of_view=60.0),
+    "turned": LidarConfig(rays=31, field_of_view=270.0, mount={"name": "single", "x": 0.05, "yaw": 40.0}),
+    "two": LidarConfig(rays=20, mount=DoubleMount()),
+}

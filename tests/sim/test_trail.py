@@ -7,7 +7,6 @@ from sim.arenas import Arena
 from sim.config import (
     ArenaConfig,
     BearingPart,
-    DoubleMount,
     GeneratedArenaConfig,
     LidarConfig,
     ObservationConfig,
@@ -21,9 +20,10 @@ from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
 from sim.observations import observation_layout
+from tests.sim.scenes import LIDARS
 
 WALL = np.array([[0.0, 1.5, 1.0, 0.1, 0.0]])
-FULL = LidarConfig(rays=120, field_of_view=360.0)
+FULL = LIDARS["full circle"]
 
 
 def seen(sectors: int = 4, lidar: LidarConfig = FULL, memory: str = "short", **task: object) -> TaskConfig:
@@ -88,17 +88,7 @@ def test_with_a_long_memory_old_crumbs_have_ages_that_differ() -> None:
 
 
 @pytest.mark.parametrize("memory", ["short", "long"])
-@pytest.mark.parametrize(
-    "lidar",
-    [
-        FULL,
-        LidarConfig(rays=30),
-        LidarConfig(rays=3, field_of_view=60.0),
-        LidarConfig(rays=31, field_of_view=270.0, mount={"name": "single", "x": 0.05, "yaw": 40.0}),
-        LidarConfig(rays=20, mount=DoubleMount()),
-    ],
-    ids=["full circle", "half", "three rays", "turned", "two"],
-)
+@pytest.mark.parametrize("lidar", LIDARS.values(), ids=LIDARS)
 def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig, memory: str) -> None:
     task = seen(
         24,

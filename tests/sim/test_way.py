@@ -6,7 +6,6 @@ import pytest
 from sim.arenas import Arena
 from sim.config import (
     ArenaConfig,
-    DoubleMount,
     LidarConfig,
     ObservationConfig,
     OdometryConfig,
@@ -16,8 +15,9 @@ from sim.config import (
 from sim.engine.plain_way import seen_way
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
+from tests.sim.scenes import LIDARS
 
-FULL = LidarConfig(rays=120, field_of_view=360.0)
+FULL = LIDARS["full circle"]
 SEES_WAY = ObservationConfig(parts=(WayPart(),))
 
 
@@ -57,17 +57,7 @@ def test_what_the_robot_would_pass_at_less_than_its_distance_is_in_the_way() -> 
     assert way((2.6, 1.6))[1] == 0.0
 
 
-@pytest.mark.parametrize(
-    "lidar",
-    [
-        FULL,
-        LidarConfig(rays=30),
-        LidarConfig(rays=3, field_of_view=60.0),
-        LidarConfig(rays=31, field_of_view=270.0, mount={"name": "single", "x": 0.05, "yaw": 40.0}),
-        LidarConfig(rays=20, mount=DoubleMount()),
-    ],
-    ids=["full circle", "half", "three rays", "turned", "two"],
-)
+@pytest.mark.parametrize("lidar", LIDARS.values(), ids=LIDARS)
 def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     task = TaskConfig(
         lidar=lidar,
