@@ -1,5 +1,5 @@
 /** One arena of the gallery: its drawing, what it is, and the way to a training on it. */
-import { ActionIcon, Button, Group, Skeleton, Slider, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Button, Group, Skeleton, Slider, Text } from '@mantine/core'
 import { useDebouncedValue } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useEffect, useRef, useState } from 'react'
@@ -13,6 +13,7 @@ import { ArenaDrawing } from './ArenaDrawing'
 import { DeleteButton } from './DeleteButton'
 import { AddToSuite } from './evaluations/AddToSuite'
 import { evaluate, suiteInArena } from './evaluations/choices'
+import { Hint } from './Hint'
 import { IconPencil, IconPlus, IconRefresh } from './icons'
 
 interface ArenaCardProps {
@@ -60,7 +61,7 @@ function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
       config={arena.config}
       action={
         <>
-          <Tooltip label="Add to a suite">
+          <Hint label="Add to a suite">
             <ActionIcon
               variant="subtle"
               color="gray"
@@ -69,7 +70,7 @@ function ImportedCard({ arena, isNew, onDelete }: Required<ArenaCardProps>) {
             >
               <IconPlus size={16} stroke={1.6} />
             </ActionIcon>
-          </Tooltip>
+          </Hint>
           <DeleteButton name={arena.title} onClick={() => onDelete(arena)} />
           {adding && <AddToSuite title={arena.title} sha256={arena.key} onClose={() => setAdding(false)} />}
         </>
@@ -95,7 +96,7 @@ function FamilyCard({ arena }: { arena: ArenaSummary }) {
       error={error}
       config={{ ...arena.config, difficulty, seed } as ArenaSummary['config']}
       action={
-        <Tooltip label="Another map">
+        <Hint label="Another map">
           <ActionIcon
             variant="subtle"
             color="gray"
@@ -104,7 +105,7 @@ function FamilyCard({ arena }: { arena: ArenaSummary }) {
           >
             <IconRefresh size={16} stroke={1.6} />
           </ActionIcon>
-        </Tooltip>
+        </Hint>
       }
     >
       <div className={classes.difficulty}>
@@ -161,7 +162,7 @@ function Card({ title, isNew = false, view, error, config, action, children }: C
       <Group justify="space-between" wrap="nowrap" gap={4} mt={8} mih={28}>
         <h3 className={classes.title}>{title}</h3>
         <Group gap={0} wrap="nowrap">
-          <Tooltip label="Draw on a copy">
+          <Hint label="Draw on a copy">
             <ActionIcon
               component={Link}
               to={drawOn(config)}
@@ -171,7 +172,7 @@ function Card({ title, isNew = false, view, error, config, action, children }: C
             >
               <IconPencil size={16} stroke={1.6} />
             </ActionIcon>
-          </Tooltip>
+          </Hint>
           {action}
         </Group>
       </Group>

@@ -1,5 +1,6 @@
 /** Asks whether one of a list is to go; the question itself is `DeleteDialog`. */
-import { ActionIcon, Tooltip } from '@mantine/core'
+import { ActionIcon } from '@mantine/core'
+import { Hint } from './Hint'
 import { IconTrash } from './icons'
 
 interface DeleteButtonProps {
@@ -10,10 +11,10 @@ interface DeleteButtonProps {
 
 export function DeleteButton({ name, onClick }: DeleteButtonProps) {
   return (
-    <Tooltip label={`Delete ${name}`}>
+    <Hint label={`Delete ${name}`}>
       <ActionIcon variant="subtle" color="gray" aria-label={`Delete ${name}`} onClick={onClick}>
         <IconTrash size={16} stroke={1.6} />
       </ActionIcon>
-    </Tooltip>
+    </Hint>
   )
 }

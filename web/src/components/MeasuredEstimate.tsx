@@ -1,7 +1,8 @@
 /** Measured numbers: value, 95 % interval, what it is over, the seeds themselves, and what so few leave open. */
-import { Tooltip, VisuallyHidden } from '@mantine/core'
+import { VisuallyHidden } from '@mantine/core'
 import type { Estimate } from '../api/types'
 import { count, percent, percentRange, plural, significant } from '../lib/format'
+import { Hint } from './Hint'
 import classes from './ui.module.css'
 
 interface SuccessEstimateProps {
@@ -16,26 +17,25 @@ export function SuccessEstimate({ estimate, detail = false }: SuccessEstimatePro
   const { value, low, high, unit } = estimate
   const behind = behindOf(estimate, percent)
   const overSeeds = unit === 'seeds'
+  const figure = (
+    <span className={`${classes.number} ${classes.estimate}`}>
+      <strong>{percent(value)}</strong>
+      <span className={classes.quiet}>{percentRange(low, high)}</span>
+      {detail ? (
+        <span className={classes.open}>{behind}</span>
+      ) : (
+        <>
+          <span className={overSeeds ? classes.open : classes.quiet}>{shortOf(estimate)}</span>
+          <VisuallyHidden>{behind}</VisuallyHidden>
+        </>
+      )}
+    </span>
+  )
+  if (detail) return figure
   return (
-    <Tooltip
-      label={`95 % interval ${percentRange(low, high)}. ${behind}`}
-      multiline
-      maw={360}
-      disabled={detail}
-    >
-      <span className={`${classes.number} ${classes.estimate}`}>
-        <strong>{percent(value)}</strong>
-        <span className={classes.quiet}>{percentRange(low, high)}</span>
-        {detail ? (
-          <span className={classes.open}>{behind}</span>
-        ) : (
-          <>
-            <span className={overSeeds ? classes.open : classes.quiet}>{shortOf(estimate)}</span>
-            <VisuallyHidden>{behind}</VisuallyHidden>
-          </>
-        )}
-      </span>
-    </Tooltip>
+    <Hint label={`95 % interval ${percentRange(low, high)}. ${behind}`} multiline maw={360}>
+      {figure}
+    </Hint>
   )
 }
 

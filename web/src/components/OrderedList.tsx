@@ -1,6 +1,7 @@
 /** What was chosen, in its order: each moved up or down, or removed, by buttons that a keyboard reaches. */
-import { ActionIcon, Tooltip } from '@mantine/core'
+import { ActionIcon } from '@mantine/core'
 import type { ReactNode } from 'react'
+import { Hint } from './Hint'
 import { IconArrowDown, IconArrowUp, IconX } from './icons'
 import classes from './OrderedList.module.css'
 
@@ -67,7 +68,7 @@ interface SmallButtonProps {
 
 export function SmallButton({ label, pressed, disabled = false, onClick, children }: SmallButtonProps) {
   return (
-    <Tooltip label={label}>
+    <Hint label={label}>
       <ActionIcon
         variant={pressed ? 'light' : 'subtle'}
         {...(pressed ? {} : { color: 'gray' })}
@@ -79,6 +80,6 @@ export function SmallButton({ label, pressed, disabled = false, onClick, childre
       >
         {children}
       </ActionIcon>
-    </Tooltip>
+    </Hint>
   )
 }

@@ -1,10 +1,11 @@
 /** One search: how far it is, what its trials show, and what the best of them is worth. */
-import { ActionIcon, Anchor, Button, Group, Skeleton, Stack, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Anchor, Button, Group, Skeleton, Stack, Text } from '@mantine/core'
 import { useDisclosure } from '@mantine/hooks'
 import { Link, useNavigate, useParams } from 'react-router'
 import { $api } from '../api/client'
 import { isRefusal } from '../api/errors'
 import { DeleteDialog } from '../components/DeleteDialog'
+import { Hint } from '../components/Hint'
 import { IconPlayerPlay, IconPlayerStop, IconPlus, IconRocket, IconTrash } from '../components/icons'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
 import { useChange } from '../components/people/useChange'
@@ -198,11 +199,11 @@ function StudyActions({ study }: { study: Study }) {
           Train the best
         </Button>
       )}
-      <Tooltip label="Delete this study">
+      <Hint label="Delete this study">
         <ActionIcon variant="default" size={36} aria-label="Delete this study" onClick={ask.open}>
           <IconTrash size={16} />
         </ActionIcon>
-      </Tooltip>
+      </Hint>
       <DeleteDialog
         opened={asking}
         what="this study"

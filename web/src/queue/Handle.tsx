@@ -1,5 +1,6 @@
 /** What a row of the queue is dragged by, or moved with Alt and the arrow keys. */
-import { ActionIcon, Tooltip } from '@mantine/core'
+import { ActionIcon } from '@mantine/core'
+import { Hint } from '../components/Hint'
 import { IconGripVertical } from '../components/icons'
 import type { useDrag } from './drag'
 import classes from './queue.module.css'
@@ -12,7 +13,7 @@ interface HandleProps {
 
 export function Handle({ name, drag }: HandleProps) {
   return (
-    <Tooltip label="Drag, or Alt with the arrow keys" openDelay={600}>
+    <Hint label="Drag, or Alt with the arrow keys" delay={600}>
       <ActionIcon
         variant="subtle"
         color="gray"
@@ -24,6 +25,6 @@ export function Handle({ name, drag }: HandleProps) {
       >
         <IconGripVertical size={16} />
       </ActionIcon>
-    </Tooltip>
+    </Hint>
   )
 }

@@ -1,11 +1,12 @@
 /** The runs that wait, in the order of their turns: what for, until when, and how urgent each is. */
-import { ActionIcon, Anchor, Group, NumberInput, Table, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Anchor, Group, NumberInput, Table, Text } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import type { WaitingRun } from '../api/types'
 import { ExperimentSwatch } from '../charts/Swatch'
+import { Hint } from '../components/Hint'
 import { IconArrowUp } from '../components/icons'
 import { Pager } from '../components/Pager'
 import { ParallelRuns } from '../components/ParallelRuns'
@@ -121,7 +122,7 @@ function WaitingRow({ run, mayOrder, drag }: WaitingRowProps) {
       </Table.Td>
       <Table.Td>
         {mayOrder && (
-          <Tooltip label="To the front">
+          <Hint label="To the front">
             <ActionIcon
               variant="subtle"
               color="gray"
@@ -132,7 +133,7 @@ function WaitingRow({ run, mayOrder, drag }: WaitingRowProps) {
             >
               <IconArrowUp size={18} />
             </ActionIcon>
-          </Tooltip>
+          </Hint>
         )}
       </Table.Td>
     </Table.Tr>

@@ -1,11 +1,12 @@
 /** The workers: what each trains and how quickly, on what machine, how busy it was, and what was last heard of it. */
-import { ActionIcon, Anchor, Group, Menu, Table, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Anchor, Group, Menu, Table, Text } from '@mantine/core'
 import type { CSSProperties } from 'react'
 import { Link } from 'react-router'
 import { useAccount } from '../api/account'
 import { $api } from '../api/client'
 import type { Worker } from '../api/types'
 import { ExperimentSwatch } from '../charts/Swatch'
+import { Hint } from '../components/Hint'
 import { IconDots } from '../components/icons'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
@@ -120,14 +121,14 @@ function Strip({ activity }: { activity: readonly number[] }) {
   const mean = activity.reduce((sum, share) => sum + share, 0) / activity.length
   const label = `Had a run ${percent(mean)} of the last 7 days`
   return (
-    <Tooltip label={`${label}; a bar is six hours`}>
+    <Hint label={`${label}; a bar is six hours`}>
       <span className={classes.strip} role="img" aria-label={label}>
         {activity.map((share, index) => (
           // biome-ignore lint/suspicious/noArrayIndexKey: hours have no other identity.
           <span key={index} style={{ '--share': share } as CSSProperties} />
         ))}
       </span>
-    </Tooltip>
+    </Hint>
   )
 }
 

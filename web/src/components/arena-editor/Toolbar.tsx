@@ -1,5 +1,6 @@
 /** Which tool draws, with what it takes to know; the grid, undo and redo. */
-import { ActionIcon, Button, Checkbox, NumberInput, Select, Tooltip } from '@mantine/core'
+import { ActionIcon, Button, Checkbox, NumberInput, Select } from '@mantine/core'
+import { Hint } from '../Hint'
 import { IconArrowBackUp, IconArrowForwardUp } from '../icons'
 import { Segments } from '../Segments'
 import classes from './editor.module.css'
@@ -79,7 +80,7 @@ function Undoing({
   children: React.ReactNode
 }) {
   return (
-    <Tooltip label={label}>
+    <Hint label={label}>
       <ActionIcon
         variant="default"
         size={30}
@@ -89,7 +90,7 @@ function Undoing({
       >
         {children}
       </ActionIcon>
-    </Tooltip>
+    </Hint>
   )
 }
 

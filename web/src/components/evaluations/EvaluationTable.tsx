@@ -1,5 +1,5 @@
 /** Evaluations that were asked for: how far they are, and what came of them. */
-import { ActionIcon, Anchor, Group, Table, Text, Tooltip, VisuallyHidden } from '@mantine/core'
+import { ActionIcon, Anchor, Group, Table, Text, VisuallyHidden } from '@mantine/core'
 import { useState } from 'react'
 import { Link } from 'react-router'
 import { $api } from '../../api/client'
@@ -8,6 +8,7 @@ import { duration, percent, significant, words } from '../../lib/format'
 import { endedSo } from '../../lib/useArrangement'
 import { DeleteDialog } from '../DeleteDialog'
 import table from '../ExperimentTable.module.css'
+import { Hint } from '../Hint'
 import { IconTrash, IconX } from '../icons'
 import { SuccessEstimate } from '../MeasuredEstimate'
 import { useChange } from '../people/useChange'
@@ -177,7 +178,7 @@ interface ActionProps {
 function Action({ evaluation, onCancel, onDelete }: ActionProps) {
   const label = isOpen(evaluation) ? 'Call it off' : 'Delete'
   return (
-    <Tooltip label={label}>
+    <Hint label={label}>
       <ActionIcon
         variant="subtle"
         color="gray"
@@ -186,6 +187,6 @@ function Action({ evaluation, onCancel, onDelete }: ActionProps) {
       >
         {isOpen(evaluation) ? <IconX size={16} /> : <IconTrash size={16} stroke={1.6} />}
       </ActionIcon>
-    </Tooltip>
+    </Hint>
   )
 }

@@ -1,8 +1,9 @@
 /** Every seed's success on a line from 0 to 100 %, the paper's as a mark; seeds that are not done beside it in words. */
-import { Anchor, Tooltip } from '@mantine/core'
+import { Anchor } from '@mantine/core'
 import { Link } from 'react-router'
 import type { CampaignRow, CampaignRun } from '../../api/types'
 import { percent } from '../../lib/format'
+import { Hint } from '../Hint'
 import { STATES } from '../states'
 import classes from './reproduction.module.css'
 
@@ -11,20 +12,20 @@ export function SeedStrip({ row }: { row: CampaignRow }) {
   return (
     <div data-testid="seeds">
       <div className={classes.strip}>
-        <Tooltip label={`The paper: ${percent(row.paper.success)}`}>
+        <Hint label={`The paper: ${percent(row.paper.success)}`}>
           <span className={classes.mark} style={{ left: percentOf(row.paper.success) }} />
-        </Tooltip>
+        </Hint>
         {row.runs.map(
           (run) =>
             run.measured && (
-              <Tooltip key={run.id} label={`Seed ${run.seed}: ${percent(run.measured.success)}`}>
+              <Hint key={run.id} label={`Seed ${run.seed}: ${percent(run.measured.success)}`}>
                 <Link
                   to={`/runs/${run.id}`}
                   className={classes.seed}
                   aria-label={`Seed ${run.seed}: ${percent(run.measured.success)} success`}
                   style={{ left: percentOf(run.measured.success) }}
                 />
-              </Tooltip>
+              </Hint>
             ),
         )}
       </div>
@@ -35,7 +36,7 @@ export function SeedStrip({ row }: { row: CampaignRow }) {
       {waiting.length > 0 && (
         <div className={classes.waiting}>
           {waiting.map((run) => (
-            <Tooltip key={run.id} label={`Seed ${run.seed}: ${stateOf(run)}`}>
+            <Hint key={run.id} label={`Seed ${run.seed}: ${stateOf(run)}`}>
               <Anchor
                 component={Link}
                 to={`/runs/${run.id}`}
@@ -46,7 +47,7 @@ export function SeedStrip({ row }: { row: CampaignRow }) {
               >
                 {run.state === 'running' ? `${percent(run.progress)} trained` : run.seed}
               </Anchor>
-            </Tooltip>
+            </Hint>
           ))}
         </div>
       )}
