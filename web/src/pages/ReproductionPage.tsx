@@ -88,7 +88,7 @@ export function ReproductionPage() {
           </Below>
         </Stack>
       ) : (
-        <Stack gap="md" aria-busy="true" aria-label="Loading the reproduction">
+        <Stack key="loading" gap="md" aria-busy="true" aria-label="Loading the reproduction">
           {[110, 260, 260].map((height, index) => (
             // biome-ignore lint/suspicious/noArrayIndexKey: placeholders have no other identity.
             <Skeleton key={index} height={height} radius={8} />

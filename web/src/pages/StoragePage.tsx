@@ -139,10 +139,12 @@ export function StoragePage() {
           onClose={() => choose(null)}
         />
       )}
-      <Text size="sm" c="dimmed" mt="md">
-        What a rule takes is gone after {plural(data?.keep_days ?? 7, 'day')}; until then it can be kept after
-        all.
-      </Text>
+      {data && (
+        <Text size="sm" c="dimmed" mt="md">
+          What a rule takes is gone after {plural(data.keep_days, 'day')}; until then it can be kept after
+          all.
+        </Text>
+      )}
     </Page>
   )
 }
