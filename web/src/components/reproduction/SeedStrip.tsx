@@ -7,23 +7,35 @@ import { Hint } from '../Hint'
 import { STATES } from '../states'
 import classes from './reproduction.module.css'
 
+/** Seeds nearer than this stand above one another: a dot's width on a strip of 200 pixels. */
+const APART = 0.05
+/** Pixels between two lanes, and the most that all of them may take. */
+const LANE = 8
+const MOST = 40
+
 export function SeedStrip({ row }: { row: CampaignRow }) {
   const waiting = row.runs.filter((run) => run.measured === null)
+  const lanes = lanesOf(row.runs.map((run) => run.measured?.success ?? null))
+  const last = Math.max(0, ...lanes)
+  const lane = Math.min(LANE, MOST / Math.max(1, last))
   return (
     <div data-testid="seeds">
-      <div className={classes.strip}>
+      <div className={classes.strip} style={{ '--above': `${last * lane}px` } as React.CSSProperties}>
         <Hint label={`The paper: ${percent(row.paper.success)}`}>
           <span className={classes.mark} style={{ left: percentOf(row.paper.success) }} />
         </Hint>
         {row.runs.map(
-          (run) =>
+          (run, index) =>
             run.measured && (
               <Hint key={run.id} label={`Seed ${run.seed}: ${percent(run.measured.success)}`}>
                 <Link
                   to={`/runs/${run.id}`}
                   className={classes.seed}
                   aria-label={`Seed ${run.seed}: ${percent(run.measured.success)} success`}
-                  style={{ left: percentOf(run.measured.success) }}
+                  style={{
+                    left: percentOf(run.measured.success),
+                    marginBottom: (lanes[index] ?? 0) * lane,
+                  }}
                 />
               </Hint>
             ),
@@ -53,6 +65,18 @@ export function SeedStrip({ row }: { row: CampaignRow }) {
       )}
     </div>
   )
+}
+
+/** The lowest lane in which each has room beside those before it; of what is not measured yet, lane 0. */
+export function lanesOf(shares: readonly (number | null)[]): number[] {
+  const taken: number[][] = []
+  return shares.map((share) => {
+    if (share === null) return 0
+    const free = taken.findIndex((lane) => lane.every((other) => Math.abs(other - share) >= APART))
+    const lane = free === -1 ? taken.push([]) - 1 : free
+    taken[lane]?.push(share)
+    return lane
+  })
 }
 
 const percentOf = (share: number) => `${share * 100}%`
