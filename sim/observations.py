@@ -22,6 +22,7 @@ from sim.config import (
     HeadingPart,
     ObservationPart,
     RangesPart,
+    ReachPart,
     SpeedsPart,
     TaskConfig,
     TrailPart,
@@ -175,6 +176,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return tuple(_trail(part, task))
         case WayPart():
             return tuple(_way(task))
+        case ReachPart():
+            return tuple(_reach(part, task))
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -219,6 +222,17 @@ def _way(task: TaskConfig) -> Iterator[ObservationNumber]:
     yield ObservationNumber("way is free", "1 where f >= l, else 0", 0.0, 1.0)
 
 
+def _reach(part: ReachPart, task: TaskConfig) -> Iterator[ObservationNumber]:
+    near, width = near_distance(task), 360.0 / part.sectors
+    for k in range(part.sectors):
+        where = f"f = metres straight on, {k * width - 180.0:g} to {(k + 1) * width - 180.0:g} degrees against the heading"
+        formula = (
+            f"{near:g} / ({near:g} + f), {where}, where it is largest, until a reading ends less than {near:g} m from the "
+            "middle of the body, at most the LiDAR's range"
+        )
+        yield ObservationNumber(f"reach {k}", formula, near / (near + task.lidar.range), 1.0)
+
+
 def pack_parts(task: TaskConfig) -> dict[str, object]:
     """Those fields of `sim.kernels.records.PARAMETERS` that say what is seen."""
     observation = task.observation
@@ -240,6 +254,7 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
         "batches": observation.batches * len(task.lidar.mount.places),
         "rays_per_batch": task.lidar.rays // (observation.batches or 1),
         "trail_sectors": next((part.sectors for part in observation.parts if isinstance(part, TrailPart)), 0),
+        "reach_sectors": next((part.sectors for part in observation.parts if isinstance(part, ReachPart)), 0),
         "frames": observation.frames,
         "parts": len(observation.parts),
         "part_sizes": np.pad([part_size(part, *sizes) for part in observation.parts], room),

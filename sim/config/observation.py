@@ -151,6 +151,21 @@ class WayPart(Frozen):
     frames: int = _frames()
 
 
+class ReachPart(Frozen):
+    """How far its body could go straight on in each direction, as its scan shows: gaps that it fits through."""
+
+    name: Literal["reach"] = Field("reach", title="Reach all around")
+    sectors: int = Field(
+        60,
+        ge=4,
+        le=120,
+        title="Sectors",
+        description="Of the full turn around it, one number each: how far it could go where it could go farthest.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
 class AddedObservationPart(AddedPart):
     """A part that an extension has added."""
 
@@ -173,6 +188,7 @@ BuiltInPart = (
     | DeviationPart
     | TrailPart
     | WayPart
+    | ReachPart
 )
 
 if TYPE_CHECKING:
@@ -290,6 +306,8 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return 2
         case TrailPart():
             return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1
+        case ReachPart():
+            return part.sectors
         case AddedObservationPart():
             return len(part.numbers())
         case _:

@@ -25,6 +25,7 @@ from sim.config import (
     HeadingPart,
     ObservationPart,
     RangesPart,
+    ReachPart,
     RewardTerm,
     SpeedsPart,
     TaskConfig,
@@ -35,6 +36,7 @@ from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
+from sim.engine.plain_reach import seen_reach
 from sim.engine.plain_trail import PlainTrail
 from sim.engine.plain_way import seen_way
 from sim.engine.rewards import constants, evaluate, parameters_of, program_of
@@ -200,6 +202,8 @@ class PlainWorld:
                 return self._trail.seen(ranges, (*self.body.position, heading), part)
             case WayPart():
                 return seen_way(ranges, bearing, self.distance, task)
+            case ReachPart():
+                return seen_reach(ranges, part, task)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

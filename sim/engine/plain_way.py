@@ -10,6 +10,13 @@ from sim.lidar import drawn_ray_angles, ray_origins
 from sim.observations import near_distance
 
 
+def reading_ends(ranges: NDArray[np.float64], task: TaskConfig) -> NDArray[np.float64]:
+    """Where readings (scan,) end, (scan, 2) metres in the robot's frame."""
+    angles = drawn_ray_angles(task.lidar, task.lidar.field_of_view)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.asarray(ray_origins(task.lidar, [(0.0, 0.0, 0.0)])[0] + ranges[:, None] * directions)
+
+
 def seen_way(ranges: NDArray[np.float64], bearing: float, distance: float, task: TaskConfig) -> NDArray[np.float64]:
     """How much of the straight way to the target is seen to be free, and whether all of it is, (2,).
 
@@ -19,10 +26,7 @@ def seen_way(ranges: NDArray[np.float64], bearing: float, distance: float, task:
         distance: likewise, metres.
         task: whose LiDAR, body and arrival distance count.
     """
-    angles = drawn_ray_angles(task.lidar, task.lidar.field_of_view)
-    ends = ray_origins(task.lidar, [(0.0, 0.0, 0.0)])[0] + ranges[:, None] * np.stack(
-        [np.cos(angles), np.sin(angles)], axis=1
-    )
+    ends = reading_ends(ranges, task)
     along, across = ends @ [math.cos(bearing), math.sin(bearing)], ends @ [-math.sin(bearing), math.cos(bearing)]
     meets = (ranges < task.lidar.range) & (along >= 0.0) & (np.abs(across) < near_distance(task))
     length = max(distance - task.arrival_distance, 0.0)

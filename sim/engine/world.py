@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import RandomisationConfig, TaskConfig, TrailPart, WayPart
+from sim.config import RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -31,6 +31,7 @@ from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
 from sim.kernels.options import bound
 from sim.kernels.random import seed_streams
+from sim.kernels.reach import DIRECTIONS
 from sim.kernels.records import (
     ARRIVAL,
     DISTANCE_NOISE,
@@ -174,7 +175,8 @@ class World:
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
         sees_trail = bool(trails)
-        sees_ways = any(isinstance(part, TrailPart | WayPart) for part in task.observation.parts)
+        sees_ways = any(isinstance(part, TrailPart | WayPart | ReachPart) for part in task.observation.parts)
+        sectors = sum(part.sectors for part in task.observation.parts if isinstance(part, ReachPart))
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -200,6 +202,7 @@ class World:
                 (robots if sees_trail else 0, LONG_TRAIL_ROOM if "long" in trails else SHORT_TRAIL_ROOM, 2), dtype=np.float32
             ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
+            reach=np.zeros((robots, DIRECTIONS * sectors) if sectors else (0, 0)),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )

@@ -113,6 +113,8 @@ class Robots(NamedTuple):
         trail: (N, TRAIL_ROOM, 2) x, y of the crumbs of this attempt, where the robot believed to be when it dropped them,
             crumb n in row n modulo the room; (0, TRAIL_ROOM, 2) where nobody sees them.
         crumbs: (N,) how many were dropped; (0,) likewise.
+        reach: (N, directions) metres that the robot could go straight on, from right to left, beginning behind it; (0, 0)
+            where nobody sees them.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
@@ -138,5 +140,6 @@ class Robots(NamedTuple):
     commands: Floats
     trail: Floats
     crumbs: Integers
+    reach: Doubles
     held_ranges: Floats
     scan_ages: Integers

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sim.kernels.options import kernel
+from sim.kernels.reach import see_reach
 from sim.kernels.records import (
     ACTIONS_PART,
     BEARING_PART,
@@ -14,6 +15,7 @@ from sim.kernels.records import (
     HEADING_PART,
     OMNIDIRECTIONAL,
     RANGES_PART,
+    REACH_PART,
     SPEEDS_PART,
     TRAIL_PART,
     WAY_PART,
@@ -124,7 +126,9 @@ def observe(i, robots, geometry, p):
 
 @kernel(fastmath=FAST)
 def observe_ways(i, robots, geometry, p):
-    """Write what robot i sees of its trail and its way ahead; apart from `observe`, which it would slow for all others."""
+    """Write what robot i sees of its trail and of ways ahead; apart from `observe`, which it would slow for all others."""
+    if p.part_places[REACH_PART] >= 0:
+        see_reach(i, robots, geometry, p)
     if p.part_places[TRAIL_PART] < 0 and p.part_places[WAY_PART] < 0:
         return
     x = robots.poses[i, 0]

@@ -10,7 +10,19 @@ CELL = 0.1
 NONE, ARRIVAL, COLLISION, TIMEOUT = 0, 1, 2, 3
 """How an attempt ended in this step; NONE while it goes on."""
 
-PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing", "heading", "deviation", "trail", "way")
+PART_KINDS = (
+    "ranges",
+    "speeds",
+    "actions",
+    "distance",
+    "direction",
+    "bearing",
+    "heading",
+    "deviation",
+    "trail",
+    "way",
+    "reach",
+)
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
 (
@@ -24,6 +36,7 @@ PART_KINDS = ("ranges", "speeds", "actions", "distance", "direction", "bearing",
     DEVIATION_PART,
     TRAIL_PART,
     WAY_PART,
+    REACH_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2
@@ -106,6 +119,7 @@ PARAMETERS = np.dtype(
         ("batches", "i4"),
         ("rays_per_batch", "i4"),
         ("trail_sectors", "i4"),
+        ("reach_sectors", "i4"),
         ("frames", "i4"),  # moments at which anything is seen
         ("parts", "i4"),  # of the observation
         ("part_sizes", "i4", (MAX_PARTS,)),  # numbers of each at one moment

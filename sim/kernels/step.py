@@ -320,7 +320,7 @@ def _steps(*, usual: bool) -> Any:
 
     Args:
         usual: whether the drive is differential, the only LiDAR looks ahead from the body's middle, and neither its trail
-            nor its way is seen.
+            nor ways ahead are seen.
     """
 
     @kernel(fastmath=FAST)

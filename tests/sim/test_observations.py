@@ -23,6 +23,7 @@ from sim.config import (
     ObservationName,
     ObservationPart,
     RangesPart,
+    ReachPart,
     SpeedsPart,
     TaskConfig,
     TrailPart,
@@ -196,6 +197,7 @@ parts = st.tuples(
     st.builds(DeviationPart, frames=frames),
     st.builds(TrailPart, sectors=st.sampled_from([4, 30]), frames=frames),
     st.builds(WayPart, frames=frames),
+    st.builds(ReachPart, sectors=st.sampled_from([4, 30]), frames=frames),
 )
 
 

@@ -31,7 +31,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from sim.actions import ActionComponent
 from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
-from workers.export.ros2.mapless_navigator.observation import ray_angles
+from workers.export.ros2.mapless_navigator.observation import DIRECTIONS, READ_OFF_SCAN, ray_angles
 from workers.export.ros2.mapless_navigator.policy import Forward, Part, Specification
 from workers.export.tracing import trace
 from workers.kernels.constants import LEAKY_SLOPE
@@ -79,9 +79,9 @@ def scan_inputs(specification: Specification) -> dict[str, int]:
     """The inputs of a scan graph, and how many columns each has: what this policy's observation is made of."""
     kinds = {part.kind for part in specification.parts}
     actions = len(specification.action_limits)
-    inputs = {RANGES: specification.scan_size} if kinds & {"ranges", "inverse_ranges", "way"} else {}
+    inputs = {RANGES: specification.scan_size} if kinds & {*READ_OFF_SCAN, "way"} else {}
     brought = {part.kind: part.size for part in specification.parts if part.brought}
-    if kinds - brought.keys() - {"ranges", "inverse_ranges", "speeds", "actions"}:
+    if kinds - brought.keys() - {*READ_OFF_SCAN, "speeds", "actions"}:
         inputs |= {POSE: 3, TARGET: 2}
     inputs |= {SPEEDS: actions} if "speeds" in kinds else {}
     inputs |= {LAST_ACTION: actions} if "actions" in kinds else {}
@@ -158,7 +158,7 @@ class _Graph:
             told |= self._of_the_target(specification)
         columns = [
             self._seen(specification, part)
-            if part.kind in ("ranges", "inverse_ranges")
+            if part.kind in READ_OFF_SCAN
             else (part.kind if part.brought else told[part.kind]())
             for part in specification.parts
         ]
@@ -189,6 +189,8 @@ class _Graph:
 
     def _seen(self, specification: Specification, part: Part) -> str:
         """The scan as the policy sees it."""
+        if part.kind == "reach":
+            return self._reach(specification, part.size)
         scan = self._node("Min", RANGES, self._number(specification.range))
         batches = np.array([-1, part.size, specification.scan_size // part.size], np.int64)
         nearest = self._node("ReduceMin", self._node("Reshape", scan, self._constant(batches)), axes=[2], keepdims=0)
@@ -199,19 +201,14 @@ class _Graph:
 
     def _free_way(self, specification: Specification, bearing: str, distance: str) -> str:
         """How much of the straight way is free, and whether all of it is."""
-        scan, limit = self._node("Min", RANGES, self._number(specification.range)), self._number(specification.range)
-        mounts = np.repeat(np.array(specification.mounts), specification.rays, axis=0)
-        angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
-        x, y = (
-            self._node("Add", self._node("Mul", scan, self._numbers(turned)), self._numbers(place))
-            for turned, place in ((np.cos(angles), mounts[:, 0]), (np.sin(angles), mounts[:, 1]))
-        )
+        limit = self._number(specification.range)
+        x, y, is_short = self._ends(specification)
         cos, sin = self._node("Cos", bearing), self._node("Sin", bearing)
         along = self._node("Add", self._node("Mul", x, cos), self._node("Mul", y, sin))
         across = self._node("Sub", self._node("Mul", y, cos), self._node("Mul", x, sin))
         beside = self._node("Less", self._node("Abs", across), self._number(specification.near))
         ahead = self._node("GreaterOrEqual", along, self._number(0.0))
-        meets = self._node("And", self._node("And", beside, ahead), self._node("Less", scan, limit))
+        meets = self._node("And", self._node("And", beside, ahead), is_short)
         nearest = self._node("ReduceMin", self._node("Where", meets, along, limit), axes=[1], keepdims=1)
         left = self._node("Sub", distance, self._number(specification.arrival_distance))
         length = self._node("Max", left, self._number(0.0))
@@ -220,6 +217,39 @@ class _Graph:
         is_left = self._node("Greater", length, self._number(0.0))
         whole = self._node("Cast", self._node("GreaterOrEqual", free, length), to=TensorProto.FLOAT)
         return self._node("Concat", self._node("Where", is_left, share, self._number(1.0)), whole, axis=1)
+
+    def _reach(self, specification: Specification, sectors: int) -> str:
+        """How far the robot could go in each sector: along each direction, and of them the farthest."""
+        count, near = sectors * DIRECTIONS, self._number(specification.near)
+        directions = (((np.arange(count) + 0.5) / count - 0.5) * 2.0 * math.pi)[:, None]
+        cos, sin = self._numbers(np.cos(directions)), self._numbers(np.sin(directions))
+        rays = self._constant(np.array([-1, 1, specification.scan_size], np.int64))
+        x, y, is_short = (self._node("Reshape", values, rays) for values in self._ends(specification))
+        along = self._node("Add", self._node("Mul", x, cos), self._node("Mul", y, sin))
+        across = self._node("Sub", self._node("Mul", y, cos), self._node("Mul", x, sin))
+        beside = self._node("Less", self._node("Abs", across), near)
+        ahead = self._node("Greater", along, self._number(0.0))
+        meets = self._node("And", self._node("And", beside, ahead), is_short)
+        squared = self._node("Sub", self._number(specification.near**2), self._node("Mul", across, across))
+        before = self._node("Sqrt", self._node("Max", squared, self._number(0.0)))
+        until = self._node("Max", self._node("Sub", along, before), self._number(0.0))
+        free = self._node("Where", meets, until, self._number(specification.range))
+        nearest = self._node("ReduceMin", free, axes=[2], keepdims=0)
+        in_sectors = self._node("Reshape", nearest, self._constant(np.array([-1, sectors, DIRECTIONS], np.int64)))
+        farthest = self._node("ReduceMax", in_sectors, axes=[2], keepdims=0)
+        return self._node("Div", near, self._node("Add", near, farthest))
+
+    def _ends(self, specification: Specification) -> tuple[str, str, str]:
+        """Where readings end, x and y in the robot's frame, and whether they end within the range."""
+        limit = self._number(specification.range)
+        scan = self._node("Min", RANGES, limit)
+        mounts = np.repeat(np.array(specification.mounts), specification.rays, axis=0)
+        angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
+        x, y = (
+            self._node("Add", self._node("Mul", scan, self._numbers(turned)), self._numbers(place))
+            for turned, place in ((np.cos(angles), mounts[:, 0]), (np.sin(angles), mounts[:, 1]))
+        )
+        return x, y, self._node("Less", scan, limit)
 
     def _direction(self, offset: str, distance: str) -> str:
         """atan2(dy, dx), which ONNX lacks, as 2 atan(dy / (d + dx)), or 2 atan((d - dx) / dy) where d + dx would cancel."""

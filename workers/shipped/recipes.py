@@ -13,6 +13,7 @@ from sim.config import (
     LidarConfig,
     MoversConfig,
     ObservationConfig,
+    ObservationPart,
     PathProgressTerm,
     ProximityTerm,
     RangesPart,
@@ -49,8 +50,10 @@ class Recipe(Frozen):
     suites: tuple[str, ...]
 
 
-def _with_trail(batches: int, memory: Literal["short", "long"] = "short", *, way: bool = False) -> ObservationConfig:
-    """What a policy sees that is to know where it has been; with `way` also whether it could go straight on."""
+def _with_trail(
+    batches: int, memory: Literal["short", "long"] = "short", *, ahead: tuple[ObservationPart, ...] = ()
+) -> ObservationConfig:
+    """What a policy sees that is to know where it has been, and what more of where it could go."""
     return ObservationConfig(
         parts=(
             RangesPart(batches=batches, inverse=True),
@@ -58,7 +61,7 @@ def _with_trail(batches: int, memory: Literal["short", "long"] = "short", *, way
             DistancePart(scaling="saturating"),
             BearingPart(encoding="sine_cosine"),
             TrailPart(sectors=30, memory=memory),
-            *((WayPart(),) if way else ()),
+            *ahead,
         )
     )
 
@@ -146,7 +149,7 @@ RECIPES: tuple[Recipe, ...] = (
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="intricate", difficulty=1.0, maps=4096, seed=0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0),
-                observation=_with_trail(batches=120, memory="long", way=True),
+                observation=_with_trail(batches=120, memory="long", ahead=(WayPart(),)),
                 reward=RewardConfig(
                     terms=(
                         # Worth a risk beside an obstacle, which a collision's price alone would not let it take.

@@ -26,6 +26,7 @@ from sim.config import (
     ObservationConfig,
     RacecarConfig,
     RangesPart,
+    ReachPart,
     RidgebackConfig,
     SpeedsPart,
     TaskConfig,
@@ -80,6 +81,11 @@ TASKS = [
         lidar=LidarConfig(rays=12, mount=TWO),
         observation=ObservationConfig(parts=(SpeedsPart(), RangesPart(batches=6), WayPart(frames=2))),
     ),
+    TaskConfig(
+        robot=JackalConfig(),
+        lidar=LidarConfig(rays=12, mount=TWO),
+        observation=ObservationConfig(parts=(ReachPart(sectors=6, frames=2),)),
+    ),
 ]
 
 
@@ -101,6 +107,7 @@ TASKS = [
         "trail",
         "long trail",
         "way",
+        "reach",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:

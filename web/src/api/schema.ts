@@ -8523,7 +8523,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"])[];
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"])[];
         };
         /**
          * ObservationConfig
@@ -8534,7 +8534,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"])[];
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"])[];
         };
         /**
          * ObservedPart
@@ -10397,6 +10397,52 @@ export interface components {
              * @enum {string}
              */
             name: "ranges";
+        };
+        /**
+         * ReachPart
+         * @description How far its body could go straight on in each direction, as its scan shows: gaps that it fits through.
+         */
+        "ReachPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "reach";
+            /**
+             * Sectors
+             * @description Of the full turn around it, one number each: how far it could go where it could go farthest.
+             * @default 60
+             */
+            sectors: number;
+        };
+        /**
+         * ReachPart
+         * @description How far its body could go straight on in each direction, as its scan shows: gaps that it fits through.
+         */
+        "ReachPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "reach";
+            /**
+             * Sectors
+             * @description Of the full turn around it, one number each: how far it could go where it could go farthest.
+             * @default 60
+             */
+            sectors: number;
         };
         /**
          * RectangularConfig

@@ -16,6 +16,7 @@
 | `deviation`            | |bearing| / pi                                                             |
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
 | `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
+| `reach`                | near / (near + how far it could go straight on), all around, see `reach`   |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
@@ -32,7 +33,13 @@ from .policy import Floats, Part, PolicyFileError, Specification
 
 Reals = NDArray[np.float64]
 
+READ_OFF_SCAN = ("ranges", "inverse_ranges", "reach")
+"""Kinds of parts that nothing else is needed for."""
+
 _TURN = 2.0 * np.pi
+
+DIRECTIONS = 4
+"""Of each sector of what is seen of the reach."""
 
 
 def wrap(angles: ArrayLike) -> Reals:
@@ -104,8 +111,7 @@ def observe(
     if any(part.kind == "way" for part in specification.parts):
         told["way"] = free_way(specification, scan, bearing, distance)
     columns = [
-        _seen(specification, part, scan) if part.kind in ("ranges", "inverse_ranges") else told[part.kind]
-        for part in specification.parts
+        _seen(specification, part, scan) if part.kind in READ_OFF_SCAN else told[part.kind] for part in specification.parts
     ]
     return np.concatenate([column.reshape(len(pose), -1) for column in columns], axis=1).astype(np.float32)
 
@@ -147,9 +153,7 @@ def free_way(specification: Specification, scan: Reals, bearing: Reals, distance
     Returns:
         (n, 2) from 0 to 1, and 0 or 1.
     """
-    mounts = np.repeat(np.asarray(specification.mounts, np.float64), specification.rays, axis=0)
-    angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
-    x, y = mounts[:, 0] + scan * np.cos(angles), mounts[:, 1] + scan * np.sin(angles)
+    x, y = _ends(specification, scan)
     cos, sin = np.cos(bearing)[:, None], np.sin(bearing)[:, None]
     along, across = x * cos + y * sin, y * cos - x * sin
     meets = (scan < specification.range) & (along >= 0.0) & (np.abs(across) < specification.near)
@@ -159,8 +163,39 @@ def free_way(specification: Specification, scan: Reals, bearing: Reals, distance
     return np.stack((share, free >= length), axis=1)
 
 
+def reach(specification: Specification, scan: Reals, sectors: int) -> Reals:
+    """How far a robot could go straight on before a reading ends less than `near` from its middle.
+
+    Args:
+        specification: the policy's.
+        scan: (n, scan) metres.
+        sectors: of the full turn around it.
+
+    Returns:
+        (n, sectors) metres, in each the farthest of four directions, at most the LiDAR's range; from right to left,
+        beginning behind it.
+    """
+    x, y = (values[:, None] for values in _ends(specification, scan))
+    count, near = sectors * DIRECTIONS, specification.near
+    directions = (((np.arange(count) + 0.5) / count - 0.5) * _TURN)[:, None]
+    along, across = x * np.cos(directions) + y * np.sin(directions), y * np.cos(directions) - x * np.sin(directions)
+    until = np.maximum(along - np.sqrt(np.maximum(near**2 - across**2, 0.0)), 0.0)
+    meets = (scan < specification.range)[:, None] & (along > 0.0) & (np.abs(across) < near)
+    free: Reals = np.where(meets, until, specification.range).min(axis=2)
+    return free.reshape(len(scan), sectors, DIRECTIONS).max(axis=2)
+
+
+def _ends(specification: Specification, scan: Reals) -> tuple[Reals, Reals]:
+    """Where readings end, x and y (n, scan) metres in the robot's frame."""
+    mounts = np.repeat(np.asarray(specification.mounts, np.float64), specification.rays, axis=0)
+    angles = np.tile(ray_angles(specification), len(specification.mounts)) + mounts[:, 2]
+    return mounts[:, 0] + scan * np.cos(angles), mounts[:, 1] + scan * np.sin(angles)
+
+
 def _seen(specification: Specification, part: Part, scan: Reals) -> Reals:
-    """A scan (n, rays) as the policy sees it, (n, batches)."""
+    """A scan (n, rays) as the policy sees it, (n, numbers of the part)."""
+    if part.kind == "reach":
+        return specification.near / (specification.near + reach(specification, scan, part.size))
     nearest: Reals = scan.reshape(len(scan), part.size, -1).min(axis=2)
     if part.kind == "ranges":
         return nearest / specification.range

@@ -42,6 +42,7 @@ KINDS = (
     "trail",
     "long_trail",
     "way",
+    "reach",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
