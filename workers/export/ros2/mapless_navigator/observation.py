@@ -181,8 +181,9 @@ def reach(specification: Specification, scan: Reals, sectors: int) -> Reals:
     along, across = x * np.cos(directions) + y * np.sin(directions), y * np.cos(directions) - x * np.sin(directions)
     until = np.maximum(along - np.sqrt(np.maximum(near**2 - across**2, 0.0)), 0.0)
     meets = (scan < specification.range)[:, None] & (along > 0.0) & (np.abs(across) < near)
-    free: Reals = np.where(meets, until, specification.range).min(axis=2)
-    return free.reshape(len(scan), sectors, DIRECTIONS).max(axis=2)
+    free = np.where(meets, until, specification.range).min(axis=2)
+    farthest: Reals = free.reshape(len(scan), sectors, DIRECTIONS).max(axis=2)
+    return farthest
 
 
 def _ends(specification: Specification, scan: Reals) -> tuple[Reals, Reals]:
