@@ -1,4 +1,7 @@
-"""axe finds nothing: every page with data on it, light and dark, on a phone and on a desk, dialogs and menus open."""
+"""axe finds nothing: every page with data on it, light and dark, on a phone and on a desk, dialogs and menus open.
+
+And no page has to be scrolled sideways in a window of 320 pixels (WCAG 2.2, 1.4.10).
+"""
 
 import base64
 import sys
@@ -16,10 +19,12 @@ from tests.browser.conftest import ROOT, logged_in, running
 pytestmark = pytest.mark.browser
 
 AXE = ROOT / "web/node_modules/axe-core/axe.min.js"
-DESK, PHONE = (1280, 900), (390, 844)
+DESK, PHONE, NARROW = (1280, 900), (390, 844), (320, 844)
 SMALL = Sizes(experiments=9, points=60, long_experiments=1, long_points=400, checkpoints=12, live=0)
 # All rules once on a desk and once on a phone, in one scheme each; in the other scheme the colours of all that a desk shows.
 LOOKS = ((DESK, "light", None), (DESK, "dark", "color-contrast"), (PHONE, "dark", None))
+PAINTED = "new Promise((painted) => requestAnimationFrame(() => requestAnimationFrame(painted)))"
+TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 CHECK = """
 async (rule) => {
   const found = await axe.run(document, {
@@ -126,14 +131,18 @@ def pages(lab: Lab) -> list[tuple[str, str, str]]:
 
 
 def faults(page: Page) -> Iterator[str]:
-    """What axe finds in every look of a page."""
+    """What axe finds in every look of a page, and by how much it is too wide for a narrow window."""
     page.evaluate(f"{AXE.read_text()};0")
     for (width, height), scheme, rule in LOOKS:
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
         expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
-        page.evaluate("new Promise((painted) => requestAnimationFrame(() => requestAnimationFrame(painted)))")
+        page.evaluate(PAINTED)
         yield from (f"{page.url} {width} {scheme}: {each}" for each in page.evaluate(CHECK, rule))
+    page.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
+    page.evaluate(PAINTED)
+    if (by := page.evaluate(TOO_WIDE)) > 0:
+        yield f"{page.url}: {by} pixels too wide for {NARROW[0]}"
 
 
 @pytest.mark.timeout(900)  # two dozen pages, three times each, once a service has started
