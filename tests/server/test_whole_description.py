@@ -79,7 +79,15 @@ def configuration(service: Furnished, who: dict[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize(("who", "seed"), [("owner", 1), ("person", 2), ("owner", 3)])
+@pytest.mark.parametrize(
+    ("database_url", "who", "seed"),
+    [
+        ("sqlite", "owner", 1),
+        pytest.param("postgresql", "person", 2, marks=pytest.mark.services),
+        pytest.param("postgresql", "owner", 3, marks=pytest.mark.services),
+    ],
+    indirect=["database_url"],
+)
 def test_every_answer_is_one_that_the_description_promises(service: Furnished, who: str, seed: int, tmp_path: Path) -> None:
     config = tmp_path / "schemathesis.toml"
     config.write_text(configuration(service, getattr(service, who)))
