@@ -2,13 +2,14 @@
 import react from '@vitejs/plugin-react'
 import { defineConfig } from 'vite'
 import { compressed } from './plugins/compressed'
+import { mantineIds } from './plugins/mantineIds'
 import { mantineStyles } from './plugins/mantineStyles'
 import { pages } from './plugins/pages'
 
 const server = process.env.MAPLESS_SERVER_URL ?? 'http://127.0.0.1:8400'
 
 export default defineConfig({
-  plugins: [mantineStyles(), react(), pages(), compressed()],
+  plugins: [mantineStyles(), mantineIds(), react(), pages(), compressed()],
   experimental: {
     // Scripts find one another from where they are: the server may stand below a path (src/lib/base.ts).
     renderBuiltUrl: (_, { hostType }) => (hostType === 'js' ? { relative: true } : undefined),

@@ -30,7 +30,9 @@ export const HEADS = {
   },
   PoliciesPage: {
     title: 'Policies',
-    about: 'Trained policies that come with Mapless: to watch, to take away, to start from.',
+    about:
+      'Trained policies that come with Mapless: watch them drive, measure them where you want to know it, take them to a robot, ' +
+      'or train them further.',
   },
   ArenasPage: {
     title: 'Arenas',

@@ -1,6 +1,6 @@
 /** Who is signed in; without accounts everybody is the owner of the server's token, and nothing of people is shown. */
-import { $now } from './client'
+import { $api } from './client'
 
 export function useAccount(enabled = true) {
-  return $now.useQuery('get', '/api/account', undefined, { enabled, staleTime: 30_000 })
+  return $api.useQuery('get', '/api/account', undefined, { enabled, staleTime: 30_000 })
 }

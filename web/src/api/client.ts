@@ -8,11 +8,11 @@ import {
 } from '@tanstack/react-query'
 import createFetchClient from 'openapi-fetch'
 import createQueryHooks from 'openapi-react-query'
-import { useDeferredValue, useMemo } from 'react'
 import { BASE } from '../lib/base'
 import { earlyAnswer } from '../lib/early'
 import { ApiError, errorOf, isUnauthorized, OfflineError } from './errors'
 import type { paths } from './schema'
+import { useInSlices } from './useInSlices'
 
 export const api = createFetchClient<paths>({
   baseUrl: window.location.origin + BASE,
@@ -54,10 +54,8 @@ export const $api: typeof $now = {
   ...$now,
   useQuery: ((...asked: Parameters<typeof $now.useQuery>) => {
     useAskedAtOnce(asked)
-    const result = $now.useQuery(...asked)
-    const { data, error, status } = result
-    // biome-ignore lint/correctness/useExhaustiveDependencies: the result is new each time, what it says is not.
-    return useDeferredValue(useMemo(() => result, [data, error, status]))
+    const [method, path, init, options, given] = asked
+    return useInSlices($now.queryOptions(method, path, init as never, options as never), given)
   }) as typeof $now.useQuery,
   useInfiniteQuery: ((...asked: Parameters<typeof $now.useInfiniteQuery>) => {
     useFirstPartAskedAtOnce(asked)

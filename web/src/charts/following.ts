@@ -1,9 +1,9 @@
 /** Curves while runs go on, a run's own and a comparison's: after the first answer only what is new is asked for. */
-import { keepPreviousData, queryOptions, useQuery } from '@tanstack/react-query'
-import { useDeferredValue } from 'react'
+import { keepPreviousData, queryOptions } from '@tanstack/react-query'
 import { api } from '../api/client'
 import type { paths } from '../api/schema'
 import type { Curves, Metrics, Series } from '../api/types'
+import { useInSlices } from '../api/useInSlices'
 
 /** A series grows to so many times the width that was asked for; then it is asked for whole, in fewer points. */
 const MOST_WIDTHS = 2
@@ -66,7 +66,7 @@ export function curvesOf(runId: string, points: number) {
 
 /** The answer to it. */
 export const useCurves = (runId: string, points: number) =>
-  useQuery({ ...curvesOf(runId, points), placeholderData: keepPreviousData })
+  useInSlices({ ...curvesOf(runId, points), placeholderData: keepPreviousData })
 
 type Experiment = Curves['experiments'][number]
 
@@ -109,7 +109,7 @@ type CurvesQuery = paths['/api/compare/curves']['get']['parameters']['query'] & 
 /** One metric of several experiments on one grid; drawn in slices, as every answer (`$api`). */
 export function useComparedCurves(query: CurvesQuery, placeholderData: typeof keepPreviousData) {
   const path = '/api/compare/curves'
-  const { data, error } = useQuery({
+  return useInSlices({
     queryKey: ['get', path, { params: { query } }],
     queryFn: async ({ client, queryKey, signal }) => {
       const known = client.getQueryData<Curves>(queryKey)
@@ -122,5 +122,4 @@ export function useComparedCurves(query: CurvesQuery, placeholderData: typeof ke
     },
     placeholderData,
   })
-  return { data: useDeferredValue(data), error }
 }

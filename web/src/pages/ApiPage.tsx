@@ -1,8 +1,8 @@
 /** The API in words: how to begin, and every operation, from the description that the server writes of itself. */
 import { Group, Skeleton, Stack, Text, TextInput } from '@mantine/core'
-import { useQuery } from '@tanstack/react-query'
 import { useState } from 'react'
 import { errorOf } from '../api/errors'
+import { useInSlices } from '../api/useInSlices'
 import { IconSearch } from '../components/icons'
 import { Page, Panel, QueryError } from '../components/ui'
 import { HEADS } from '../heads'
@@ -40,7 +40,7 @@ interface Listed extends Operation {
 export function ApiPage() {
   useTitle(HEADS.ApiPage.title)
   const [search, setSearch] = useState('')
-  const { data, error, refetch } = useQuery({
+  const { data, error, refetch } = useInSlices({
     queryKey: [DESCRIPTION],
     queryFn: async ({ signal }): Promise<OpenApi> => {
       const response = await fetch(new Request(new URL(DESCRIPTION, window.location.origin), { signal }))

@@ -238,5 +238,5 @@ test('any metric that was reported becomes a panel, and the address keeps them i
   expect(screen.getByRole('button', { name: 'Remove Value loss' })).toBeDisabled()
   await user.click(screen.getByRole('button', { name: 'Usual' }))
   expect(router.state.location.search).toBe('?experiment=exp1&experiment=exp2')
-  expect((await screen.findAllByRole('figure', { name: 'Success rate' })).length).toBe(2)
+  await waitFor(() => expect(screen.getAllByRole('figure', { name: 'Success rate' })).toHaveLength(2))
 })

@@ -1,0 +1,28 @@
+import { render } from '@testing-library/react'
+import { expect, test } from 'vitest'
+import { useId } from './useId'
+
+test('each has its own, which a selector can name and which stays, or the given one, and none is drawn twice', () => {
+  const drawn: string[] = []
+  function Named({ id }: { id?: string }) {
+    const own = useId(id)
+    drawn.push(own)
+    return <i id={own} />
+  }
+  const both = (
+    <>
+      <Named />
+      <Named />
+      <Named id="given" />
+    </>
+  )
+  const { container, rerender } = render(both)
+  const [one, other, given] = drawn
+  expect(drawn).toHaveLength(3)
+  expect(one).not.toBe(other)
+  expect(given).toBe('given')
+  expect(container.querySelector(`#${one}`)).not.toBeNull()
+
+  rerender(<>{both.props.children.map((child: React.ReactNode) => child)}</>)
+  expect([...container.querySelectorAll('i')].map(({ id }) => id)).toEqual([one, other, given])
+})
