@@ -34,20 +34,23 @@ const escaped = (text: string) => text.replace(/&/g, '&amp;').replace(/</g, '&lt
 const page = (html: string) =>
   `<main class="frame-page"><div class="frame-top"><div class="frame-text">${html}</div></div></main>`
 
+const aboveHtml = ([above, to]: Name['within']) => `<p class="frame-above"><a href="${to}">${above}</a></p>`
+
 /** A page's title and introduction, as `components/Page` draws them. */
-function headHtml({ title, about }: Head): string {
+function headHtml({ title, about, within }: Head): string {
   const said = partsOf(about ?? '').map(({ text, to, code }) => {
     if (code) return `<code>${escaped(text)}</code>`
     return to ? `<a href="${to}">${escaped(text)}</a>` : escaped(text)
   })
-  return page(`<h1>${escaped(title)}</h1>${about ? `<p class="frame-about">${said.join('')}</p>` : ''}`)
+  return page(
+    `${within ? aboveHtml(within) : ''}<h1>${escaped(title)}</h1>${about ? `<p class="frame-about">${said.join('')}</p>` : ''}`,
+  )
 }
 
 /** The place of a title that `question` is asked for, and what the page is one of. */
-function nameHtml({ title, about, within: [above, to] }: Name, question: string): string {
+function nameHtml({ title, about, within }: Name, question: string): string {
   return page(
-    `<p class="frame-above"><a href="${to}">${above}</a></p>` +
-      `<h1 data-asks="${question.replace(/{.*/, '')}" data-told="${title}"></h1>` +
+    `${aboveHtml(within)}<h1 data-asks="${question.replace(/{.*/, '')}" data-told="${title}"></h1>` +
       (about ? `<p class="frame-about" data-told="${about}"></p>` : ''),
   )
 }

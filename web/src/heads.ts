@@ -10,6 +10,8 @@ export interface Head {
   title: string
   /** What the page is for. In it `code`, and [links](/to) within the pages and without. */
   about?: string
+  /** What the page is one of, and where that is. */
+  within?: readonly [title: string, to: string]
 }
 
 export const HEADS = {
@@ -46,20 +48,56 @@ export const HEADS = {
     about:
       'Walls, boxes, people and where robots start: draw them, see at once whether every target can be reached, and train in it.',
   },
-  QueuePage: { title: 'Queue and workers' },
+  QueuePage: {
+    title: 'Queue and workers',
+    about:
+      'What waits, what for and in which order, and who works. What is launched begins by itself; drag it, or give it a priority, to ' +
+      'have it begin before others.',
+  },
   EvaluationsPage: {
     title: 'Evaluations',
     about:
       'How well policies do where you want to know it: some seconds each, beside trainings. What is measured already is not measured again.',
   },
-  RecordingsPage: { title: 'From a robot' },
-  StudiesPage: { title: 'Studies' },
-  ReproductionPage: { title: 'Reproduce the paper' },
+  LeaderboardPage: {
+    title: 'Leaderboards',
+    about:
+      'All that was evaluated on the same scenarios, the best first, with intervals, and who is tied with the best.',
+    within: ['Evaluations', '/evaluations'],
+  },
+  RecordingsPage: {
+    title: 'From a robot',
+    about:
+      'What a robot did, beside what a policy would have done in its place, and where the two part. Noise, dropout, rate, delay and ' +
+      'limits of acceleration are fitted, to train with. A few seconds in which the robot stands tell the noise of its LiDAR.',
+  },
+  StudiesPage: {
+    title: 'Studies',
+    about:
+      'A study looks for good settings: in the form of a new training, give a number a range, or a choice several values.',
+  },
+  PlayPage: {
+    title: 'Playground',
+    about:
+      'A policy drives while you move its target, obstacles, people and the robot itself, push it, and dim what it sees.',
+  },
+  ReproductionPage: {
+    title: 'Reproduce the paper',
+    about:
+      'The experiments of Taheri, Hosseini, Nekoui: “Deep Reinforcement Learning with Enhanced PPO for Safe Mobile Robot Navigation”, ' +
+      'trained and measured here.',
+  },
   ProjectsPage: { title: 'Projects' },
   AlertsPage: {
     title: 'Alerts',
     about:
       'Be told when a training ends, fails or stands still: on these pages, and by the channels of the server.',
+  },
+  ProjectPage: {
+    title: 'Project',
+    about:
+      'Who is in it, and as what: viewers look and take home, editors also launch and change, admins also invite.',
+    within: ['Projects', '/projects'],
   },
   PeoplePage: { title: 'People and workers' },
   StoragePage: {
@@ -94,7 +132,6 @@ export interface Name {
   title: string
   /** Likewise: what it is. */
   about?: string
-  /** What the page is one of, and where that is. */
   within: readonly [title: string, to: string]
 }
 
@@ -106,6 +143,9 @@ export const NAMES: { readonly [page in PageName]?: Name } = {
 }
 
 export const nameOf = (page: string): Name | undefined => NAMES[page as PageName]
+
+/** What a page is one of, and where that is. */
+export const withinOf = (page: string) => (headOf(page) ?? nameOf(page))?.within
 
 /** An introduction as it is drawn: text, code and links. */
 export function partsOf(about: string): Part[] {

@@ -15,7 +15,7 @@ export function Coming({ page }: { page: string | undefined }) {
   return (
     <div aria-busy="true">
       {head && (
-        <Page {...head}>
+        <Page title={head.title} about={head.about} above={head.within && <Within page={page} />}>
           <span />
         </Page>
       )}

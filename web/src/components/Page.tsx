@@ -1,7 +1,7 @@
 /** What every page stands in; of nothing but itself, since it is there before the pages' own code. */
 import type { ReactNode } from 'react'
 import { Link } from 'react-router'
-import { nameOf, partsOf } from '../heads'
+import { partsOf, withinOf } from '../heads'
 import { at } from '../lib/base'
 
 /** A page's frame: its title on the left, what can be done on the right. */
@@ -39,7 +39,7 @@ export function Page({
 
 /** What a page is one of, as its HTML has it (frame.ts), and what else leads to it. */
 export function Within({ page, children }: { page: string; children?: ReactNode }) {
-  const [above, to] = nameOf(page)?.within ?? []
+  const [above, to] = withinOf(page) ?? []
   return (
     <p className="frame-above">
       {to && <Link to={to}>{above}</Link>}

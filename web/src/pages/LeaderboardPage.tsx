@@ -5,8 +5,9 @@ import { $api } from '../api/client'
 import type { Leaderboard } from '../api/types'
 import table from '../components/ExperimentTable.module.css'
 import { SuccessEstimate } from '../components/MeasuredEstimate'
-import { Page, Panel, QueryError } from '../components/ui'
+import { Page, Panel, QueryError, Within } from '../components/ui'
 import ui from '../components/ui.module.css'
+import { HEADS } from '../heads'
 import { plural, significant, words } from '../lib/format'
 import { useTitle } from '../lib/hooks'
 import { endedSo } from '../lib/useArrangement'
@@ -26,12 +27,9 @@ export function LeaderboardPage() {
   const names = suites.map(({ suite }) => suite)
   return (
     <Page
-      title="Leaderboards"
-      above={
-        <Anchor component={Link} to="/evaluations" size="xs">
-          Evaluations
-        </Anchor>
-      }
+      title={HEADS.LeaderboardPage.title}
+      about={HEADS.LeaderboardPage.about}
+      above={<Within page="LeaderboardPage" />}
       actions={
         <Select
           aria-label="Suite"

@@ -3,7 +3,6 @@ import { Button } from '@mantine/core'
 import { Link, useParams } from 'react-router'
 import { $api } from '../api/client'
 import { Ground } from '../components/playground/Ground'
-import { OpenForm } from '../components/playground/OpenForm'
 import { Page, Panel, QueryError } from '../components/ui'
 import { useTitle } from '../lib/hooks'
 
@@ -11,17 +10,9 @@ import { useTitle } from '../lib/hooks'
 const LOOK_MS = 400
 
 export function PlaygroundPage() {
-  const { playgroundId } = useParams()
+  const { playgroundId = '' } = useParams()
   useTitle('Playground')
-  return playgroundId === undefined ? (
-    <Page title="Playground">
-      <Panel title="Which policy, and where?">
-        <OpenForm />
-      </Panel>
-    </Page>
-  ) : (
-    <OpenGround key={playgroundId} id={playgroundId} />
-  )
+  return <OpenGround key={playgroundId} id={playgroundId} />
 }
 
 function OpenGround({ id }: { id: string }) {

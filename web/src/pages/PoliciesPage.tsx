@@ -21,6 +21,8 @@ import classes from './PoliciesPage.module.css'
 
 /** Pixels, about. */
 const CARD_HEIGHT = 240
+/** Cards that a phone shows: made later, each would push away those below it. */
+const SEEN_AT_ONCE = 3
 const WATCH: ToWatch = { watch: true }
 
 export function PoliciesPage() {
@@ -45,8 +47,8 @@ export function PoliciesPage() {
       ) : (
         <ul className={classes.list} aria-busy={!data}>
           {data
-            ? data.map((policy) => (
-                <Below key={policy.name} as="li" height={CARD_HEIGHT} now={asked}>
+            ? data.map((policy, index) => (
+                <Below key={policy.name} as="li" height={CARD_HEIGHT} now={asked || index < SEEN_AT_ONCE}>
                   <PolicyCard policy={policy} />
                 </Below>
               ))

@@ -9,7 +9,8 @@ import { Invitations } from '../components/people/Invitations'
 import { InviteForm } from '../components/people/InviteForm'
 import { Rows } from '../components/people/Rows'
 import { useChange } from '../components/people/useChange'
-import { Page, Panel } from '../components/ui'
+import { Page, Panel, Within } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 
 const SIZE = 50
@@ -20,7 +21,7 @@ export function ProjectPage() {
   const [page, setPage] = useState(1)
   const projects = $api.useQuery('get', '/api/projects', { params: { query: { limit: 200 } } })
   const project = projects.data?.items.find(({ id }) => id === projectId)
-  useTitle(project?.name ?? 'Project')
+  useTitle(project?.name ?? HEADS.ProjectPage.title)
   const members = $api.useQuery('get', '/api/projects/{project_id}/members', {
     params: { path: { project_id: projectId }, query: { limit: SIZE, offset: (page - 1) * SIZE } },
   })
@@ -36,7 +37,11 @@ export function ProjectPage() {
   )
   const of = (userId: string) => ({ params: { path: { project_id: projectId, user_id: userId } } })
   return (
-    <Page title={project?.name ?? 'Project'}>
+    <Page
+      title={project?.name ?? HEADS.ProjectPage.title}
+      about={HEADS.ProjectPage.about}
+      above={<Within page="ProjectPage" />}
+    >
       <Stack gap="md">
         <Panel title="Members" flush>
           <Rows

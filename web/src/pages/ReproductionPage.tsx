@@ -1,5 +1,5 @@
 /** The paper reproduced: one button, its tables beside ours, its figures, and a sentence for each of its claims. */
-import { ActionIcon, Button, Group, Select, Skeleton, Stack, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Button, Group, Select, Skeleton, Stack, Tooltip } from '@mantine/core'
 import { useDisclosure } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
 import { useSearchParams } from 'react-router'
@@ -45,12 +45,6 @@ export function ReproductionPage() {
   return (
     <Page
       {...HEADS.ReproductionPage}
-      below={
-        <Text size="sm" c="dimmed" mt={4} maw="78ch">
-          Taheri, Hosseini, Nekoui:{' '}
-          <cite>Deep Reinforcement Learning with Enhanced PPO for Safe Mobile Robot Navigation</cite>
-        </Text>
-      }
       actions={
         data?.campaign && (
           <Group gap="xs">

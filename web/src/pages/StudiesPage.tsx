@@ -43,8 +43,8 @@ export function StudiesPage() {
               </Button>
             }
           >
-            A study finds good settings: in the form of a new training, give a number a range, or a choice
-            several values.
+            Once one is launched it stands here: its trials, the best of them, and how much each setting
+            matters.
           </Message>
         ) : (
           <StudyTable studies={data.items} />

@@ -98,8 +98,7 @@ export function RecordingUpload() {
           </FileButton>
           <Text size="xs" c="dimmed" maw="80ch">
             Scans (LaserScan) and odometry are needed; with commands (Twist or TwistStamped) delay and
-            acceleration can be told, with /tf goals in a map's frame. Let the robot stand for a few seconds,
-            so that the LiDAR's noise can be told. Up to 32 MiB.
+            acceleration can be told, with /tf goals in a map's frame. Up to 32 MiB.
           </Text>
           {projects.length > 1 && (
             <Select
