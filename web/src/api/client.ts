@@ -1,9 +1,12 @@
 /** The typed client of the server's API: types generated from its OpenAPI, errors as classes, queries with defaults. */
 import {
+  InfiniteQueryObserver,
   MutationCache,
   QueryCache,
   QueryClient,
   type QueryFunction,
+  type QueryFunctionContext,
+  type QueryKey,
   useQueryClient,
 } from '@tanstack/react-query'
 import createFetchClient from 'openapi-fetch'
@@ -48,54 +51,52 @@ export const $now = createQueryHooks(api)
 
 /**
  * The same for the pages. What has been answered is drawn in slices, between which the browser answers: a long list holds up
- * nobody who types or presses. Of a question's state it tells `data`, `error` and `status`, and what follows from them.
+ * nobody who types or presses. Of a question's state it tells what `useInSlices` does.
  */
 export const $api: typeof $now = {
   ...$now,
-  useQuery: ((...asked: Parameters<typeof $now.useQuery>) => {
-    useAskedAtOnce(asked)
-    const [method, path, init, options, given] = asked
-    return useInSlices($now.queryOptions(method, path, init as never, options as never), given)
+  useQuery: ((...[method, path, init, options, given]: Parameters<typeof $now.useQuery>) => {
+    const asked = $now.queryOptions(method, path, init as never, options as never)
+    useAskedAtOnce(asked, (client) => client.query(asked), given)
+    return useInSlices(asked, given)
   }) as typeof $now.useQuery,
-  useInfiniteQuery: ((...asked: Parameters<typeof $now.useInfiniteQuery>) => {
-    useFirstPartAskedAtOnce(asked)
-    return $now.useInfiniteQuery(...asked)
-  }) as typeof $now.useInfiniteQuery,
+  useInfiniteQuery: ((...[method, path, init, options, given]: Parameters<typeof $now.useInfiniteQuery>) => {
+    const asked = inParts(method, path, init, options)
+    useAskedAtOnce(asked, (client) => client.infiniteQuery(asked), given)
+    return useInSlices(asked as never, given, InfiniteQueryObserver as never)
+  }) as unknown as typeof $now.useInfiniteQuery,
 }
 
 /** Sends a new question while the page is drawn: React sends it once all is drawn, half a second later on a slow phone. */
-function useAskedAtOnce([method, path, init, options, given]: Parameters<typeof $now.useQuery>) {
+function useAskedAtOnce(
+  { queryKey, enabled }: { queryKey: QueryKey; enabled?: unknown },
+  ask: (client: QueryClient) => Promise<unknown>,
+  given?: QueryClient,
+) {
   const client = useQueryClient(given)
-  const query = $now.queryOptions(method, path, init as never, options as never)
-  if (query.enabled === false || client.getQueryState(query.queryKey)) return
+  if (enabled === false || client.getQueryState(queryKey)) return
   // How it ends, whoever asked is told by the cache.
-  client.query(query).catch(() => {})
+  ask(client).catch(() => {})
 }
 
-/** The same for the first part of a list. */
-function useFirstPartAskedAtOnce([method, path, init, options, given]: Parameters<
-  typeof $now.useInfiniteQuery
->) {
-  const client = useQueryClient(given)
+/** The question for a list in parts, as openapi-react-query asks it. */
+function inParts(...[method, path, init, options]: Parameters<typeof $now.useInfiniteQuery>) {
   const { queryKey, queryFn } = $now.queryOptions(method, path, init as never)
-  if (options.enabled === false || client.getQueryState(queryKey)) return
   const { pageParamName = 'cursor', ...rest } = options
   const asked = init as { params: { query: object } }
   const part = (pageParam: unknown) => ({
     ...asked,
     params: { ...asked.params, query: { ...asked.params.query, [pageParamName]: pageParam } },
   })
-  client
-    .infiniteQuery({
-      ...(rest as { initialPageParam: unknown; getNextPageParam: () => unknown }),
-      queryKey,
-      queryFn: ({ pageParam, ...context }) =>
-        (queryFn as unknown as QueryFunction)({
-          ...context,
-          queryKey: [method, path, part(pageParam)],
-        } as never),
-    })
-    .catch(() => {})
+  return {
+    ...(rest as { enabled?: boolean; initialPageParam: unknown; getNextPageParam: () => unknown }),
+    queryKey,
+    queryFn: ({ pageParam, ...context }: QueryFunctionContext<typeof queryKey, unknown>) =>
+      (queryFn as unknown as QueryFunction)({
+        ...context,
+        queryKey: [method, path, part(pageParam)],
+      } as never),
+  }
 }
 
 const statusKey = ['get', '/api/status'] as const

@@ -1,6 +1,7 @@
 /** A question whose answer is drawn in slices, between which the browser answers. */
 import {
   notifyManager,
+  type QueryClient,
   type QueryKey,
   QueryObserver,
   type UseQueryOptions,
@@ -10,7 +11,7 @@ import {
 import { startTransition, useEffect, useMemo, useReducer, useState } from 'react'
 
 /** Of a question's state these are told, and what follows from them. */
-const TOLD = ['data', 'error', 'status'] as const
+const TOLD = ['data', 'error', 'status', 'isPlaceholderData'] as const
 
 /**
  * As `useQuery` of TanStack, but for when it draws. That one keeps its state in what React calls an external store: each answer
@@ -19,12 +20,13 @@ const TOLD = ['data', 'error', 'status'] as const
  */
 export function useInSlices<Answer, Failure = Error, Data = Answer, Key extends QueryKey = QueryKey>(
   options: UseQueryOptions<Answer, Failure, Data, Key>,
-  given?: Parameters<typeof useQueryClient>[0],
+  given?: QueryClient,
+  Observer = QueryObserver,
 ): UseQueryResult<Data, Failure> {
   const client = useQueryClient(given)
   const asked = client.defaultQueryOptions({ ...options, notifyOnChangeProps: [...TOLD] })
   asked._optimisticResults = 'optimistic'
-  const [observer] = useState(() => new QueryObserver(client, asked))
+  const [observer] = useState(() => new Observer(client, asked))
   const [, draw] = useReducer((times: number) => times + 1, 0)
   const result = observer.getOptimisticResult(asked)
   useEffect(() => {
@@ -34,7 +36,7 @@ export function useInSlices<Answer, Failure = Error, Data = Answer, Key extends 
     return end
   }, [observer])
   useEffect(() => observer.setOptions(asked), [observer, asked])
-  const { data, error, status } = result
+  const { data, error, status, isPlaceholderData } = result
   // biome-ignore lint/correctness/useExhaustiveDependencies: the result is new each time, what it says is not.
-  return useMemo(() => result, [data, error, status])
+  return useMemo(() => result, [data, error, status, isPlaceholderData])
 }

@@ -2,7 +2,7 @@
 import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
 import { memo, Suspense, useLayoutEffect, useRef } from 'react'
 import { Link, NavLink, Outlet, useLocation, useNavigationType } from 'react-router'
-import { useAlertNews } from '../alerts/useAlertNews'
+import { AlertNews } from '../alerts/AlertNews'
 import { useAccount } from '../api/account'
 import { isUnauthorized } from '../api/errors'
 import { useServerEvents } from '../api/events'
@@ -28,11 +28,11 @@ export function Shell() {
   const joining = pathname === '/join'
   const offline = isError && !locked
   useServerEvents(status !== undefined && !locked)
-  useAlertNews(status !== undefined && !locked)
   useTopOfNewPages()
 
   return (
     <div className={classes.shell}>
+      {status !== undefined && !locked && <AlertNews />}
       <a href="#main" className={classes.skip}>
         Skip to content
       </a>

@@ -2,9 +2,9 @@
 import { Button, Text, VisuallyHidden } from '@mantine/core'
 import { useDebouncedValue, useLocalStorage } from '@mantine/hooks'
 import { keepPreviousData } from '@tanstack/react-query'
-import { useEffect, useState } from 'react'
+import { startTransition, useEffect, useState } from 'react'
 import { Link, useSearchParams } from 'react-router'
-import { $now } from '../api/client'
+import { $api } from '../api/client'
 import { messageOf } from '../api/errors'
 import type { ArenaConfig } from '../api/types'
 import { Canvas } from '../components/arena-editor/Canvas'
@@ -156,8 +156,10 @@ function useFrom({ change }: Draft): string | null {
     geometryOf(config as unknown as ArenaConfig).then(
       (arena) => {
         if (left) return
-        change(arena, { chosen: null })
-        setSearch({}, { replace: true })
+        startTransition(() => {
+          change(arena, { chosen: null })
+          setSearch({}, { replace: true })
+        })
       },
       (error: unknown) => !left && setProblem(messageOf(error)),
     )
@@ -172,7 +174,7 @@ function useFrom({ change }: Draft): string | null {
 function useReview({ arena }: Draft, clearance: number) {
   const [drawn] = useDebouncedValue(arena, REST_MS)
   const body = { arena: { ...drawn, name: drawn.name.trim() || 'Drawing' }, clearance }
-  const { data, error, isPlaceholderData } = $now.useQuery(
+  const { data, error, isPlaceholderData } = $api.useQuery(
     'post',
     '/api/arenas/reviews',
     { body },

@@ -1,6 +1,6 @@
 /** The rows of the table: trainings, part by part as one scrolls, or groups with the trainings of those that are open. */
 import { keepPreviousData, useQueries } from '@tanstack/react-query'
-import { useDeferredValue, useEffect, useMemo, useRef } from 'react'
+import { useEffect, useMemo, useRef } from 'react'
 import { $api } from '../api/client'
 import type { Group, ListedExperiment } from '../api/types'
 import { askedFor } from './cells'
@@ -54,7 +54,6 @@ function useAskedRows(view: TableView, open: ReadonlySet<string>): Rows {
       enabled: !grouped,
     },
   )
-  const parts = useDeferredValue(list.data)
   const groups = $api.useQuery(
     'get',
     '/api/workbench/groups',
@@ -73,17 +72,17 @@ function useAskedRows(view: TableView, open: ReadonlySet<string>): Rows {
     ),
   })
   if (!grouped) {
-    const pages = parts?.pages ?? []
+    const pages = list.data?.pages ?? []
     return {
       rows: pages
         .flatMap(({ items }) => items)
         .map((experiment) => ({ kind: 'training', key: experiment.id, experiment, nested: false })),
       total: pages[0]?.total,
       error: list.error,
-      isPending: parts === undefined && !list.error,
+      isPending: list.isPending,
       refetch: () => void list.refetch(),
       more: () => {
-        if (list.hasNextPage && !list.isFetchingNextPage) void list.fetchNextPage()
+        if (list.hasNextPage) void list.fetchNextPage({ cancelRefetch: false })
       },
     }
   }

@@ -14,13 +14,14 @@ function shown(): number | undefined {
   return text === null ? undefined : Number(text)
 }
 
-export function useAlertNews(enabled: boolean): void {
+/** Draws nothing of its own: a component, so that news draw no page anew. */
+export function AlertNews() {
   const [after, setAfter] = useState(shown)
   const { data } = $api.useQuery(
     'get',
     '/api/alerts/news',
     { params: { query: after === undefined ? {} : { after } } },
-    { enabled, refetchInterval: EVERY_MS, refetchIntervalInBackground: true, meta: { ownPace: true } },
+    { refetchInterval: EVERY_MS, refetchIntervalInBackground: true, meta: { ownPace: true } },
   )
   useEffect(() => {
     if (!data) return
@@ -40,4 +41,5 @@ export function useAlertNews(enabled: boolean): void {
       }
     }
   }, [data])
+  return null
 }
