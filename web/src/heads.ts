@@ -99,6 +99,10 @@ export const HEADS = {
       'Who is in it, and as what: viewers look and take home, editors also launch and change, admins also invite.',
     within: ['Projects', '/projects'],
   },
+  NotFoundPage: {
+    title: 'There is no page here',
+    about: 'The address may be mistyped, or what it led to has been deleted.',
+  },
   PeoplePage: { title: 'People and workers' },
   StoragePage: {
     title: 'Storage',

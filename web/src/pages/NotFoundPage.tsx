@@ -1,24 +1,17 @@
 /** An address that leads nowhere. */
 import { Button } from '@mantine/core'
 import { Link } from 'react-router'
-import { IconCompassOff } from '../components/icons'
-import { Message } from '../components/ui'
+import { Page } from '../components/ui'
+import { HEADS } from '../heads'
 import { useTitle } from '../lib/hooks'
 
 export function NotFoundPage() {
-  useTitle('Not found')
+  useTitle(HEADS.NotFoundPage.title)
   return (
-    <Message
-      icon={<IconCompassOff size={40} stroke={1.3} />}
-      alone
-      title="There is no page here"
-      actions={
-        <Button component={Link} to="/" variant="default">
-          All trainings
-        </Button>
-      }
-    >
-      The address may be mistyped, or what it led to has been deleted.
-    </Message>
+    <Page {...HEADS.NotFoundPage}>
+      <Button component={Link} to="/" variant="default">
+        All trainings
+      </Button>
+    </Page>
   )
 }

@@ -45,7 +45,8 @@ export function TrainingsTable(props: TrainingsTableProps) {
   const { rows } = data
   const now = useNow()
   const navigate = useNavigate()
-  const narrow = useMediaQuery('(max-width: 620px)') ?? false
+  // Known at once: a phone draws cards, not rows and then cards.
+  const narrow = useMediaQuery('(max-width: 620px)', undefined, { getInitialValueInEffect: false })
   const scroll = useRef<HTMLDivElement>(null)
   const [active, setActive] = useState(0)
   const wanted = useRef<number | null>(null)
@@ -59,8 +60,13 @@ export function TrainingsTable(props: TrainingsTableProps) {
     useFlushSync: false,
     getItemKey: (index) => rows[index]?.key ?? index,
   })
-  // biome-ignore lint/correctness/useExhaustiveDependencies: other rows have other heights.
-  useEffect(() => virtual.measure(), [narrow, view.by, virtual])
+  // Other rows have other heights.
+  const heights = `${narrow} ${view.by}`
+  const measured = useRef(heights)
+  useEffect(() => {
+    if (measured.current !== heights) virtual.measure()
+    measured.current = heights
+  }, [heights, virtual])
   const shown = virtual.getVirtualItems()
   const last = shown.at(-1)?.index ?? 0
   const { more } = data
