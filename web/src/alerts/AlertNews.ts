@@ -21,7 +21,7 @@ export function AlertNews() {
     'get',
     '/api/alerts/news',
     { params: { query: after === undefined ? {} : { after } } },
-    { refetchInterval: EVERY_MS, refetchIntervalInBackground: true, meta: { ownPace: true } },
+    { refetchInterval: EVERY_MS, refetchIntervalInBackground: true, gcTime: 0, meta: { ownPace: true } },
   )
   useEffect(() => {
     if (!data) return
