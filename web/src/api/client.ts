@@ -46,7 +46,7 @@ api.use({
   },
 })
 
-/** The hooks as they come: for what has to be told at once, whether a question is under way, or of what an answer is. */
+/** The hooks as they come: for what has to be told at once, and for whether a question is under way. */
 export const $now = createQueryHooks(api)
 
 /**
