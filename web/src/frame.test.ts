@@ -16,7 +16,8 @@ test.each(Object.entries(HEADS))(
   async (name, head) => {
     vi.stubGlobal('EventSource', FakeEventSource)
     startServer({})
-    const [address = '/'] = Object.entries(ROUTES).find(([, page]) => page === name) ?? []
+    const [path = '/'] = Object.entries(ROUTES).find(([, page]) => page === name) ?? []
+    const address = path === '*' ? '/nowhere' : path
     const written = document.createElement('div')
     written.innerHTML = frameHtml(address, head)
     open(address)
