@@ -9,6 +9,7 @@ from workers.config import OffPolicyConfig, TrainingConfig
 from workers.errors import MemoryTooLargeError
 from workers.networks.inputs import inputs_of
 from workers.networks.layout import known_shapes
+from workers.wording import counted
 
 _NUMBER_BYTES = 4
 # A reward, and whether something followed.
@@ -55,8 +56,9 @@ def refuse_too_large(training: TrainingConfig, max_bytes: int = MAX_STATE_BYTES)
         return
     fits = max(0, limit - (archive_bytes(training) - replay)) // _transition_bytes(training) // 1_000 * 1_000
     raise MemoryTooLargeError(
-        f"checkpoints with this memory may have {archive_bytes(training) / 2**20:,.0f} MiB, {limit / 2**20:,.0f} are taken: "
-        f"keep at most {fits:,} transitions, or make observations smaller (fewer batches of rays, fewer frames)"
+        f"checkpoints with this memory may have {counted(archive_bytes(training) / 2**20)} MiB, {counted(limit / 2**20)} "
+        f"are taken: keep at most {counted(fits)} transitions, or make observations smaller (fewer batches of rays, "
+        "fewer frames)"
     )
 
 

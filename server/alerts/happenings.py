@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from server.database import tables
 from server.database.tables import AlertEvent
 from workers.diagnoses import Diagnosis
-from workers.diagnoses.model import percent
+from workers.wording import counted, percent
 
 _LONGEST_ERROR = 500
 
@@ -53,7 +53,7 @@ def ended(experiment: tables.Experiment, runs: Sequence[tables.Run], found: Find
         if (number := sum(run.state == state for run in runs))
     ]
     rates = [rate for run in runs if (rate := success_rate(run)) is not None]
-    success = f" Success: {', '.join(percent(rate, 1) for rate in rates)}." if rates else ""
+    success = f" Success: {', '.join(percent(rate) for rate in rates)}." if rates else ""
     return Happening(
         event="ended",
         # A run that is resumed begins another attempt, and so ends once more.
@@ -76,7 +76,7 @@ def failed(run: tables.Run, found: Findings) -> Happening:
         event="failed",
         key=f"failed {run.id} {run.attempt}",
         title=f"{run.experiment.name}, seed {run.seed}, has failed",
-        words=lambda: f"At step {run.step:,}: {why or 'nobody said why.'}{_what_curves_say(found())}",
+        words=lambda: f"At step {counted(run.step)}: {why or 'nobody said why.'}{_what_curves_say(found())}",
         project_id=run.experiment.project_id,
         experiment_id=run.experiment_id,
         run_id=run.id,
@@ -106,10 +106,10 @@ def succeeded(run: tables.Run, threshold: float) -> Happening:
     return Happening(
         event="success",
         key=f"success {run.id}",
-        title=f"{run.experiment.name}, seed {run.seed}: success {percent(rate, 1)}",
+        title=f"{run.experiment.name}, seed {run.seed}: success {percent(rate)}",
         words=lambda: (
             f"{run.final_arrivals} of {run.final_episodes} episodes on {run.final_suite} arrive at step "
-            f"{run.final_step or 0:,}: at or above {percent(threshold, 1)}."
+            f"{counted(run.final_step or 0)}: at or above {percent(threshold)}."
         ),
         project_id=run.experiment.project_id,
         experiment_id=run.experiment_id,
@@ -126,8 +126,8 @@ def stuck(experiment: tables.Experiment, waiting: int, since: float, now: float)
         key=f"stuck {experiment.id} {_day(now)}",
         title=f"{experiment.name} waits in the queue",
         words=lambda: (
-            f"{waiting} {'run waits' if waiting == 1 else 'runs wait'}, for {minutes:,.0f} minutes by now. The page of the "
-            "queue says for what."
+            f"{waiting} {'run waits' if waiting == 1 else 'runs wait'}, for {counted(minutes)} minutes by now. The page of "
+            "the queue says for what."
         ),
         project_id=experiment.project_id,
         experiment_id=experiment.id,

@@ -8,6 +8,7 @@ from server.checkpoints.schemas import Checkpoint, Evaluation
 from server.database import tables
 from server.estimates import success_estimate
 from server.schemas import Estimate
+from workers.wording import counted
 
 
 class Evaluated(Protocol):
@@ -39,7 +40,7 @@ def success_over_runs(evaluations: Sequence[Evaluated]) -> Estimate | None:
 
 def policy_title(run: tables.Run, checkpoint: tables.Checkpoint) -> str:
     """What a checkpoint's policy is called where it stands alone."""
-    return f"{run.experiment.name}, seed {run.seed}, step {checkpoint.step:,}"
+    return f"{run.experiment.name}, seed {run.seed}, step {counted(checkpoint.step)}"
 
 
 def evaluation_view(evaluation: tables.Evaluation) -> Evaluation:

@@ -26,6 +26,7 @@ from server.metrics.thinning import Thinned, ThinningRepository, thinned
 from server.runs import states
 from server.runs.repository import PointsState, RunRepository
 from server.services import Services
+from workers.wording import counted
 
 logger = logging.getLogger(__name__)
 
@@ -169,8 +170,8 @@ class CurveThinningService:
                 run.thinned_at = time.time()
             if piece.last:
                 run.thins_at, run.thin_enough = None, piece.limit
-                if run.thinned_at is not None:
-                    told = f"{run.thinned_from:,} points to {run.thinned_to:,}"
+                if run.thinned_at is not None and run.thinned_from is not None and run.thinned_to is not None:
+                    told = f"{counted(run.thinned_from)} points to {counted(run.thinned_to)}"
                     RunRepository(session).add_event(run_id, "info", f"Curves were thinned: {told}.", run.step)
                     _note(session, run.experiment, "experiment.curves_thinned", f"seed {run.seed}: {told}")
             experiment_id = run.experiment_id

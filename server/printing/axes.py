@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from server.comparison.grid import Across
-from server.printing.values import MINUS, NARROW_SPACE, counted, significant
+from server.printing.values import significant
+from workers.wording import MINUS, NARROW_SPACE, counted
 
 _TICKS = 5
 _AXIS_DIGITS = 3

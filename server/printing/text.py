@@ -3,8 +3,8 @@
 import re
 
 from server.printing.tables import PrintedTable
-from server.printing.values import MINUS, NARROW_SPACE
 from server.spreadsheets import csv_rows
+from workers.wording import MINUS, NARROW_SPACE
 
 _LATEX = {
     "\\": r"\textbackslash{}",

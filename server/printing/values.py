@@ -5,9 +5,9 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from workers.wording import MINUS, counted
+
 NOTHING = "–"
-NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
-MINUS = "\N{MINUS SIGN}"
 SPELLED: Mapping[str, str] = {
     "cpu": "CPU",
     "cuda": "CUDA",
@@ -50,12 +50,6 @@ def spelled_out(name: str) -> str:
     """A name of the code as a person reads it: "Learning rate", "CPU"."""
     text = name.replace("_", " ")
     return SPELLED.get(text, text[:1].upper() + text[1:])
-
-
-def counted(value: float) -> str:
-    """A whole number, with narrow spaces between its thousands."""
-    whole = math.floor(abs(value) + 0.5)
-    return f"{MINUS if value < 0 and whole else ''}{whole:,}".replace(",", NARROW_SPACE)
 
 
 def significant(value: float, digits: int) -> str:

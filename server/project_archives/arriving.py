@@ -55,6 +55,7 @@ from server.uploads.schemas import MAX_FILE_BYTES
 from sim.config import ArenaFile
 from workers.checkpoints import check_archive
 from workers.errors import ArchiveError
+from workers.wording import counted
 
 MAX_RUNS = 10_000
 """Of one archive."""
@@ -399,7 +400,7 @@ def _unpacked(run: _Run, content: bytes, size: int) -> tuple[ArchivedPoints, byt
     head = _read(ArchivedPoints, line)
     run.points += head.count
     if run.points > _MAX_POINTS:
-        raise CorruptUploadError(f"a run may have {_MAX_POINTS:,} points")
+        raise CorruptUploadError(f"a run may have {counted(_MAX_POINTS)} points")
     reader = zlib.decompressobj()
     try:
         if len(reader.decompress(data, size * head.count + 1)) != size * head.count or not reader.eof:

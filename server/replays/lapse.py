@@ -17,6 +17,7 @@ from server.services import Services
 from workers.film_protocol import MAX_CHAPTERS, MAX_ROBOTS, FilmedChapter, LapseFilm
 from workers.replays.recording import Recording
 from workers.scene.themes import Theme
+from workers.wording import counted, percent
 
 _LONGEST_SECONDS = 6.0
 # The picture at the end of each chapter.
@@ -63,10 +64,10 @@ def filmed(subjects: Sequence[Subject], recordings: Sequence[Recording], theme: 
         for subject, (begins, lasts) in zip(subjects, times, strict=True)
     )
     said = [
-        (begins, f"Step {subject.step:,}: {100.0 * _success(recording):.1f} % of all arrive")
+        (begins, f"Step {counted(subject.step)}: {percent(_success(recording))} of all arrive")
         for subject, recording, (begins, _) in zip(subjects, recordings, times, strict=True)
     ]
-    run = subjects[-1].title.removesuffix(f", step {subjects[-1].step:,}")  # its checkpoints come one after another
+    run = subjects[-1].title.removesuffix(f", step {counted(subjects[-1].step)}")  # its checkpoints come one after another
     caption = LapseCaption(run, subjects[0].recorded.suite, len(scenarios), said)
     return LapseFilm(theme=theme, scenarios=tuple(scenarios), chapters=chapters), caption
 

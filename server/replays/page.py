@@ -10,6 +10,7 @@ from pathlib import Path
 from server.live.page import asset, viser_page
 from workers.reporting import EpisodeResult
 from workers.scene.themes import Theme, css_colour
+from workers.wording import counted
 
 _DIRECTORY = Path(__file__).parent / "assets"
 _OUTCOMES = {"arrival": "Arrived", "collision": "Collided", "timeout": "Timed out"}
@@ -86,11 +87,12 @@ class Caption:
             f"<span>of {html.escape(self.suite)}</span></div>",
         ]
         for number, driver in enumerate(self.drivers):
-            outcome, steps = driver.result.outcome, driver.result.steps
+            outcome = driver.result.outcome
+            lasted = f"{counted(driver.result.steps)} steps, {driver.seconds:.1f} s"
             dot = f'<i style="background:{css_colour(number)}"></i>' if len(self.drivers) > 1 else ""
             lines += [
                 f'<div class="step">{dot}{html.escape(driver.title)}</div>',
-                f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {steps:,} steps, {driver.seconds:.1f} s</div>',
+                f'<div class="outcome {outcome}">{_OUTCOMES[outcome]} after {lasted}</div>',
                 "" if driver.faithful else f'<div class="note">{_UNFAITHFUL}</div>',
             ]
         return f'<div id="display">{"".join(lines)}</div>'

@@ -13,6 +13,7 @@ from server.run_log.schemas import LogLine, RunLog
 from server.runs.repository import RunRepository
 from server.services import Services
 from workers.protocol import LogBatch
+from workers.wording import counted
 
 _BLOCK_LINES = 500
 
@@ -82,7 +83,7 @@ def _printed(lines: Iterable[PrintedLine]) -> Iterator[LogLine]:
         if line.attempt != attempt:
             attempt, number = line.attempt, 0
         if (missing := line.number - number - 1) > 0:
-            said = f"{missing:,} {'line was' if missing == 1 else 'lines were'} not kept."
+            said = f"{counted(missing)} {'line was' if missing == 1 else 'lines were'} not kept."
             yield LogLine(at=line.at, kind="left out", attempt=attempt, step=None, level="warning", text=said)
         number = line.number
         yield LogLine(at=line.at, kind="output", attempt=attempt, step=None, level="info", text=line.text)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 from workers.statistics.seeds import interquartile_mean
+from workers.wording import percent
 
 SeedRungs = Mapping[str, Sequence[float | None]]
 """By seed, its success rate at every evaluation, the first at one interval's steps; None where there was none."""
@@ -64,11 +65,10 @@ def hopeless(trial: SeedRungs, complete: Sequence[SeedRungs], first: int) -> str
             continue
         best = max(value for at in range(1, rung + 1) if (value := _together(trial, seeds, at)) is not None)
         if best < median(others):
-            reason = (
-                f"After evaluation {rung} at best {best:.1%} of its episodes had arrived with seeds "
-                f"{', '.join(seeds)}, and {median(others):.1%} with the same ones of the median trial."
+            return (
+                f"After evaluation {rung} at best {percent(best)} of its episodes had arrived with seeds "
+                f"{', '.join(seeds)}, and {percent(median(others))} with the same ones of the median trial."
             )
-            return reason.replace("%", " %")
         return None
     return None
 

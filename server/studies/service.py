@@ -23,6 +23,7 @@ from server.studies.repository import StudyRepository
 from server.studies.schemas import MAX_TRIALS, Study, StudyLaunch, StudyPage, StudySpec
 from server.studies.space import UnusableSettingError
 from server.studies.views import listed_view, study_view
+from workers.wording import counted
 
 
 class StudyService:
@@ -188,7 +189,8 @@ def _most_trials(spec: StudySpec) -> int:
         return MAX_TRIALS
     if (size := grid_size(space_of(spec))) > MAX_GRID:
         raise RefusedFieldError(
-            ("body", "sampler"), f"this grid has {size:,} points, {MAX_GRID:,} are taken: search fewer settings or values"
+            ("body", "sampler"),
+            f"this grid has {counted(size)} points, {counted(MAX_GRID)} are taken: search fewer settings or values",
         )
     return min(MAX_TRIALS, size)
 

@@ -10,6 +10,7 @@ from server.suites.schemas import MAX_SUITES, OwnScenario, OwnSuite
 from sim.arenas.review import why_no_scenario
 from sim.config import ArenaFile
 from workers.job_protocol import MAX_SCENARIOS
+from workers.wording import counted
 
 MAX_OBSTACLES = 20_000
 """Of all scenarios of a suite: what a worker is sent at once, 2 MB."""
@@ -60,7 +61,8 @@ def add_scenario(services: Services, suite_id: str, sha256: str) -> OwnSuite:
             return _view(suite)
         if len(suite.scenarios) >= MAX_SCENARIOS or obstacles > MAX_OBSTACLES:
             raise ConflictError(
-                f"A suite has at most {MAX_SCENARIOS} scenarios with {MAX_OBSTACLES:,} obstacles in all: make another one."
+                f"A suite has at most {MAX_SCENARIOS} scenarios with {counted(MAX_OBSTACLES)} obstacles in all: "
+                "make another one."
             )
         suite.scenarios = [*suite.scenarios, {"sha256": sha256, "name": document.name}]
         return _view(suite)

@@ -17,6 +17,7 @@ from server.runs import states
 from server.runs.repository import RunRepository
 from server.worker_api.losses import MAX_LOSSES, count_loss, exhausted, hopeful, too_many
 from workers.protocol import ClaimRequest, Final
+from workers.wording import counted
 
 
 class FencedError(ConflictError):
@@ -53,7 +54,7 @@ def begin(session: Session, run: tables.Run, request: ClaimRequest, others: Coll
     run.claim_id = request.claim_id
     run.started_at = run.started_at or time.time()
     _rewind(session, run, checkpoint)
-    origin = f"from step {checkpoint.step:,}" if checkpoint else "from the start"
+    origin = f"from step {counted(checkpoint.step)}" if checkpoint else "from the start"
     message = f"Attempt {run.attempt} begins {origin} on {request.worker}."
     RunRepository(session).add_event(run.id, "info", message, run.step)
     return checkpoint
@@ -156,8 +157,8 @@ def _fall_back(
     session.flush()
     checkpoint = CheckpointRepository(session).last(run.id)
     _rewind(session, run, checkpoint)
-    origin = f"step {checkpoint.step:,}" if checkpoint else "the start"
-    message = f"The checkpoint of step {damaged.step:,} is damaged ({reason}): the run goes on from {origin}."
+    origin = f"step {counted(checkpoint.step)}" if checkpoint else "the start"
+    message = f"The checkpoint of step {counted(damaged.step)} is damaged ({reason}): the run goes on from {origin}."
     RunRepository(session).add_event(run.id, "warning", message, run.step)
     run.state = states.next_state(run.state, "lose")
     _settle(run)

@@ -48,6 +48,7 @@ from workers.protocol import (
     device_of,
     queues_of,
 )
+from workers.wording import counted
 
 logger = logging.getLogger(__name__)
 
@@ -132,7 +133,7 @@ class WorkerService:
         self._services.leases.renew(run.id, claim.attempt)
         self._publish(run, "run")
         if is_fresh:
-            origin = f"step {checkpoint.step:,}" if checkpoint else "the start"
+            origin = f"step {counted(checkpoint.step)}" if checkpoint else "the start"
             _say(run.id, logging.INFO, f"attempt {claim.attempt} begins from {origin} on {request.worker}")
         if problem is not None:
             _say(run.id, logging.ERROR, f"attempt {claim.attempt} ended: failed: {problem}")
@@ -204,7 +205,7 @@ class WorkerService:
         for run, attempt, final in ended:
             reason = f": {final.error}" if final.error else ""
             level = logging.INFO if final.outcome in _AS_IT_SHOULD else logging.WARNING
-            _say(run.id, level, f"attempt {attempt} ended at step {run.step:,}: {final.outcome}{reason}")
+            _say(run.id, level, f"attempt {attempt} ended at step {counted(run.step)}: {final.outcome}{reason}")
             self._announce(run)
             if final.outcome == "completed":
                 make_ahead(self._services, run.id)

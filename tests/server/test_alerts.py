@@ -129,7 +129,7 @@ def test_a_training_that_has_ended_is_told_once_when_all_its_runs_have(
 
     (alert,) = alerts(client)
     assert alert["title"] == "Corridor has ended"
-    assert alert["text"] == "Of 2 runs: 1 completed, 1 stopped. Success: 93.0 %."
+    assert alert["text"] == "Of 2 runs: 1 completed, 1 stopped. Success: 93.0\u202f%."
     assert (alert["state"], alert["channel"]) == ("sent", "browser")
 
     # Resumed, it ends once more.
@@ -149,7 +149,9 @@ def test_a_failed_run_is_told_with_its_error_and_its_diagnoses(
 
     (alert,) = alerts(client)
     assert alert["title"] == "Corridor, seed 7, has failed"
-    assert alert["text"].startswith("At step 4,000: RuntimeError: out of memory Its curves say: KL divergence exploded.")
+    assert alert["text"].startswith(
+        "At step 4\u202f000: RuntimeError: out of memory Its curves say: KL divergence exploded."
+    )
     assert "To try first: Lower the learning rate" in alert["text"]
     assert alert["text"].endswith("Also: Success is stuck.")
     assert alert["run_id"] == run["id"]
@@ -184,7 +186,9 @@ def test_success_is_told_when_an_evaluation_reaches_it(client: TestClient, repor
     assert watcher.look() == 1
     reports.state(run, "running", final_arrivals=199, **final)
     assert watcher.look() == 0
-    assert alerts(client)[0]["text"] == "180 of 200 episodes on simple-200 arrive at step 30,000: at or above 90.0 %."
+    assert (
+        alerts(client)[0]["text"] == "180 of 200 episodes on simple-200 arrive at step 30\u202f000: at or above 90.0\u202f%."
+    )
 
 
 def test_waiting_too_long_and_a_full_disk_are_told_once_a_day(

@@ -169,7 +169,7 @@ def test_a_rule_thins_after_its_days_and_those_of_the_trash(place: Place) -> Non
     with place.services.database.read() as session:
         said = session.scalars(select(tables.RunEvent.message).where(tables.RunEvent.run_id == "r")).all()
         done = session.scalars(select(tables.AuditEntry.action).order_by(tables.AuditEntry.id)).all()
-    assert said == [f"Curves were thinned: 20,000 points to {run.thinned_to}."]
+    assert said == [f"Curves were thinned: 20\u202f000 points to {run.thinned_to}."]
     assert done == ["experiment.curve_rule_changed", "experiment.curves_thinned"]
 
 

@@ -356,7 +356,7 @@ def test_a_memory_that_makes_checkpoints_larger_than_the_service_takes_is_refuse
     assert response.status_code == 422
     (problem,) = response.json()["detail"]
     assert problem["loc"] == ["body", "training", "algorithm", "sac", "replay_size"]
-    assert "keep at most 104,000 transitions" in problem["msg"]
+    assert "keep at most 104\u202f000 transitions" in problem["msg"]
     assert client.get("/api/experiments").json()["items"] == []
 
 

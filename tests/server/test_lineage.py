@@ -76,7 +76,7 @@ def test_hash_and_title_are_written_down_at_launch(client: TestClient, checkpoin
         "source": "checkpoint",
         "name": checkpoint,
         "sha256": hashlib.sha256(b"archive of step 50000").hexdigest(),
-        "title": "Corridor, seed 3, step 50,000",
+        "title": "Corridor, seed 3, step 50\u202f000",
     }
 
 
@@ -122,7 +122,7 @@ def test_what_does_not_fit_says_in_what(client: TestClient, checkpoint: str) -> 
     network = {"name": "mlp", "hidden_sizes": [32]}
     other = fine_tune(client, checkpoint, algorithm={"name": "ppo", "network": network}, task={"observation": "paper"})
     message = refusal(other)
-    assert "Corridor, seed 3, step 50,000 does not fit: its observation is improved of" in message
+    assert "Corridor, seed 3, step 50\u202f000 does not fit: its observation is improved of" in message
     assert "its network is mlp (hidden_sizes [64, 64], activation relu), and this one's mlp (hidden_sizes [32]," in message
 
 
@@ -200,7 +200,7 @@ def test_a_child_outlives_its_parent_from_the_first_moment_on(
     lineage = client.get(f"/api/runs/{run}/lineage").json()
     assert (lineage["parent"]["state"], lineage["parent"]["start_from"]["title"]) == (
         "gone",
-        "Corridor, seed 3, step 50,000",
+        "Corridor, seed 3, step 50\u202f000",
     )
     claim(client, run)
     assert start_archive(client, run).content == b"archive of step 50000"
@@ -234,7 +234,7 @@ def test_in_a_comparison_it_is_one_difference_with_a_name(
     child = fine_tune(client, checkpoint).json()
     compared = client.get("/api/compare", params={"experiment": [parent["id"], child["id"]]}).json()
     sha256 = child["training"]["start_from"]["sha256"]
-    named = f"Corridor, seed 3, step 50,000 ({sha256[:8]})"
+    named = f"Corridor, seed 3, step 50\u202f000 ({sha256[:8]})"
     assert compared["differences"] == [{"path": "start_from", "values": [None, named], "left_out": [False, False]}]
 
 

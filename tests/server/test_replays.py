@@ -96,7 +96,7 @@ def test_an_episode_is_replayed_as_it_was_recorded(client: TestClient, checkpoin
     assert "darkMode:true" in page.text
     assert f"after {recorded.steps} steps" in page.text
     # Names are people's own.
-    assert "Tür &lt;b&gt;, seed 4, step 81,920" in page.text
+    assert "Tür &lt;b&gt;, seed 4, step 81\u202f920" in page.text
     content = recording_in(page.text)
     assert content["durationSeconds"] == pytest.approx(0.2 * recorded.steps + 1.5)
     times = [time for time, _ in content["messages"]]  # type: ignore[attr-defined]
@@ -165,7 +165,7 @@ def test_two_policies_drive_one_scenario_side_by_side(client: TestClient, servic
     assert page.status_code == 200
     names = {name for _, message in recording_in(page.text)["messages"] if (name := message.get("name"))}  # type: ignore[attr-defined]
     assert {"/world/chassis", "/world/beside1/chassis", "/world/ends/0", "/world/ends/1"} <= names
-    assert "Tür &lt;b&gt;, seed 4, step 81,920" in page.text
+    assert "Tür &lt;b&gt;, seed 4, step 81\u202f920" in page.text
     download = client.get(f"{replay['page']}light/?download")
     assert download.headers["content-disposition"] == 'attachment; filename="mapless-complex-and-1-more-episode7.html"'
 
@@ -461,7 +461,7 @@ def test_a_time_lapse_shows_the_same_scenarios_at_every_checkpoint(
     assert client.get(f"/api/runs/{run_id}/lapse/progress").json() == {"ready": 8, "policies": 8, "share": 1.0}
     page = client.get(f"{lapse['page']}light/")
     assert page.status_code == 200
-    assert "Step 92,920" in page.text
+    assert "Step 92\\u202f920: " in page.text
     content = recording_in(page.text)
     last = lapse["chapters"][-1]["begins"]
     assert last < content["durationSeconds"] <= last + 8.0

@@ -14,6 +14,7 @@ from server.runs.repository import RunRepository
 from server.services import Services
 from tests.server.harness import WORKER_TOKEN, Reports
 from workers.protocol import MAX_LOG_LINES, LogBatch, LogLine
+from workers.wording import counted
 
 
 @pytest.fixture
@@ -72,7 +73,7 @@ def test_a_gap_says_how_many_are_missing(
     reports.state(run, "running", attempt=2)
     log.append(run["id"], 2, batch(2, "c"))
 
-    assert texts(client, run) == ["a", "1,001 lines were not kept.", "b", "1 line was not kept.", "c"]
+    assert texts(client, run) == ["a", "1\u202f001 lines were not kept.", "b", "1 line was not kept.", "c"]
     with pytest.raises(ConflictError, match=r"Attempt 1 of run .* is over"):
         log.append(run["id"], 1, batch(1_004, "too late"))
 
@@ -89,7 +90,7 @@ def test_the_middle_of_a_long_log_goes(client: TestClient, services: Services, r
 
     assert numbers[0] == 1
     assert numbers[-1] == count
-    assert said == f"{count - len(numbers):,} lines were not kept."
+    assert said == f"{counted(count - len(numbers))} lines were not kept."
     kept_bytes = len(numbers) * (24 + 7 + 976)
     assert 0.9 * (HEAD_BYTES + TAIL_BYTES) < kept_bytes <= HEAD_BYTES + TAIL_BYTES
 

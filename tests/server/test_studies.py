@@ -182,8 +182,8 @@ def test_a_trial_that_does_worse_than_the_median_is_stopped(
     move()
     now = look(client, study)
     assert states(now)[-1] == "pruned"
-    assert "at best 30.0 %" in now["results"][-1]["reason"]
-    assert "60.0 % with the same ones" in now["results"][-1]["reason"]
+    assert "at best 30.0\u202f%" in now["results"][-1]["reason"]
+    assert "60.0\u202f% with the same ones" in now["results"][-1]["reason"]
     assert [run["state"] for run in runs(client, bad["experiment_id"])] == ["stopping", "stopped", "stopped"]
     assert now["rule"].startswith("A trial is stopped early once two or more of its seeds")
 
@@ -414,7 +414,7 @@ def test_a_grid_has_no_more_trials_than_points(client: TestClient) -> None:
     many = [{"kind": "range", "path": f"algorithm.{one}", "low": 1e-3, "high": 0.01, "points": 5} for one in paths]
     refused = client.post("/api/studies", json={"name": "Grid", "training": {}, "settings": many, "sampler": "grid"})
     assert refused.status_code == 422
-    assert "15,625 points" in refused.json()["detail"][0]["msg"]
+    assert "15\u202f625 points" in refused.json()["detail"][0]["msg"]
 
 
 def test_the_list_of_studies(client: TestClient, reports: Reports, move: Callable[[], int]) -> None:

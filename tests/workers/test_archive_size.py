@@ -44,7 +44,7 @@ def test_archives_stay_within_what_was_foretold(tmp_path: Path, algorithm: Algor
 
 
 def test_a_memory_that_fits_is_named_and_fits() -> None:
-    with pytest.raises(MemoryTooLargeError, match="keep at most 104,000 transitions") as refused:
+    with pytest.raises(MemoryTooLargeError, match="keep at most 104\u202f000 transitions") as refused:
         refuse_too_large(wide(200_000), 512 * 2**20)
     assert "fewer batches" in str(refused.value)
     refuse_too_large(wide(104_000), 512 * 2**20)
@@ -52,5 +52,5 @@ def test_a_memory_that_fits_is_named_and_fits() -> None:
 
 
 def test_no_training_begins_that_this_release_could_not_resume(tmp_path: Path) -> None:
-    with pytest.raises(MemoryTooLargeError, match="2,048 are taken"):
+    with pytest.raises(MemoryTooLargeError, match="2\u202f048 are taken"):
         train(wide(2_000_000), 0, Recorder(), tmp_path)

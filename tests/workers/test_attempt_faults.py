@@ -117,7 +117,7 @@ def last_word(resumed: Attempt, service: Service) -> Final:
 def test_a_checkpoint_that_stays_damaged_is_said_to_be(resumed: Attempt, service: Service) -> None:
     final = last_word(resumed, service)
     assert final.outcome == "damaged"
-    assert "checkpoint of step 81,920 is not what was stored there" in (final.error or "")
+    assert "checkpoint of step 81\u202f920 is not what was stored there" in (final.error or "")
     # It may have been damaged on its way: it was asked for again.
     assert service.downloads == 3
 
@@ -126,7 +126,7 @@ def test_a_checkpoint_that_is_gone_is_asked_for_once(resumed: Attempt, service: 
     service.status = HTTPStatus.NOT_FOUND
     final = last_word(resumed, service)
     assert final.outcome == "damaged"
-    assert "checkpoint of step 81,920 is gone" in (final.error or "")
+    assert "checkpoint of step 81\u202f920 is gone" in (final.error or "")
     assert service.downloads == 1
 
 
@@ -235,7 +235,10 @@ def test_a_worker_without_room_takes_no_run_and_says_how_much_is_missing(
     tmp_path: Path, places: Callable[..., Place]
 ) -> None:
     place = places(tmp_path, min_free_bytes=2**60)
-    with pytest.raises(UnfitError, match="MiB free, less than 1,099,511,627,776"):
+    with pytest.raises(
+        UnfitError,
+        match="MiB free, less than 1\u202f099\u202f511\u202f627\u202f776",
+    ):
         place.slot.take_trainer()
     assert "MAPLESS_WORK_DIR" in (place.slot.trouble or "")
 

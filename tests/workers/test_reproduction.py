@@ -245,7 +245,7 @@ def test_who_never_learned_counts_as_having_learned_at_the_end() -> None:
     learned, never = seeds(1, 1, 1, 1, 1), seeds(0, 0, 0, 0, 0, learned=None)
     verdict = judge(one, {one.better: learned, one.worse: never})
     assert verdict.word == "holds"
-    assert verdict.reason.startswith("500,000 training steps fewer")
+    assert verdict.reason.startswith("500\u202f000 training steps fewer")
     assert judge(one, {one.better: never, one.worse: never}).reason.startswith("No seed of either reached 90%")
 
 

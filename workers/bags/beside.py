@@ -23,6 +23,7 @@ from workers.export.ros2.mapless_navigator.policy import Policy, Specification, 
 from workers.export.specification import pack_weights, specify, specify_task
 from workers.job_protocol import PlayedPolicy, UploadedPolicy
 from workers.onnx_policy import OnnxPolicy
+from workers.wording import counted
 
 MAX_COMMANDS = 36_000
 """Of one comparison: two hours of a policy that commands five times a second."""
@@ -96,7 +97,9 @@ def beside(bag: Bag, policy: Policy, name: str, progress: Callable[[float], None
     notes = _notes(bag, specification)
     if len(times) > MAX_COMMANDS:
         times = times[:MAX_COMMANDS]
-        notes.append(f"The recording is longer than {MAX_COMMANDS:,} commands of this policy: the first of them are shown.")
+        notes.append(
+            f"The recording is longer than {counted(MAX_COMMANDS)} commands of this policy: the first of them are shown."
+        )
     commands = _commands(bag, policy, times, progress)
     would = np.array([(each.linear, each.angular) for each in commands])
     did = _did(bag, times, period)

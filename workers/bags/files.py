@@ -22,6 +22,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from workers.errors import BagError
 from workers.packed import UNPACKING_ERRORS, is_damage
+from workers.wording import counted
 
 MAX_UNPACKED_BYTES = 256 * 2**20
 """Of a recording, once it is unpacked."""
@@ -204,7 +205,7 @@ class _Reading:
     def _add(self, topic: str, nanoseconds: int, data: bytes) -> None:
         self._count += 1
         if self._count > _MOST_MESSAGES:
-            raise BagError(f"the recording has more than {_MOST_MESSAGES:,} messages: upload a part of it")
+            raise BagError(f"the recording has more than {counted(_MOST_MESSAGES)} messages: upload a part of it")
         self.messages.setdefault(topic, []).append(Raw(1e-9 * nanoseconds, data))
 
     def mcap(self, path: Path) -> None:

@@ -15,6 +15,7 @@ from workers.bags.files import GOAL, ODOMETRY, SCAN, TRANSFORMS, TWISTS, Content
 from workers.bags.results import Role, Topic, TopicChoice
 from workers.bags.transforms import Frames
 from workers.errors import BagError
+from workers.wording import counted
 
 Reals = NDArray[np.float64]
 
@@ -255,7 +256,10 @@ def _scans(
     if not (3 <= beams <= _MOST_BEAMS and increment and range_max > 0.0 and np.isfinite(layout).all()):
         raise BagError(f"the scans make no sense: {beams} beams, {increment:g} rad apart, up to {range_max:g} m")
     if count < len(messages):
-        notes.append(f"{len(messages) - count:,} of {len(messages):,} scans have other angles than most: they are left out.")
+        notes.append(
+            f"{counted(len(messages) - count)} of {counted(len(messages))} scans have other angles than most: "
+            "they are left out."
+        )
     kept = [
         (clock.when(at, m), m)
         for at, m in messages

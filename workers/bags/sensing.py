@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from workers.bags.read import Bag, Motion, Reals, Scans
 from workers.bags.results import Fitted
+from workers.wording import counted
 
 Z95 = 1.96
 _STILL_METRES, _STILL_RADIANS = 0.003, 0.003
@@ -60,7 +61,7 @@ def _noise(scans: Scans, motion: Motion) -> Fitted:
     mean = float(squares.mean())
     error = Z95 * float(squares.std()) / math.sqrt(len(squares))
     low, high = math.sqrt(max(0.0, mean - error) / 2.0), math.sqrt((mean + error) / 2.0)
-    note = f"From {len(kept):,} changes of beams between scans while the robot stood."
+    note = f"From {counted(len(kept))} changes of beams between scans while the robot stood."
     return Fitted(**told, value=math.sqrt(mean / 2.0), low=low, high=high, note=note)
 
 
@@ -127,7 +128,8 @@ def _dropout(scans: Scans) -> Fitted:
     middle = (share + Z95**2 / (2.0 * effective)) / (1.0 + Z95**2 / effective)
     half = Z95 / (1.0 + Z95**2 / effective) * math.sqrt(share * (1.0 - share) / effective + (Z95 / (2.0 * effective)) ** 2)
     note = (
-        f"{int(losses.sum()):,} of {int(count):,} beams that returned before and after, and whose neighbours did, did not."
+        f"{counted(losses.sum())} of {counted(count)} beams that returned before and after, and whose neighbours did, "
+        "did not."
     )
     return Fitted(**told, value=share, low=max(0.0, middle - half), high=middle + half, note=note)
 
@@ -153,7 +155,9 @@ def _rate(scans: Scans) -> list[Fitted]:
     count = len(whole)
     pauses = len(intervals) - count
     error = Z95 * spread * math.sqrt(_long_run(whole) / count)
-    note = f"From {count:,} intervals between scans" + (f"; {pauses:,} longer pauses are left out." if pauses else ".")
+    note = f"From {counted(count)} intervals between scans" + (
+        f"; {counted(pauses)} longer pauses are left out." if pauses else "."
+    )
     rate = Fitted(
         key="lidar.rate",
         title="LiDAR rate",

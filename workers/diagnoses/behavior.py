@@ -3,7 +3,8 @@
 import numpy as np
 
 from workers.diagnoses.history import MIN_POINTS, History
-from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
+from workers.diagnoses.model import Diagnosis, Evidence, Rule
+from workers.wording import counted, percent
 
 # Uniform noise spins at 0.5 in the shortest window, a healthy policy at 0.2.
 _SPIN = 0.6
@@ -36,7 +37,7 @@ def spins(history: History) -> Diagnosis | None:
         severity="warning",
         title="The robot only spins",
         explanation=(
-            f"Over the last quarter of the training the robots turned one way at {percent(spin)} of their turning rate, "
+            f"Over the last quarter of the training the robots turned one way at {percent(spin, 0)} of their turning rate, "
             + ("on the spot." if on_the_spot else "in circles.")
         ),
         evidence=(
@@ -63,8 +64,8 @@ def actions_saturate(history: History) -> Diagnosis | None:
         severity="warning",
         title="Actions saturate",
         explanation=(
-            f"{percent(saturation)} of the turning commands are at their limit, whatever the robot sees; there tanh has no "
-            "gradient left to learn from."
+            f"{percent(saturation, 0)} of the turning commands are at their limit, whatever the robot sees; there tanh has "
+            "no gradient left to learn from."
         ),
         evidence=(
             Evidence(metric="policy/saturation", value=saturation, expected="below 0.3"),
@@ -99,8 +100,8 @@ def reward_hacked(history: History) -> Diagnosis | None:
         severity="warning",
         title="The reward is hacked",
         explanation=(
-            f"The return of an episode rose by {rise:,.0f} while success went from {percent(arrived.mean(), 1)} to "
-            f"{percent(arrives.mean(), 1)}: the robot has found something that pays better than arriving."
+            f"The return of an episode rose by {counted(rise)} while success went from {percent(arrived.mean())} to "
+            f"{percent(arrives.mean())}: the robot has found something that pays better than arriving."
         ),
         evidence=(
             Evidence(metric="train/return", value=float(np.median(late)), expected="rising together with success"),
@@ -136,8 +137,8 @@ def success_stuck(history: History) -> Diagnosis | None:
         severity="warning",
         title="Success is stuck",
         explanation=(
-            f"Success was {percent(was, 1)} in the first half of the training so far and is {percent(now, 1)} now, after "
-            f"{percent(history.progress)} of the steps."
+            f"Success was {percent(was)} in the first half of the training so far and is {percent(now)} now, after "
+            f"{percent(history.progress, 0)} of the steps."
         ),
         evidence=(Evidence(metric=name, value=now, expected="rising, or above 0.7"),),
         advice=(

@@ -7,7 +7,8 @@ from sim.extending.parts import RewardTerm as AddedTerm
 from sim.observations import observation_size
 from workers.config import OffPolicyConfig, TrainingConfig
 from workers.diagnoses.history import MIN_POINTS, History
-from workers.diagnoses.model import Diagnosis, Evidence, Rule, percent
+from workers.diagnoses.model import Diagnosis, Evidence, Rule
+from workers.wording import counted, percent
 
 # A third of the numbers: the whole scan of 10 batches is more, a velocity that has settled is one.
 _CONSTANT = 1 / 3
@@ -120,8 +121,8 @@ def _critic_gets_worse(history: History) -> Diagnosis | None:
         return None
     return _value_diagnosis(
         history,
-        f"The critic explains less of the returns than a constant would; its loss is {loss / max(best, 1e-12):,.0f} times "
-        "its best.",
+        f"The critic explains less of the returns than a constant would; its loss is {counted(loss / max(best, 1e-12))} "
+        "times its best.",
         (
             Evidence(metric="loss/value", value=loss, expected=f"falling; it was {best:.2g}"),
             Evidence(metric="value/explained_variance", value=explained, expected="above 0"),
@@ -194,7 +195,7 @@ def entropy_collapsed(history: History) -> Diagnosis | None:
         severity="warning",
         title="Entropy collapsed",
         explanation=(
-            f"The policy's entropy is {entropy:.1f} nats: its actions hardly vary, at {percent(history.success)} success."
+            f"The policy's entropy is {entropy:.1f} nats: its actions hardly vary, at {percent(history.success, 0)} success."
         ),
         evidence=(
             Evidence(metric="policy/entropy", value=entropy, expected=f"above {_ENTROPY:g} until the robot arrives"),

@@ -43,8 +43,3 @@ class Diagnosis(Frozen):
 
 Rule = Callable[[History], Diagnosis | None]
 """Looks for one thing; None where it is not there, or where the curves are too short to tell."""
-
-
-def percent(fraction: float, digits: int = 0) -> str:
-    """A fraction as people read it: 0.494 is '49 %'."""
-    return f"{100.0 * fraction:.{digits}f} %"

@@ -30,6 +30,7 @@ from workers.protocol import (
     found_extensions,
 )
 from workers.reporting import EvaluationResult
+from workers.wording import counted
 
 _Answer = TypeVar("_Answer", bound=BaseModel)
 
@@ -107,7 +108,7 @@ class ServerClient:
             ServerUnavailableError: not now; ask again later.
             RequestRefusedError: never.
         """
-        what = f"the checkpoint of step {checkpoint.step:,}"
+        what = f"the checkpoint of step {counted(checkpoint.step)}"
         self._fetch(f"/api/worker/checkpoints/{checkpoint.id}", checkpoint.sha256, path, what)
 
     def fetch_start(self, run_id: str, sha256: str, path: Path) -> None:

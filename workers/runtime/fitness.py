@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from workers.errors import UnfitError
+from workers.wording import counted
 
 logger = logging.getLogger(__name__)
 
@@ -89,8 +90,9 @@ class Fitness:
             free = shutil.disk_usage(self._work_dir).free
             if free < self._min_free_bytes:
                 return (
-                    f"{self._work_dir} has {free / 2**20:,.0f} MiB free, less than {self._min_free_bytes / 2**20:,.0f}: "
-                    "make room there, or choose another place (MAPLESS_WORK_DIR, MAPLESS_MIN_FREE_BYTES)"
+                    f"{self._work_dir} has {counted(free / 2**20)} MiB free, less than "
+                    f"{counted(self._min_free_bytes / 2**20)}: make room there, "
+                    "or choose another place (MAPLESS_WORK_DIR, MAPLESS_MIN_FREE_BYTES)"
                 )
             with tempfile.TemporaryFile(dir=self._work_dir) as probe:
                 probe.write(bytes(_PROBE_BYTES))

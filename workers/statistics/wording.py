@@ -2,6 +2,7 @@
 
 from sim.config import Frozen
 from workers.statistics.differences import Difference
+from workers.wording import NARROW_SPACE
 
 
 class Scale(Frozen):
@@ -26,7 +27,7 @@ def number(scale: Scale, value: float, *, signed: bool = False) -> str:
     """A value in its unit."""
     # "-0.0" would be a sign without a meaning.
     rounded = round(value * scale.factor, scale.decimals) + 0.0
-    return f"{rounded:{'+' if signed else ''},.{scale.decimals}f}"
+    return f"{rounded:{'+' if signed else ''},.{scale.decimals}f}".replace(",", NARROW_SPACE)
 
 
 def favourable(scale: Scale, difference: Difference) -> Difference:

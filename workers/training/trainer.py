@@ -44,6 +44,7 @@ from workers.training.effort import EffortMeter
 from workers.training.evaluation import evaluate, evaluation_metrics
 from workers.training.metrics import TrainingMetrics
 from workers.training.threads import ThreadCount
+from workers.wording import counted
 
 TrainingOutcome = Literal["completed", "stopped"]
 
@@ -308,7 +309,7 @@ class Training:
         self.reported = self.saved = counters.step
         self.metrics = TrainingMetrics(self.algorithm.robots, self.step // self.algorithm.robots, self.actions)
         self.effort.resume(counters.effort)
-        self.reporter.event(self.step, "info", f"Resumed at step {self.step:,}.")
+        self.reporter.event(self.step, "info", f"Resumed at step {counted(self.step)}.")
 
     def begin_with(self, start: StartFrom, archive: Path | None) -> None:
         """Begins with the policy of another training, and keeps it as a checkpoint of step 0 of its own.

@@ -426,14 +426,14 @@ test('a checkpoint that comes with the address is named by training, seed and st
   startServer({
     ...routes,
     'GET /api/checkpoints/nkny4x/start': {
-      start_from: { source: 'checkpoint', name: 'nkny4x', sha256: null, title: 'Rooms, seed 1, step 40,000' },
+      start_from: { source: 'checkpoint', name: 'nkny4x', sha256: null, title: 'Rooms, seed 1, step 40 000' },
       kind: 'best',
       experiment_id: 'e1',
       success: null,
     },
   })
   open('/evaluations?policy=checkpoint:nkny4x')
-  await waitFor(() => expect(screen.getAllByText('Rooms, seed 1, step 40,000').length).toBeGreaterThan(0))
+  await waitFor(() => expect(screen.getAllByText('Rooms, seed 1, step 40 000').length).toBeGreaterThan(0))
 })
 
 test('a leaderboard says what is tied with the best, and by what that is known', async () => {

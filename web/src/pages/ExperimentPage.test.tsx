@@ -100,7 +100,7 @@ test('its parent and what was trained further from it are told', async () => {
           source: 'checkpoint',
           name: 'cp9',
           sha256: 'cd'.repeat(32),
-          title: 'Maze, seed 1, step 9,000',
+          title: 'Maze, seed 1, step 9 000',
         },
         state: 'there',
         run_id: 'run9',
@@ -111,7 +111,7 @@ test('its parent and what was trained further from it are told', async () => {
   })
   open('/experiments/exp1')
   const lineage = await screen.findByTestId('lineage')
-  expect(within(lineage).getByRole('link', { name: 'Maze, seed 1, step 9,000' })).toHaveAttribute(
+  expect(within(lineage).getByRole('link', { name: 'Maze, seed 1, step 9 000' })).toHaveAttribute(
     'href',
     '/runs/run9?step=9000',
   )
@@ -125,7 +125,7 @@ test('a parent that is gone, or not to be seen, is named without a link', async 
       source: 'checkpoint',
       name: 'cp9',
       sha256: 'cd'.repeat(32),
-      title: 'Maze, seed 1, step 9,000',
+      title: 'Maze, seed 1, step 9 000',
     },
     state: 'gone',
     run_id: null,
@@ -137,7 +137,7 @@ test('a parent that is gone, or not to be seen, is named without a link', async 
     'GET /api/experiments/exp1/lineage': { parent, children: [] },
   })
   const { unmount } = open('/experiments/exp1')
-  expect(await screen.findByTestId('lineage')).toHaveTextContent('Maze, seed 1, step 9,000 (deleted)')
+  expect(await screen.findByTestId('lineage')).toHaveTextContent('Maze, seed 1, step 9 000 (deleted)')
   unmount()
   server.routes['GET /api/experiments/exp1/lineage'] = {
     parent: { ...parent, state: 'hidden' },

@@ -278,7 +278,7 @@ const START = {
     source: 'checkpoint',
     name: 'cp2',
     sha256: 'cd'.repeat(32),
-    title: 'Corridor, seed 0, step 100,000',
+    title: 'Corridor, seed 0, step 100 000',
   },
   kind: 'best',
   experiment_id: 'exp1',
@@ -302,7 +302,7 @@ test('a policy to start from is searched for, sent, and taken back', async () =>
   const field = await screen.findByRole('combobox', { name: 'Start from' })
   await user.type(field, 'corr')
   await waitFor(() => expect(server.asked).toContain('/api/training/starts?search=corr'))
-  await user.click(await screen.findByRole('option', { name: /Corridor, seed 0, step 100,000/ }))
+  await user.click(await screen.findByRole('option', { name: /Corridor, seed 0, step 100 000/ }))
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(server.changes).toHaveLength(1))
   expect(sent(server).training).toEqual({ ...training, start_from: START.start_from })
@@ -312,7 +312,7 @@ test('fine-tuning a checkpoint begins with the settings of its training', async 
   const server = start(STARTS)
   const { user } = open('/new?checkpoint=cp2')
   expect(await screen.findByRole('textbox', { name: 'Name' })).toHaveValue('Corridor, further')
-  expect(screen.getByRole('combobox', { name: 'Start from' })).toHaveValue('Corridor, seed 0, step 100,000')
+  expect(screen.getByRole('combobox', { name: 'Start from' })).toHaveValue('Corridor, seed 0, step 100 000')
   await user.click(screen.getByRole('button', { name: 'Launch' }))
   await waitFor(() => expect(server.changes).toHaveLength(1))
   expect(sent(server)).toMatchObject({ seeds: [0], training: { ...training, start_from: START.start_from } })

@@ -253,7 +253,7 @@ export const replay: EpisodeReplay = {
   policies: [
     {
       of: 'checkpoint:cp2',
-      title: 'Corridor, seed 1, step 100,000',
+      title: 'Corridor, seed 1, step 100 000',
       colour: '#339af0',
       outcome: 'collision',
       steps: 12,

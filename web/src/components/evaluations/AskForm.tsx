@@ -50,7 +50,7 @@ function nameOf(key: string, checkpoints: ReadonlyMap<string, string>): string {
     : key.slice(key.indexOf(':') + 1)
 }
 
-/** What the chosen checkpoints are called: "Two rooms, seed 1, step 40,000", by key. */
+/** What the chosen checkpoints are called: "Two rooms, seed 1, step 40 000", by key. */
 function useCheckpointNames(keys: readonly string[]): ReadonlyMap<string, string> {
   const wanted = keys.filter((key) => key.startsWith(CHECKPOINT))
   return useQueries({
