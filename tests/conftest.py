@@ -5,13 +5,11 @@ import os
 import shutil
 import socket
 import subprocess
-import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-import psycopg
 import pytest
 from hypothesis import settings
 
@@ -20,13 +18,14 @@ from server.database.migrate import upgrade
 from sim.actions import action_layout
 from sim.config import TaskConfig
 from sim.observations import observation_layout
+from tests import postgres
 from workers.checkpoints import Checkpoint, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
 from workers.networks.inputs import inputs_of
 from workers.networks.layout import layout, policy_shapes
 
-POSTGRES = ("127.0.0.1", 5432)
+POSTGRES = (postgres.HOST, postgres.PORT)
 
 # How long an example takes says something of the machine, nothing of the code.
 settings.register_profile("mapless", deadline=None)
@@ -69,76 +68,50 @@ def _lack(message: str) -> None:
     pytest.skip(message)
 
 
-def _postgres() -> "psycopg.Connection[tuple[object, ...]]":
-    require_service("PostgreSQL", *POSTGRES)
-    host, port = POSTGRES
-    return psycopg.connect(host=host, port=port, user="postgres", dbname="postgres", autocommit=True)
-
-
-def _postgres_url(name: str) -> str:
-    host, port = POSTGRES
-    return f"postgresql+psycopg://postgres@{host}:{port}/{name}"
-
-
-def _create(template: str | None = None) -> str:
-    name = f"mapless_test_{uuid.uuid4().hex[:12]}"
-    with _postgres() as connection:
-        connection.execute(f'CREATE DATABASE "{name}" TEMPLATE "{template or "template1"}"'.encode())
-    return name
-
-
-def _drop(name: str) -> None:
-    with _postgres() as connection:
-        connection.execute(f'DROP DATABASE "{name}" WITH (FORCE)'.encode())
-
-
 @pytest.fixture(scope="session")
 def let_go() -> Iterator[Callable[[str], None]]:
     """Drops databases of PostgreSQL while the next tests run: its disk takes a second for each."""
     dropped: list[Future[None]] = []
     with ThreadPoolExecutor(1) as thread:
-        yield lambda name: dropped.append(thread.submit(_drop, name))
+        yield lambda name: dropped.append(thread.submit(postgres.drop, name))
     for each in dropped:
         each.result()
-
-
-def _migrated(url: str) -> None:
-    database = Database(url)
-    upgrade(database)
-    database.dispose()
 
 
 @pytest.fixture(scope="session")
 def new_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A SQLite database with this version's tables and nothing in them, to be copied: migrations take a while."""
     path = tmp_path_factory.mktemp("database") / "mapless.db"
-    _migrated(f"sqlite:///{path}")
+    database = Database(f"sqlite:///{path}")
+    upgrade(database)
+    database.dispose()
     return path
 
 
 @pytest.fixture(scope="session")
-def new_postgres(let_go: Callable[[str], None]) -> Iterator[str]:
-    """Name of such a database of PostgreSQL."""
-    name = _create()
-    _migrated(_postgres_url(name))
-    yield name
-    let_go(name)
+def postgres_pool() -> Iterator[postgres.Pool]:
+    """Such databases of PostgreSQL."""
+    require_service("PostgreSQL", *POSTGRES)
+    pool = postgres.Pool()
+    yield pool
+    pool.close()
 
 
 @pytest.fixture
 def empty_postgres_url(let_go: Callable[[str], None]) -> Iterator[str]:
     """SQLAlchemy URL of a PostgreSQL database without tables that is gone after the test."""
-    name = _create()
-    yield _postgres_url(name)
+    require_service("PostgreSQL", *POSTGRES)
+    name = postgres.create()
+    yield postgres.url_of(name)
     let_go(name)
 
 
 @pytest.fixture
-def postgres_url(new_postgres: str, let_go: Callable[[str], None]) -> Iterator[str]:
-    """SQLAlchemy URL of a PostgreSQL database with this version's tables that is gone after the test."""
-    name = _create(new_postgres)
-    yield _postgres_url(name)
-    let_go(name)
+def postgres_url(postgres_pool: postgres.Pool) -> Iterator[str]:
+    """SQLAlchemy URL of a PostgreSQL database with this version's tables that nobody has after the test."""
+    name = postgres_pool.take()
+    yield postgres.url_of(name)
+    postgres_pool.give_back(name)
 
 
 BOTH_KINDS = ["sqlite", pytest.param("postgresql", marks=pytest.mark.services)]
