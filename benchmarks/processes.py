@@ -24,19 +24,18 @@ def tree(pid: int) -> list[psutil.Process]:
 
 def trainer_of(pid: int) -> psutil.Process | None:
     """The trainer process under a worker, forked from the nursery; None where none trains."""
-    nursery = nursery_of(pid)
-    if nursery is None:
-        return None
-    with contextlib.suppress(psutil.NoSuchProcess):
-        return next((child for child in nursery.children() if child.status() != psutil.STATUS_ZOMBIE), None)
-    return None
+    return _named("mapless-trainer", pid)
 
 
 def nursery_of(pid: int) -> psutil.Process | None:
     """The process under a worker that its trainers are forked from; None where it is not there now."""
+    return _named("mapless-nursery", pid)
+
+
+def _named(name: str, pid: int) -> psutil.Process | None:
     for process in tree(pid):
         with contextlib.suppress(psutil.NoSuchProcess):
-            if process.status() != psutil.STATUS_ZOMBIE and "workers.runtime.nursery_process" in process.cmdline():
+            if process.status() != psutil.STATUS_ZOMBIE and process.name() == name:
                 return process
     return None
 

@@ -19,6 +19,7 @@ from sim.actions import action_layout
 from sim.config import TaskConfig
 from sim.observations import observation_layout
 from tests import postgres
+from tests.nursery import keeper
 from workers.checkpoints import Checkpoint, write_checkpoint
 from workers.config import MlpNetwork, Network, PpoConfig, TrainingConfig
 from workers.manifest import EvaluationSummary, Manifest, Number, Observation, TrainingCounters
@@ -112,6 +113,12 @@ def postgres_url(postgres_pool: postgres.Pool) -> Iterator[str]:
     name = postgres_pool.take()
     yield postgres.url_of(name)
     postgres_pool.give_back(name)
+
+
+@pytest.fixture
+def nursery_door() -> int:
+    """To the tests' nursery."""
+    return keeper().door
 
 
 BOTH_KINDS = ["sqlite", pytest.param("postgresql", marks=pytest.mark.services)]

@@ -79,8 +79,10 @@ class Node:
 
     def child(self) -> psutil.Process | None:
         """The process of Celery's pool in which the attempt is looked after."""
-        nursery = self.nursery()
-        return nursery.parent() if nursery is not None else None
+        if self._process is None or not psutil.pid_exists(self._process.pid):
+            return None
+        children = psutil.Process(self._process.pid).children()
+        return next((child for child in children if child.name() != "mapless-nursery"), None)
 
     def spool(self, run_id: str) -> Path | None:
         """The file of the attempt that is under way."""

@@ -10,12 +10,14 @@ import httpx
 from fastapi.testclient import TestClient
 
 from server.services import Services
+from tests.nursery import keeper
 from tests.server.harness import WORKER_TOKEN
 from workers.job_protocol import JobKind
 from workers.runtime.fitness import Fitness
 from workers.runtime.jobs.__main__ import Takes, places
 from workers.runtime.jobs.client import JobClient
-from workers.runtime.jobs.place import Place, forkserver
+from workers.runtime.jobs.forks import Forks
+from workers.runtime.jobs.place import Place
 from workers.runtime.sight import ServerSight
 
 _AS_WORKER = {"Authorization": f"Bearer {WORKER_TOKEN}"}
@@ -47,6 +49,7 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
     """Does jobs for as long as the block lasts, of these kinds where any are given."""
     work_dir.mkdir(exist_ok=True)
     ending = threading.Event()
+    forks = Forks(keeper().door)
     at_work = [
         Place(
             f"w@host/jobs{index}",
@@ -56,7 +59,7 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
             work_dir,
             Fitness(work_dir, 0),
             ServerSight("the application"),
-            forkserver(),
+            forks,
             ending,
         )
         for index, takes in enumerate([Takes(kinds, long=True)] if kinds else places(2)[:2])
@@ -72,4 +75,5 @@ def working(client: TestClient, services: Services, work_dir: Path, kinds: tuple
         client.portal.call(services.board.close)
         for thread in threads:
             thread.join()
+        forks.close()
         services.board.closed = False

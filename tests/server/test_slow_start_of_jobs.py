@@ -5,7 +5,6 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from multiprocessing import forkserver as forking
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,7 @@ from server.services import Services
 from server.settings import Settings
 from tests.server.job_worker import working
 from workers.job_protocol import ReplayJob, ShippedPolicyName
-from workers.runtime.jobs import place
+from workers.runtime.nursery import Nursery
 
 # The imports of what processes are forked from take a while where nothing else has needed them.
 pytestmark = pytest.mark.timeout(180)
@@ -39,11 +38,13 @@ def wait_until(true: Callable[[], bool], seconds: float = 90.0) -> None:
 
 
 @pytest.fixture
-def standing_forkserver() -> Iterator[Callable[[], None]]:
+def standing_nursery(nursery_door: int) -> Iterator[Callable[[], None]]:
     """What processes are forked from stands still, as where the machine has no time for its imports; called, it goes on."""
-    place.forkserver()
-    forking.ensure_running()
-    pid = forking._forkserver._forkserver_pid  # type: ignore[attr-defined]
+    nursery = Nursery(nursery_door)
+    nursery.until_ready(120.0)
+    pid = nursery.pid
+    nursery.close()
+    assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     yield lambda: os.kill(pid, signal.SIGCONT)
     with contextlib.suppress(ProcessLookupError):
@@ -57,7 +58,7 @@ def job(services: Services, client: TestClient) -> str:
 
 
 def test_a_job_whose_process_is_slow_to_start_keeps_its_lease(
-    client: TestClient, services: Services, job: str, standing_forkserver: Callable[[], None], tmp_path: Path
+    client: TestClient, services: Services, job: str, standing_nursery: Callable[[], None], tmp_path: Path
 ) -> None:
     jobs = JobService(services)
     with working(client, services, tmp_path / "work", ("replay",)):
@@ -68,7 +69,7 @@ def test_a_job_whose_process_is_slow_to_start_keeps_its_lease(
             found = jobs.find(job)
             assert (found.state, found.attempt, found.losses) == ("running", 1, 0)
         finally:
-            standing_forkserver()
+            standing_nursery()
         wait_until(lambda: jobs.find(job).state not in ("queued", "running"))
     found = jobs.find(job)
     assert (found.state, found.attempt) == ("done", 1), found.error

@@ -169,10 +169,9 @@ def tree(pid: int) -> list[psutil.Process]:
 
 
 def trainers(pid: int) -> list[psutil.Process]:
-    """The trainer processes under a worker: those that its nurseries have forked."""
+    """The trainer processes under a worker."""
     members = [process for process in tree(pid) if process.status() != psutil.STATUS_ZOMBIE]
-    nurseries = {process.pid for process in members if "workers.runtime.nursery_process" in process.cmdline()}
-    return [process for process in members if process.ppid() in nurseries]
+    return [process for process in members if process.name() == "mapless-trainer"]
 
 
 def assert_one_unbroken_curve(service: Service, run_id: str) -> None:

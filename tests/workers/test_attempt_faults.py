@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -24,6 +25,7 @@ from workers.runtime import attempt, fitness, slot, tasks
 from workers.runtime.attempt import Attempt
 from workers.runtime.client import ServerClient
 from workers.runtime.fitness import Fitness, make_private
+from workers.runtime.nursery_keeper import NurseryKeeper
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.sight import ServerSight
 from workers.runtime.slot import Slot
@@ -151,8 +153,8 @@ def test_who_waits_for_a_store_that_does_not_answer_listens_to_stop(resumed: Att
 class Place:
     """A slot on a machine whose state a test decides."""
 
-    def __init__(self, directory: Path, **settings: object) -> None:
-        self.slot = Slot(settings_for("http://127.0.0.1:9", directory, **settings), 0, lambda: False)
+    def __init__(self, directory: Path, door: int, **settings: object) -> None:
+        self.slot = Slot(settings_for("http://127.0.0.1:9", directory, **settings), 0, lambda: False, door)
 
     def taken(self) -> bool:
         """Whether a trainer could be had; it is put back."""
@@ -164,11 +166,11 @@ class Place:
 
 
 @pytest.fixture
-def places() -> Iterator[Callable[..., Place]]:
+def places(nursery_door: int) -> Iterator[Callable[..., Place]]:
     opened: list[Place] = []
 
-    def open_place(directory: Path, **settings: object) -> Place:
-        opened.append(Place(directory, **settings))
+    def open_place(directory: Path, door: int = nursery_door, **settings: object) -> Place:
+        opened.append(Place(directory, door, **settings))
         return opened[-1]
 
     yield open_place
@@ -181,14 +183,16 @@ def test_a_slot_gets_over_a_machine_that_can_start_no_process(
 ) -> None:
     monkeypatch.setattr(slot, "_FIRST_RETRY_SECONDS", 0.05)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
-    place = places(tmp_path)
-    # No run is claimed meanwhile: who waits for a trainer with a run in hand keeps it from others.
-    with pytest.raises(UnfitError, match="no trainer can be started"):
-        place.slot.take_trainer()
-    assert "no trainer can be started" in (place.slot.trouble or "")
-    monkeypatch.undo()
-    until(place.taken, 30.0)
-    until(lambda: place.slot.trouble is None)
+    with closing(NurseryKeeper()) as keeper:
+        keeper.keep_running()
+        place = places(tmp_path, keeper.door)
+        # No run is claimed meanwhile: who waits for a trainer with a run in hand keeps it from others.
+        with pytest.raises(UnfitError, match=r"no trainer is ready\. No process can be started"):
+            place.slot.take_trainer()
+        assert "No process can be started" in (place.slot.trouble or "")
+        monkeypatch.undo()
+        until(place.taken, 60.0)
+        until(lambda: place.slot.trouble is None)
 
 
 def test_a_slot_whose_trainers_die_while_they_start_takes_no_run_and_says_why(
@@ -198,15 +202,17 @@ def test_a_slot_whose_trainers_die_while_they_start_takes_no_run_and_says_why(
     dying.write_text("#!/bin/sh\necho no such library\nexit 3\n")
     dying.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(dying))
-    place = places(tmp_path)
-    with pytest.raises(UnfitError, match=r"ended with status 3\. It printed last:\nno such library"):
-        place.slot.take_trainer()
+    with closing(NurseryKeeper()) as keeper:
+        keeper.keep_running()
+        place = places(tmp_path, keeper.door)
+        with pytest.raises(UnfitError, match=r"ended with status 3\. It printed last:\nno such library"):
+            place.slot.take_trainer()
 
 
 def test_a_worker_that_is_told_to_end_does_not_say_that_it_takes_up_no_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, nursery_door: int
 ) -> None:
-    place = Slot(settings_for("http://127.0.0.1:9", tmp_path), 0, lambda: True)
+    place = Slot(settings_for("http://127.0.0.1:9", tmp_path), 0, lambda: True, nursery_door)
     monkeypatch.setattr(tasks, "_slot", place)
     before = signal.getsignal(signal.SIGTERM)
     try:
@@ -291,7 +297,7 @@ def test_an_attempts_folder_is_its_owners_alone(resumed: Attempt, tmp_path: Path
     resumed.run(NoTrainer())  # type: ignore[arg-type] # none comes to train
 
 
-def test_a_claim_whose_answer_got_lost_is_asked_for_again_as_the_same(tmp_path: Path) -> None:
+def test_a_claim_whose_answer_got_lost_is_asked_for_again_as_the_same(tmp_path: Path, nursery_door: int) -> None:
     asked: list[ClaimRequest] = []
     granted = Claim(
         attempt=1, seed=0, training=TrainingConfig(), last_seq=0, checkpoint=None, lease_seconds=15.0
@@ -314,7 +320,7 @@ def test_a_claim_whose_answer_got_lost_is_asked_for_again_as_the_same(tmp_path: 
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Answers) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        place = Slot(settings_for(f"http://127.0.0.1:{server.server_address[1]}", tmp_path), 0, lambda: False)
+        place = Slot(settings_for(f"http://127.0.0.1:{server.server_address[1]}", tmp_path), 0, lambda: False, nursery_door)
         try:
             claim = tasks._claim(place, "r", 0)
         finally:

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
@@ -16,19 +16,38 @@ from tests.workers.test_link import until
 from workers.checkpoints import read_policy
 from workers.config import Algorithm as AlgorithmConfig
 from workers.config import DdpgConfig, EvaluationConfig, GruNetwork, MlpNetwork, PpoConfig, TrainingConfig
+from workers.job_protocol import ShippedPolicyName, ViewJob
+from workers.runtime.jobs.forks import Forks
+from workers.runtime.jobs.process import Failed, Task
 from workers.runtime.nursery import Nursery
+from workers.runtime.nursery_keeper import NurseryKeeper
 from workers.runtime.pipe import CheckpointReport, Control, Ended, Job, Report
 from workers.runtime.trainer_handle import TrainerHandle
 
 PPO = PpoConfig(network=MlpNetwork(hidden_sizes=(16,)), robots=4, rollout_steps=32, minibatch_size=64, epochs=2)
 
 
-@pytest.fixture(scope="module")
-def nursery() -> Iterator[Nursery]:
-    nursery = Nursery()
-    until(lambda: nursery.ready, 120.0)
+@pytest.fixture
+def nursery(nursery_door: int) -> Iterator[Nursery]:
+    nursery = Nursery(nursery_door)
+    nursery.until_ready(120.0)
     yield nursery
     nursery.close()
+
+
+@pytest.fixture
+def keepers() -> Iterator[Callable[[], NurseryKeeper]]:
+    """Nurseries of their own, for tests that do something to them."""
+    made: list[NurseryKeeper] = []
+
+    def make() -> NurseryKeeper:
+        made.append(NurseryKeeper())
+        made[-1].keep_running()
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
 
 
 def job(directory: Path, algorithm: AlgorithmConfig = PPO, steps: int = 1_024) -> Job:
@@ -108,12 +127,14 @@ os.register_at_fork(after_in_child=start)
 """
 
 
-def test_what_a_trainer_has_started_is_killed_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_trainer_has_started_is_killed_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keepers: Callable[[], NurseryKeeper]
+) -> None:
     (tmp_path / "sitecustomize.py").write_text(_STARTS)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    nursery = Nursery()
+    nursery = Nursery(keepers().door)
     try:
-        until(lambda: nursery.ready, 120.0)
+        nursery.until_ready(120.0)
         trainer = nursery.trainer()
         until(lambda: bool(psutil.Process(trainer.pid).children()))
         (started,) = psutil.Process(trainer.pid).children()
@@ -143,10 +164,14 @@ def test_what_nobody_expected_is_among_its_last_words(nursery: Nursery, tmp_path
     assert trainer.cause_of_death().startswith("The trainer process ended with status 1. It printed last:\nTraceback")
 
 
-def test_where_its_nursery_is_killed_a_trainer_ends_too_and_that_is_known() -> None:
-    nursery = Nursery()
-    until(lambda: nursery.ready, 120.0)
+def test_where_its_nursery_is_killed_a_trainer_ends_too_and_the_next_comes_from_another(
+    keepers: Callable[[], NurseryKeeper],
+) -> None:
+    door = keepers().door
+    nursery = Nursery(door)
+    nursery.until_ready(120.0)
     trainer = nursery.trainer()
+    assert nursery.pid is not None
     os.kill(nursery.pid, signal.SIGKILL)
     assert trainer.wait(10.0)
     trainer.close()
@@ -155,6 +180,59 @@ def test_where_its_nursery_is_killed_a_trainer_ends_too_and_that_is_known() -> N
     with pytest.raises(OSError, match="has ended"):
         nursery.trainer()
     nursery.close()
+    another = Nursery(door)
+    another.until_ready(120.0)
+    another.trainer().close()
+    another.close()
+
+
+def test_one_nursery_has_the_trainers_of_all_and_who_leaves_takes_only_its_own_along(
+    nursery: Nursery, nursery_door: int, tmp_path: Path
+) -> None:
+    leaving = Nursery(nursery_door)
+    leaving.until_ready(120.0)
+    assert leaving.pid == nursery.pid
+    stays, goes = nursery.trainer(), leaving.trainer()
+    leaving.close()
+    until(lambda: not psutil.pid_exists(goes.pid), 10.0)
+    assert goes.wait(0.0)
+    goes.close()
+    assert trained(stays, job(tmp_path / "run"))[0][-1] == Ended("completed")
+
+
+def test_a_slot_that_is_killed_leaves_no_trainer_behind(nursery: Nursery, nursery_door: int) -> None:
+    script = (
+        "import sys, time; from workers.runtime.nursery import Nursery\n"
+        "nursery = Nursery(int(sys.argv[1])); nursery.until_ready(120.0)\n"
+        "print(nursery.trainer().pid, flush=True); time.sleep(600)"
+    )
+    slot = subprocess.Popen(
+        [sys.executable, "-c", script, str(nursery_door)], pass_fds=(nursery_door,), stdout=subprocess.PIPE, text=True
+    )
+    assert slot.stdout is not None
+    trainer = int(slot.stdout.readline())
+    until(lambda: psutil.Process(trainer).name() == "mapless-trainer")
+    slot.kill()
+    slot.wait()
+    slot.stdout.close()
+    until(lambda: not psutil.pid_exists(trainer), 10.0)
+
+
+def test_a_job_comes_from_there_too_and_says_what_was_wrong(nursery_door: int, tmp_path: Path) -> None:
+    forks = Forks(nursery_door)
+    process, pipe = forks.begin(Task("{}", str(tmp_path), ahead=False))
+    with pipe:
+        said = pipe.recv()
+        assert isinstance(said, Failed)
+        assert process.wait(10.0)
+    assert process.status == 0
+    view = ViewJob(policy=ShippedPolicyName(name="simple"))
+    killed, pipe = forks.begin(Task(view.model_dump_json(), str(tmp_path), ahead=True))
+    os.kill(killed.pid, signal.SIGKILL)
+    assert killed.wait(10.0)
+    assert killed.status == -signal.SIGKILL
+    pipe.close()
+    forks.close()
 
 
 def test_many_begin_and_end_at_once(nursery: Nursery, tmp_path: Path) -> None:

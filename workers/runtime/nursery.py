@@ -1,153 +1,159 @@
-"""The process that a slot's trainers are forked from, as the slot sees it: started, asked for trainers, closed."""
+"""The process that trainers and jobs are forked from, as a slot or a place for jobs sees it: asked for them, closed."""
 
 import itertools
-import logging
 import os
 import signal
 import socket
-import subprocess
-import sys
 import threading
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from pathlib import Path
+from multiprocessing.connection import Connection
 
 import msgspec
 
-from workers.processes import how_it_ended
+from workers.runtime.forked_process import ForkedProcess
 from workers.runtime.nursery_protocol import (
     MAX_PACKET_BYTES,
     Ended,
     Fork,
     Forked,
+    Hello,
     Kill,
     News,
     NotForked,
     Ready,
+    Refused,
+    What,
     Wish,
 )
-from workers.runtime.printed import Printed
 from workers.runtime.trainer_handle import TrainerHandle
 
-logger = logging.getLogger(__name__)
-
-_ROOT = Path(__file__).resolve().parents[2]
-# One thread a process: seeds train side by side, one a core, and small networks gain nothing from more.
-_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 # A fork takes hundredths of a second; one that takes this long has met a machine on which nothing goes.
 _FORK_SECONDS = 60.0
+_ENDED = "The process that trainers and jobs are forked from has ended: the worker's log says how."
 
 
 class Nursery:
-    """A process that imports what trainers need, seconds of it, once, and begins trainers in a fraction of one.
+    """A connection to the worker's nursery (`workers.runtime.nursery_keeper`); what is forked for it ends with it.
 
-    Start it from a thread that lives as long as the worker: Linux ends the process when the thread that started it ends.
-    Its trainers end with it.
+    Args:
+        door: descriptor of the socket through which one comes to it.
 
     Raises:
-        OSError: the machine can start no process now.
+        OSError: this process can open no connection now.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, door: int) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
         try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "workers.runtime.nursery_process", str(theirs.fileno()), str(os.getpid())],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                pass_fds=(theirs.fileno(),),
-                start_new_session=True,
-                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path},
-            )
+            with theirs, socket.socket(fileno=os.dup(door)) as through:
+                socket.send_fds(through, [_packet(Hello())], [theirs.fileno()])
         except BaseException:
             self._socket.close()
             raise
-        finally:
-            theirs.close()
-        assert self._process.stdout is not None
-        self._printed = Printed(self._process.stdout, logger, f"trainers' nursery {self._process.pid}")
+        self.pid: int | None = None
+        """The nursery's process id, once it is ready."""
+        self._cause = _ENDED
         self._numbers = itertools.count()
         self._lock = threading.Lock()
         self._begun: dict[int, Future[int]] = {}
         self._ended: dict[int, Future[int]] = {}
         self._gone = False
-        self._ready = threading.Event()
-        self._news_thread = threading.Thread(target=self._hear, name="news of trainers", daemon=True)
+        self._answered = threading.Event()
+        self._news_thread = threading.Thread(target=self._hear, name="news of the nursery", daemon=True)
         self._news_thread.start()
 
     @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
-
-    @property
     def alive(self) -> bool:
-        """Whether it still runs."""
-        return self._process.poll() is None
+        """Whether it still runs, or may yet."""
+        return not self._gone
 
     @property
     def ready(self) -> bool:
         """Whether it has imported everything."""
-        return self._ready.is_set()
+        return self.pid is not None
+
+    def until_ready(self, seconds: float) -> None:
+        """Wait for its imports.
+
+        Raises:
+            OSError: it has ended, or is not ready within that time.
+        """
+        self._answered.wait(seconds)
+        if not self.ready or self._gone:
+            raise OSError(self._cause if self._gone else "what processes are forked from was not ready in time")
 
     def trainer(self) -> TrainerHandle:
         """A trainer that waits for its job.
 
         Raises:
-            OSError: the machine can begin none now, or this process has ended.
+            OSError: the machine can begin none now, or the nursery has ended.
         """
+        ours: list[int] = []
+        theirs: list[int] = []
+        # Orders go to it, what it prints and reports comes from it.
+        for goes in (True, False, False):
+            read, write = os.pipe()
+            ours.append(write if goes else read)
+            theirs.append(read if goes else write)
+        try:
+            process = self._forked("trainer", theirs)
+        except OSError:
+            _close(ours)
+            raise
+        finally:
+            _close(theirs)
+        return TrainerHandle(process, *ours)
+
+    def job(self, theirs: "Connection[object, object]") -> ForkedProcess:
+        """A process that waits for the order of a job at this end of a pipe, and prints where this one does.
+
+        Raises:
+            OSError: the machine can begin none now, or the nursery has ended.
+        """
+        return self._forked("job", [theirs.fileno(), 1, 2])
+
+    def close(self) -> None:
+        """End what was forked for it."""
+        self._socket.shutdown(socket.SHUT_RDWR)
+        self._news_thread.join()
+        self._socket.close()
+
+    def cause_of_death(self) -> str:
+        """How it ended, where that is known here."""
+        return self._cause
+
+    def _forked(self, what: What, descriptors: Sequence[int]) -> ForkedProcess:
         number = next(self._numbers)
         begun, ended = Future[int](), Future[int]()
         with self._lock:
             if self._gone:
-                raise OSError("the process that trainers are forked from has ended")
+                raise OSError(self._cause)
             self._begun[number], self._ended[number] = begun, ended
-        ours: list[int] = []
-        theirs: list[int] = []
+        kill: Callable[[], None] = lambda: self._wish(Kill(number))  # noqa: E731 - given away, and used below
         try:
-            # Orders go to it, what it prints and reports comes from it.
-            for goes in (True, False, False):
-                read, write = os.pipe()
-                ours.append(write if goes else read)
-                theirs.append(read if goes else write)
-            socket.send_fds(self._socket, [_packet(Fork(number))], theirs)
+            socket.send_fds(self._socket, [_packet(Fork(number, what))], descriptors)
             pid = begun.result(_FORK_SECONDS)
         except (OSError, TimeoutError) as error:
-            for descriptor in ours:
-                os.close(descriptor)
-            self._wish(Kill(number))
-            raise OSError(str(error) or "the machine has begun no trainer in time") from error
-        finally:
-            for descriptor in theirs:
-                os.close(descriptor)
-        return TrainerHandle(pid, ended, lambda: self._wish(Kill(number)), *ours)
-
-    def close(self) -> None:
-        """End it, and its trainers with it."""
-        if self.alive:
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        self._news_thread.join()
-        self._printed.close()
-        self._socket.close()
-
-    def cause_of_death(self) -> str:
-        """How it ended and what it printed last; call it after `close`."""
-        return self._printed.explains(f"The trainer process {how_it_ended(self._process.returncode)}.")
+            kill()
+            raise OSError(str(error) or "the machine has begun no process in time") from error
+        return ForkedProcess(pid, ended, kill)
 
     def _wish(self, wish: Wish) -> None:
         try:
             self._socket.send(_packet(wish))
         except OSError:
-            return  # it has ended, and its trainers with it
+            return  # it has ended, and what it has forked with it
 
     def _hear(self) -> None:
         decoder = msgspec.msgpack.Decoder(News)
         while packet := self._packet():
             match decoder.decode(packet):
-                case Ready():
-                    self._ready.set()
+                case Ready(pid):
+                    self.pid = pid
+                    self._answered.set()
+                case Refused(cause):
+                    self._cause = cause
                 case Forked(number, pid):
                     self._begun.pop(number).set_result(pid)
                 case NotForked(number, error):
@@ -157,10 +163,11 @@ class Nursery:
                     self._ended.pop(number).set_result(status)
         with self._lock:
             self._gone = True
+        self._answered.set()
         for begun in self._begun.values():
-            begun.set_exception(OSError("the process that trainers are forked from has ended"))
+            begun.set_exception(OSError(self._cause))
         for ended in self._ended.values():
-            # Linux has ended them with their parent.
+            # Linux has ended them with their parent, or that has ended them with this connection.
             ended.set_result(-signal.SIGKILL)
 
     def _packet(self) -> bytes:
@@ -170,5 +177,10 @@ class Nursery:
             return b""
 
 
-def _packet(message: Wish) -> bytes:
+def _packet(message: Wish | Hello) -> bytes:
     return msgspec.msgpack.encode(message)
+
+
+def _close(descriptors: Sequence[int]) -> None:
+    for descriptor in descriptors:
+        os.close(descriptor)

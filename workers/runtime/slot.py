@@ -43,14 +43,16 @@ class Slot:
         settings: of the worker.
         number: of this process among the worker's, from 0.
         shutting_down: whether the worker has been asked to end.
+        door: to the nursery, a descriptor.
     """
 
-    def __init__(self, settings: WorkerSettings, number: int, shutting_down: Callable[[], bool]) -> None:
+    def __init__(self, settings: WorkerSettings, number: int, shutting_down: Callable[[], bool], door: int) -> None:
         self.settings = settings
         self.name = settings.name(number)
         self.client = ServerClient(settings.server_url, settings.worker_token.get_secret_value())
         self._parent = os.getppid()
         self._worker_shutting_down = shutting_down
+        self._door = door
         self._condition = threading.Condition()
         self._terminated = False
         self._draining = False
@@ -135,14 +137,14 @@ class Slot:
             self._close_nursery()
 
     def _keep(self) -> None:
-        """Linux ends the nursery with the thread that started it, so it is always started on this one."""
+        """Look after the connection to the nursery, and after the worker."""
         while not self._closed.is_set():
             with self._condition:
                 died = self._bury_nursery()
                 if self._nursery is not None and self._nursery.ready:
                     self._no_trainer, self._patience = None, _FIRST_RETRY_SECONDS
                 if self._nursery is None and self._may_start(died=died):
-                    died = not self._start_nursery()
+                    died = not self._come_to_nursery()
                 if self._alone() and not self._busy:
                     self._leave()
                 self._condition.wait(self._patience if died else _TICK_SECONDS)
@@ -150,10 +152,10 @@ class Slot:
     def _may_start(self, *, died: bool) -> bool:
         return not self._closed.is_set() and (self._wanted or not (died or self.shutting_down()))
 
-    def _start_nursery(self) -> bool:
-        """Whether it could be started: a machine may be out of processes, memory or files for a while."""
+    def _come_to_nursery(self) -> bool:
+        """Whether that could be tried: a machine may be out of memory or files for a while."""
         try:
-            self._nursery = Nursery()
+            self._nursery = Nursery(self._door)
         except OSError as error:
             self._be_patient(f"no trainer can be started: {error}")
             return False
@@ -161,7 +163,7 @@ class Slot:
         return True
 
     def _bury_nursery(self) -> bool:
-        """Whether it has died; another one is tried after a while that doubles each time."""
+        """Whether it has died; whether there is another is looked at after a while that doubles each time."""
         if self._nursery is None or self._nursery.alive:
             return False
         self._nursery.close()

@@ -18,6 +18,7 @@ from workers.runtime.app import TRAIN_TASK
 from workers.runtime.attempt import Attempt
 from workers.runtime.ending import drain_on_signal, leave_when_idle
 from workers.runtime.fitness import make_private
+from workers.runtime.nursery_keeper import door
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.slot import Slot, remove_leftovers
 from workers.runtime.trainer_handle import TrainerHandle
@@ -50,7 +51,7 @@ def _watch_for_the_end(**_: Any) -> None:
 
 def _open_slot(**_: Any) -> None:
     global _slot  # one a process, made after the fork
-    _slot = Slot(WorkerSettings(), billiard.current_process().index, _shutting_down.is_set)
+    _slot = Slot(WorkerSettings(), billiard.current_process().index, _shutting_down.is_set, door())
 
 
 def _announce_shutdown(**_: Any) -> None:

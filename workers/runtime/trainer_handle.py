@@ -4,9 +4,9 @@ import logging
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
 
 from workers.processes import how_it_ended
+from workers.runtime.forked_process import ForkedProcess
 from workers.runtime.pipe import Control, Job, Order, Report, Sender, reports
 from workers.runtime.printed import Printed
 
@@ -17,31 +17,30 @@ class TrainerHandle:
     """A trainer process in a session of its own, which waits for its one job.
 
     Args:
-        pid: its id, which is its process group's too.
-        ended: its status, once it has one.
-        kill: ends it and whatever it has started, at once; of one that has ended it does nothing.
+        process: that was forked.
         orders, output, reports: descriptors to write its orders to, and to read from what it prints and reports.
     """
 
-    def __init__(
-        self, pid: int, ended: "Future[int]", kill: Callable[[], None], orders: int, output: int, reports: int
-    ) -> None:
-        self.pid = pid
-        self.kill = kill
-        self._ended = ended
+    def __init__(self, process: ForkedProcess, orders: int, output: int, reports: int) -> None:
+        self._process = process
         self._orders_stream = os.fdopen(orders, "wb")
         self._orders = Sender(self._orders_stream)
         self._orders_lock = threading.Lock()
-        self._printed = Printed(os.fdopen(output, "rb"), logger, f"trainer {pid}")
+        self._printed = Printed(os.fdopen(output, "rb"), logger, f"trainer {process.pid}")
         self._reports = os.fdopen(reports, "rb")
         self._on_report: Callable[[Report], None] | None = None
         self._report_thread = threading.Thread(target=self._read_reports, name="trainer reports", daemon=True)
         self._report_thread.start()
 
     @property
+    def pid(self) -> int:
+        """Its id, which is its process group's too."""
+        return self._process.pid
+
+    @property
     def alive(self) -> bool:
         """Whether it still runs."""
-        return not self._ended.done()
+        return self._process.alive
 
     def train(self, job: Job, on_report: Callable[[Report], None], on_output: Callable[[str], None]) -> None:
         """Give it its one job; all that it reports, and all lines that it prints, are told in order on threads."""
@@ -55,17 +54,17 @@ class TrainerHandle:
 
     def wait(self, seconds: float) -> bool:
         """Whether it has ended within that time."""
-        try:
-            self._ended.result(seconds)
-        except TimeoutError:
-            return False
-        return True
+        return self._process.wait(seconds)
+
+    def kill(self) -> None:
+        """End it and whatever it has started, at once; of one that has ended it does nothing."""
+        self._process.kill()
 
     def close(self) -> None:
         """Kill it if it still runs, and hear the last of its reports."""
         if self.alive:
             self.kill()
-        self._ended.result()
+        _ = self._process.status
         self._report_thread.join()
         self._printed.close()
         self._reports.close()
@@ -76,7 +75,7 @@ class TrainerHandle:
 
     def cause_of_death(self) -> str:
         """How it ended and what it printed last; call it after `close`."""
-        return self._printed.explains(f"The trainer process {how_it_ended(self._ended.result())}.")
+        return self._printed.explains(f"The trainer process {how_it_ended(self._process.status)}.")
 
     def _send(self, order: Order) -> None:
         with self._orders_lock:

@@ -3,6 +3,7 @@
 import functools
 import logging
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,8 +18,11 @@ from workers.processes import usable_cores
 from workers.protocol import Queue
 from workers.runtime.companion import Companion
 from workers.runtime.fitness import make_private
+from workers.runtime.nursery_keeper import DOOR, NurseryKeeper
 from workers.runtime.settings import WorkerSettings
-from workers.runtime.supervised import end_with_supervisor
+from workers.runtime.supervised import SUPERVISED, end_with_supervisor
+
+_ROOT = Path(__file__).resolve().parents[2]
 
 
 def worker(
@@ -94,12 +98,18 @@ def run_worker(settings: WorkerSettings, concurrency: int, jobs: int) -> None:
     os.umask(0o077)
     # The processes that Celery forks read the settings anew.
     os.environ.update(_environment(settings))
+    os.environ.pop(DOOR, None)
     if not concurrency:
         if jobs:
             os.execv(sys.executable, [sys.executable, *_jobs_command(jobs)])  # noqa: S606 (a fixed list)
         sys.exit("mapless: a worker without trainings (--concurrency 0) and without jobs (--jobs 0) has nothing to do")
     end_with_supervisor()
-    companion = Companion(_jobs_command(jobs)) if jobs else None
+    nursery = NurseryKeeper()
+    os.environ[DOOR] = str(nursery.door)
+    companions: list[NurseryKeeper | Companion] = [
+        nursery,
+        *([Companion("jobs", functools.partial(_start_jobs, jobs, nursery.door))] if jobs else []),
+    ]
 
     # Late, so that `mapless worker --help` does not wait for Celery.
     from celery.signals import setup_logging, worker_ready
@@ -107,8 +117,8 @@ def run_worker(settings: WorkerSettings, concurrency: int, jobs: int) -> None:
     import workers.runtime.tasks  # noqa: F401 - its signal handlers must be there when the worker starts
     from workers.runtime.app import create_app
 
-    if companion is not None:
-        worker_ready.connect(lambda **_: companion.keep_running(), weak=False)
+    for companion in companions:
+        worker_ready.connect(functools.partial(_keep_running, companion), weak=False)
     # In Celery's place: a line for each message that comes and goes says nothing that ours do not.
     log = functools.partial(_log, settings.log_format)
     setup_logging.connect(log, weak=False)
@@ -133,6 +143,21 @@ def run_worker(settings: WorkerSettings, concurrency: int, jobs: int) -> None:
 
 def _jobs_command(count: int) -> list[str]:
     return ["-m", "workers.runtime.jobs", str(count)]
+
+
+def _start_jobs(count: int, door: int) -> "subprocess.Popen[bytes]":
+    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
+    return subprocess.Popen(
+        [sys.executable, *_jobs_command(count)],
+        # It hears of this process's end by the end of its input.
+        stdin=subprocess.PIPE,
+        pass_fds=(door,),
+        env={**os.environ, "PYTHONPATH": path, SUPERVISED: "1"},
+    )
+
+
+def _keep_running(companion: Companion | NurseryKeeper, **_: Any) -> None:
+    companion.keep_running()
 
 
 def _log(log_format: LogFormat, **_: Any) -> None:

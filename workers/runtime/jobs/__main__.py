@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 import time
-from multiprocessing.forkserver import ensure_running
 from typing import NamedTuple
 
 from workers.errors import UnfitError
@@ -20,7 +19,9 @@ from workers.logs import configure
 from workers.protocol import HEARTBEAT_SECONDS
 from workers.runtime.fitness import Fitness, make_private
 from workers.runtime.jobs.client import JobClient
-from workers.runtime.jobs.place import Place, forkserver
+from workers.runtime.jobs.forks import Forks
+from workers.runtime.jobs.place import Place
+from workers.runtime.nursery_keeper import DOOR, NurseryKeeper, door
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.sight import ServerSight
 from workers.runtime.supervised import end_with_supervisor
@@ -53,7 +54,6 @@ def main(count: int) -> None:
     configure(settings.log_format)
     logging.getLogger("httpx").setLevel(logging.WARNING)
     os.umask(0o077)
-    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", NUMBA_NUM_THREADS="1")
     try:
         make_private(settings.work_dir)
     except UnfitError as error:
@@ -61,18 +61,20 @@ def main(count: int) -> None:
     ending = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: ending.set())
-    context = forkserver()
-    # At once: imports take seconds.
-    ensure_running()
+    # The worker's where it has one; its imports take seconds, so one of its own begins at once.
+    keeper = None if DOOR in os.environ else NurseryKeeper()
+    forks = Forks(door() if keeper is None else keeper.door)
     client = JobClient(settings.server_url, settings.worker_token.get_secret_value())
     fitness = Fitness(settings.work_dir, settings.min_free_bytes)
     sight = ServerSight(settings.server_url)
     threads = []
     for index, takes in enumerate(places(count)):
         name = f"{settings.host_name}/jobs{index}"
-        place = Place(name, takes.kinds, takes.long, client, settings.work_dir, fitness, sight, context, ending)
+        place = Place(name, takes.kinds, takes.long, client, settings.work_dir, fitness, sight, forks, ending)
         threads.append(threading.Thread(target=place.run, name=place.name, daemon=True))
         threads[-1].start()
+    if keeper is not None:
+        keeper.keep_running()
     while not ending.wait(HEARTBEAT_SECONDS):
         fitness.say(fitness.trouble)
     deadline = time.monotonic() + _END_SECONDS

@@ -2,17 +2,14 @@
 
 import logging
 import math
-import multiprocessing
+import os
 import shutil
 import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
 from functools import partial
-from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
-from typing import TypeAlias
 
 from workers.errors import ArchiveIntegrityError, RequestRefusedError, RunRefusedError, ServerError, ServerUnavailableError
 from workers.job_protocol import (
@@ -29,7 +26,9 @@ from workers.job_protocol import (
 from workers.play_protocol import PlaySeen
 from workers.processes import how_it_ended
 from workers.runtime.fitness import HEARTBEAT_FILE, Fitness
+from workers.runtime.forked_process import ForkedProcess
 from workers.runtime.jobs.client import JobClient
+from workers.runtime.jobs.forks import Forks, Orders
 from workers.runtime.jobs.process import (
     ARCHIVE,
     BAG,
@@ -38,8 +37,7 @@ from workers.runtime.jobs.process import (
     Done,
     Failed,
     Progressed,
-    Said,
-    main,
+    Task,
     recording_name,
 )
 from workers.runtime.jobs.pulse import REPORT_SECONDS, pulse
@@ -58,15 +56,6 @@ _ERROR_CHARACTERS = 9_000
 # A process that has said its last word has nothing left to do.
 _EXIT_SECONDS = 2.0
 
-Pipe: TypeAlias = "Connection[JobOrders, Said]"
-
-
-def forkserver() -> ForkServerContext:
-    """Where job processes are forked from: a process that imports, once, everything that they need."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["workers.runtime.jobs.ready"])
-    return context
-
 
 class Place:
     """One job at a time.
@@ -79,7 +68,7 @@ class Place:
         work_dir: where jobs keep their files while they are under way.
         fitness: of this machine.
         sight: of the server, one for all places of a process.
-        context: where processes are forked from.
+        forks: where processes are forked from, one for all places of a process.
         ending: set once the worker is to end.
     """
 
@@ -92,7 +81,7 @@ class Place:
         work_dir: Path,
         fitness: Fitness,
         sight: ServerSight,
-        context: ForkServerContext,
+        forks: Forks,
         ending: threading.Event,
     ) -> None:
         self.name = name
@@ -102,7 +91,7 @@ class Place:
         self._work_dir = work_dir
         self._fitness = fitness
         self._sight = sight
-        self._context = context
+        self._forks = forks
         self._ending = ending
 
     def run(self) -> None:
@@ -131,7 +120,7 @@ class Place:
 
     def _see_through(self, claim: JobClaim) -> None:
         logger.info("job %s (%s): attempt %d begins", claim.id, claim.spec.kind, claim.attempt)
-        directory = self._work_dir / f"{multiprocessing.current_process().pid}-{claim.id}-{claim.attempt}"
+        directory = self._work_dir / f"{os.getpid()}-{claim.id}-{claim.attempt}"
         directory.mkdir(mode=0o700)
         try:
             end = self._do(claim, directory)
@@ -151,25 +140,16 @@ class Place:
                     self._patiently(fetch, claim.lease_seconds)
         except (ArchiveIntegrityError, RequestRefusedError) as error:
             return JobEnd(outcome="failed", error=str(error))
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(
-            target=main,
-            args=(claim.spec.model_dump_json(), str(directory), theirs),
-            kwargs={"ahead": claim.ahead},
-            daemon=True,
-        )
+        # Under load what it is forked from may still be at its imports.
+        with pulse(self._client, claim, 0.0):
+            process, pipe = self._forks.begin(Task(claim.spec.model_dump_json(), str(directory), claim.ahead))
         try:
-            # Under load what it is forked from may still be at its imports.
-            with pulse(self._client, claim, 0.0):
-                process.start()
-            theirs.close()
-            end = _Watch(self._client, claim, process, ours, self._ending).until_ended()
+            end = _Watch(self._client, claim, process, pipe, self._ending).until_ended()
         finally:
-            ours.close()
-            if process.pid is not None:
-                process.join(_EXIT_SECONDS if not self._ending.is_set() else 0.0)
-                process.kill()
-                process.join()
+            pipe.close()
+            process.wait(_EXIT_SECONDS if not self._ending.is_set() else 0.0)
+            process.kill()
+            _ = process.status
         if end.outcome == "done" and not isinstance(claim.spec, WatchedJob):
             result = directory / RESULT
             with pulse(self._client, claim, 1.0):
@@ -208,7 +188,7 @@ class _Watch:
     """Stands between a job's process and the server for as long as the process runs."""
 
     def __init__(
-        self, client: JobClient, claim: JobClaim, process: ForkServerProcess, pipe: Pipe, ending: threading.Event
+        self, client: JobClient, claim: JobClaim, process: ForkedProcess, pipe: Orders, ending: threading.Event
     ) -> None:
         self._client = client
         self._claim = claim
@@ -238,7 +218,7 @@ class _Watch:
                 due = time.monotonic() + REPORT_SECONDS
                 self._report()
             if not self._pipe.poll(_LOOK_SECONDS):
-                if not self._process.is_alive() and not self._pipe.poll():
+                if not self._process.alive and not self._pipe.poll():
                     return self._died()
                 continue
             try:
@@ -300,5 +280,5 @@ class _Watch:
             return  # it has ended, and whoever waits for it notices
 
     def _died(self) -> JobEnd:
-        self._process.join(_EXIT_SECONDS)
-        return JobEnd(outcome="lost", error=f"The process {how_it_ended(self._process.exitcode or 0)}.")
+        how = how_it_ended(self._process.status) if self._process.wait(_EXIT_SECONDS) else "said nothing any more"
+        return JobEnd(outcome="lost", error=f"The process {how}.")

@@ -1,7 +1,7 @@
 """What a job's process does: the job, and what it says of it over a pipe to the place that started it.
 
-Processes are forked from one that has imported all that they need (`workers.runtime.jobs.ready`), so that the first frame
-of a view comes in a fraction of a second. Each does one job and ends; a crash takes nothing else along.
+Processes are forked from the worker's nursery, which has imported all that they need (`workers.runtime.jobs.ready`), so that
+the first frame of a view comes in a fraction of a second. Each does one job and ends; a crash takes nothing else along.
 """
 
 import contextlib
@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import cast
 
 from sim.errors import SimError
 from workers.errors import WorkerError
@@ -30,7 +31,6 @@ from workers.job_protocol import (
     ViewJob,
 )
 from workers.play_protocol import PlaySeen
-from workers.processes import die_with_parent
 from workers.reporting import EvaluationResult, EventLevel, WatchRequest
 
 ARCHIVE = "checkpoint.zip"
@@ -77,22 +77,39 @@ Said = Progressed | Failed | Done | PlaySeen | bytes
 """What a job's process says; bytes are an encoded frame of a view or a playground."""
 
 
-def main(spec: str, directory: str, connection: "Connection[Said, JobOrders]", *, ahead: bool = False) -> None:
-    """Do a job.
+@dataclass(frozen=True)
+class Task:
+    """What a job's process is to do; the first that it is told.
 
-    Args:
+    Attributes:
         spec: a `JobSpec` as JSON.
         directory: the job's folder.
-        connection: to the place; what comes in are the orders of whoever watches.
         ahead: nobody waits for it.
     """
-    die_with_parent(os.getppid())
-    if ahead:
+
+    spec: str
+    directory: str
+    ahead: bool
+
+
+def do_as_told(pipe: int) -> None:
+    """Do the job that comes through this descriptor of a pipe; what comes after it are the orders of whoever watches."""
+    connection: Connection[Said, Task] = Connection(pipe)
+    with connection:
+        try:
+            task = connection.recv()
+        except EOFError:
+            return
+        _see_through(task, cast("Connection[Said, JobOrders]", connection))
+
+
+def _see_through(task: Task, connection: "Connection[Said, JobOrders]") -> None:
+    if task.ahead:
         os.nice(_AHEAD_NICENESS)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     last: Said
     try:
-        _do(spec, Path(directory), connection)
+        _do(task.spec, Path(task.directory), connection)
     except (WorkerError, SimError, OSError, ValueError, KeyError) as error:
         last = Failed(str(error.args[0]) if error.args else type(error).__name__)
     else:

@@ -1,4 +1,4 @@
-"""Everything that jobs need, imported and compiled: loaded once by the process that job processes are forked from."""
+"""Everything that jobs need, imported and compiled: loaded once by the nursery, which job processes are forked from."""
 
 import numpy as np
 
