@@ -20,6 +20,7 @@ from server.metrics.axes import AxisRepository
 from server.runs.repository import RunRepository
 from workers.checkpoints import read_checkpoint
 from workers.errors import ArchiveError
+from workers.wording import NARROW_SPACE
 
 # A series' name, a step, and the bits of the time and of the value: what the database keeps of a reported number.
 Point = tuple[str, int, bytes]
@@ -171,9 +172,9 @@ def _limits(session: Session, run_id: str) -> dict[int, float]:
     """For each attempt the last step that was not taken back: the smallest that a later attempt went on from."""
     resumed: dict[int, float] = {}
     for event in RunRepository(session).events(run_id):
-        words = event.message.split()
+        words = event.message.split(" ")
         if words[:1] == ["Attempt"] and words[2:4] == ["begins", "from"]:
-            resumed[int(words[1])] = -1 if words[4] == "the" else int(words[5].replace(",", ""))
+            resumed[int(words[1])] = -1 if words[4] == "the" else int(words[5].replace(NARROW_SPACE, ""))
     limits: dict[int, float] = {}
     limit = math.inf
     for number in sorted(resumed, reverse=True):

@@ -15,6 +15,7 @@ import httpx
 import psutil
 
 from workers.config import PpoConfig
+from workers.wording import NARROW_SPACE
 
 ROOT = Path(__file__).parents[2]
 TOKEN = "a-login-token-for-tests"
@@ -143,7 +144,7 @@ class Service:
     def resumed_from(self, run_id: str) -> list[int]:
         """The step from which each attempt after the first began."""
         begins = [message for message in self.events(run_id) if " begins from step " in message]
-        return [int(message.split(" from step ")[1].split(" ")[0].replace(",", "")) for message in begins]
+        return [int(message.split(" from step ")[1].split(" ")[0].replace(NARROW_SPACE, "")) for message in begins]
 
     def stop(self, run_id: str) -> int:
         """Stop a run and return its last step, of which there is a checkpoint and a point of the curve."""
