@@ -6,7 +6,7 @@ BIN := .venv/bin
 # Parts of the tests that run beside all the rest, each with services, ports and databases of its own. One: with more,
 # browsers on two cores wait longer than their tests do.
 PARTS := stack
-TESTS_stack := tests/benchmarks tests/browser tests/services
+TESTS_stack := tests/browser tests/services
 SLOWEST := --durations=30 --durations-min=10
 .PHONY: help run test check format lock pages types sbom
 
