@@ -91,12 +91,12 @@ class Nursery:
         """
         ours: list[int] = []
         theirs: list[int] = []
-        # Orders go to it, what it prints and reports comes from it.
-        for goes in (True, False, False):
-            read, write = os.pipe()
-            ours.append(write if goes else read)
-            theirs.append(read if goes else write)
         try:
+            # Orders go to it, what it prints and reports comes from it.
+            for goes in (True, False, False):
+                read, write = os.pipe()
+                ours.append(write if goes else read)
+                theirs.append(read if goes else write)
             process = self._forked("trainer", theirs)
         except OSError:
             _close(ours)
