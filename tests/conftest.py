@@ -43,6 +43,15 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(10_000, 10, 10)
 
 
+@pytest.fixture(autouse=True)
+def umask_of_before() -> Iterator[None]:
+    """Commands set it for a process of their own; where a test runs one in this process, later tests have it as it was."""
+    before = os.umask(0o022)
+    os.umask(before)
+    yield
+    os.umask(before)
+
+
 def require_service(name: str, host: str, port: int) -> None:
     """Skip the test where nobody listens; with REQUIRE_SERVICES=1 that is an error: CI must have run it."""
     try:

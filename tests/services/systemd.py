@@ -21,6 +21,7 @@ HOME = "/opt/mapless"
 PYTHON = "/opt/python"
 
 _BOOT = f"""set -e
+umask 022
 mount --make-rprivate /
 mount -t tmpfs tmpfs "$FOLDER"
 cd "$FOLDER"
