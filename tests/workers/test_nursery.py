@@ -228,6 +228,9 @@ def test_a_job_comes_from_there_too_and_says_what_was_wrong(nursery_door: int, t
     assert process.status == 0
     view = ViewJob(policy=ShippedPolicyName(name="simple"))
     killed, pipe = forks.begin(Task(view.model_dump_json(), str(tmp_path), ahead=True))
+    # A group of its own, to be killed with what it starts; but the session of who began it, within which niceness counts.
+    until(lambda: os.getpgid(killed.pid) == killed.pid)
+    assert os.getsid(killed.pid) == os.getsid(0)
     os.kill(killed.pid, signal.SIGKILL)
     assert killed.wait(10.0)
     assert killed.status == -signal.SIGKILL

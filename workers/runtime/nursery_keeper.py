@@ -56,7 +56,9 @@ class NurseryKeeper:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             pass_fds=(self._inside.fileno(),),
-            start_new_session=True,
+            # What is typed at a terminal is not for it. No session of its own: Linux shares cores among sessions, so that no
+            # job would make way for others, as it says it does.
+            process_group=0,
             env={**environment, **_ENVIRONMENT, "PYTHONPATH": path},
         )
 

@@ -156,7 +156,10 @@ class _Nursery:
     def _become(self, what: What, parent: int, first: int, second: int, third: int) -> NoReturn:
         status = 1
         try:
-            os.setsid()
+            if what == "trainer":
+                os.setsid()
+            else:
+                os.setpgid(0, 0)
             die_with_parent(parent)
             name_this_process(what)
             self._forget_everybody()
