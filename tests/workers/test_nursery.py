@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from multiprocessing import Pipe
 from pathlib import Path
 
 import psutil
@@ -16,7 +17,6 @@ from tests.workers.test_link import until
 from workers.checkpoints import read_policy
 from workers.config import Algorithm as AlgorithmConfig
 from workers.config import DdpgConfig, EvaluationConfig, GruNetwork, MlpNetwork, PpoConfig, TrainingConfig
-from workers.job_protocol import ShippedPolicyName, ViewJob
 from workers.runtime.jobs.forks import Forks
 from workers.runtime.jobs.process import Failed, Task
 from workers.runtime.nursery import Nursery
@@ -226,16 +226,19 @@ def test_a_job_comes_from_there_too_and_says_what_was_wrong(nursery_door: int, t
         assert isinstance(said, Failed)
         assert process.wait(10.0)
     assert process.status == 0
-    view = ViewJob(policy=ShippedPolicyName(name="simple"))
-    killed, pipe = forks.begin(Task(view.model_dump_json(), str(tmp_path), ahead=True))
-    # A group of its own, to be killed with what it starts; but the session of who began it, within which niceness counts.
-    until(lambda: os.getpgid(killed.pid) == killed.pid)
-    assert os.getsid(killed.pid) == os.getsid(0)
-    os.kill(killed.pid, signal.SIGKILL)
-    assert killed.wait(10.0)
-    assert killed.status == -signal.SIGKILL
-    pipe.close()
     forks.close()
+
+
+def test_a_job_is_killed_with_what_it_starts_and_makes_way_for_others_as_it_says(nursery: Nursery) -> None:
+    ours, theirs = Pipe()
+    with ours, theirs:
+        waits = nursery.job(theirs)
+        until(lambda: os.getpgid(waits.pid) == waits.pid)
+        # The session of who began it: Linux shares cores among sessions, and niceness counts within one.
+        assert os.getsid(waits.pid) == os.getsid(0)
+        waits.kill()
+        assert waits.wait(10.0)
+    assert waits.status == -signal.SIGKILL
 
 
 def test_many_begin_and_end_at_once(nursery: Nursery, tmp_path: Path) -> None:
