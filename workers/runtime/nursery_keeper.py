@@ -7,17 +7,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import msgspec
 
+from workers.processes import python_path
 from workers.runtime.companion import Companion
 from workers.runtime.nursery_protocol import MAX_CAUSE_CHARACTERS, MAX_PACKET_BYTES, Refused
 
 DOOR = "MAPLESS_NURSERY_DOOR"
 """Environment variable: the door's descriptor, in the worker's processes that have it from the first one."""
 
-_ROOT = Path(__file__).resolve().parents[2]
 # One thread a process: seeds train side by side, one a core, and small networks gain nothing from more.
 _ENVIRONMENT = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 
@@ -49,7 +48,6 @@ class NurseryKeeper:
 
     def _start(self) -> "subprocess.Popen[bytes]":
         environment = {name: value for name, value in os.environ.items() if name != DOOR}
-        path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
         return subprocess.Popen(
             [sys.executable, "-m", "workers.runtime.nursery_process", str(self._inside.fileno()), str(os.getpid())],
             stdin=subprocess.DEVNULL,
@@ -59,7 +57,7 @@ class NurseryKeeper:
             # What is typed at a terminal is not for it. No session of its own: Linux shares cores among sessions, so that no
             # job would make way for others, as it says it does.
             process_group=0,
-            env={**environment, **_ENVIRONMENT, "PYTHONPATH": path},
+            env={**environment, **_ENVIRONMENT, "PYTHONPATH": python_path()},
         )
 
     def _refuse(self, cause: str) -> None:

@@ -14,15 +14,13 @@ from pydantic import ValidationError
 from sim.parts import require
 from workers.errors import UnfitError
 from workers.logs import LogFormat, configure
-from workers.processes import usable_cores
+from workers.processes import python_path, usable_cores
 from workers.protocol import Queue
 from workers.runtime.companion import Companion
 from workers.runtime.fitness import make_private
 from workers.runtime.nursery_keeper import DOOR, NurseryKeeper
 from workers.runtime.settings import WorkerSettings
 from workers.runtime.supervised import SUPERVISED, end_with_supervisor
-
-_ROOT = Path(__file__).resolve().parents[2]
 
 
 def worker(
@@ -146,13 +144,12 @@ def _jobs_command(count: int) -> list[str]:
 
 
 def _start_jobs(count: int, door: int) -> "subprocess.Popen[bytes]":
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
     return subprocess.Popen(
         [sys.executable, *_jobs_command(count)],
         # It hears of this process's end by the end of its input.
         stdin=subprocess.PIPE,
         pass_fds=(door,),
-        env={**os.environ, "PYTHONPATH": path, SUPERVISED: "1"},
+        env={**os.environ, "PYTHONPATH": python_path(), SUPERVISED: "1"},
     )
 
 
