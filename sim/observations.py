@@ -20,6 +20,7 @@ from sim.config import (
     DirectionPart,
     DistancePart,
     HeadingPart,
+    KnownPart,
     ObservationPart,
     RangesPart,
     ReachPart,
@@ -32,7 +33,7 @@ from sim.config import (
 from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS
-from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS
+from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS, SHORT_OF, VIEW_ROOM
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -178,6 +179,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return tuple(_way(task))
         case ReachPart():
             return tuple(_reach(part, task))
+        case KnownPart():
+            return tuple(_known(part, task))
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -222,6 +225,22 @@ def _way(task: TaskConfig) -> Iterator[ObservationNumber]:
     yield ObservationNumber("way is free", "1 where f >= l, else 0", 0.0, 1.0)
 
 
+def _known(part: KnownPart, task: TaskConfig) -> Iterator[ObservationNumber]:
+    limit, width = task.lidar.range, 360.0 / part.sectors
+    end = f"the end of the farthest sight in this sector ({SHORT_OF:g} m before what its ray meets, at least half way there)"
+    kinds = (
+        (
+            "known freshness",
+            f"1 - ln(1 + m) / ln({VIEW_ROOM + 1}), m = views kept since the oldest one that showed {end}; 1 where none did",
+        ),
+        ("known nearness", f"1 - d / {limit:g} m, d = distance of {end} from the nearest view, at least 0"),
+    )
+    for name, formula in kinds:
+        for k in range(part.sectors):
+            where = f"{k * width - 180.0:g} to {(k + 1) * width - 180.0:g} degrees against the heading"
+            yield ObservationNumber(f"{name} {k}", f"{formula}; {where}; 0 without a ray", 0.0, 1.0)
+
+
 def _reach(part: ReachPart, task: TaskConfig) -> Iterator[ObservationNumber]:
     near, width = near_distance(task), 360.0 / part.sectors
     for k in range(part.sectors):
@@ -254,6 +273,7 @@ def pack_parts(task: TaskConfig) -> dict[str, object]:
         "batches": observation.batches * len(task.lidar.mount.places),
         "rays_per_batch": task.lidar.rays // (observation.batches or 1),
         "trail_sectors": next((part.sectors for part in observation.parts if isinstance(part, TrailPart)), 0),
+        "known_sectors": next((part.sectors for part in observation.parts if isinstance(part, KnownPart)), 0),
         "reach_sectors": next((part.sectors for part in observation.parts if isinstance(part, ReachPart)), 0),
         "frames": observation.frames,
         "parts": len(observation.parts),

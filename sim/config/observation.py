@@ -151,6 +151,22 @@ class WayPart(Frozen):
     frames: int = _frames()
 
 
+class KnownPart(Frozen):
+    """Since when it knows what it sees, in each direction: views that it keeps every 0.48 m, and which of them showed it."""
+
+    name: Literal["known"] = Field("known", title="What is known")
+    sectors: int = Field(
+        30,
+        ge=4,
+        le=120,
+        title="Sectors",
+        description="Of the full turn around it, two numbers each: since when it knows the end of its sight, how near to "
+        "that it has been.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
 class ReachPart(Frozen):
     """How far its body could go straight on in each direction, as its scan shows: gaps that it fits through."""
 
@@ -189,6 +205,7 @@ BuiltInPart = (
     | TrailPart
     | WayPart
     | ReachPart
+    | KnownPart
 )
 
 if TYPE_CHECKING:
@@ -308,6 +325,8 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1
         case ReachPart():
             return part.sectors
+        case KnownPart():
+            return 2 * part.sectors
         case AddedObservationPart():
             return len(part.numbers())
         case _:

@@ -23,6 +23,7 @@ from sim.config import (
     DistancePart,
     FormulaTerm,
     HeadingPart,
+    KnownPart,
     ObservationPart,
     RangesPart,
     ReachPart,
@@ -36,6 +37,7 @@ from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
+from sim.engine.plain_known import PlainViews
 from sim.engine.plain_reach import seen_reach
 from sim.engine.plain_trail import PlainTrail
 from sim.engine.plain_way import seen_way
@@ -122,6 +124,10 @@ class PlainWorld:
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
         self._trail = PlainTrail(task.lidar)
         self._trail.drop(pose[:2])
+        self._views = PlainViews(task.lidar)
+        self._sees_views = any(isinstance(part, KnownPart) for part in task.observation.parts)
+        if self._sees_views:
+            self._views.keep(self.scan(), pose)
         self._seen: list[list[NDArray[np.float64]]] = []
         self._added_parts = AddedParts(task)
         if task.observation.frames > 1:
@@ -169,6 +175,8 @@ class PlainWorld:
         """The task's observation after a step: what it sees now before what it saw earlier, see `sim.observations`."""
         parts = self.task.observation.parts
         self._trail.drop(self.body.position)
+        if self._sees_views:
+            self._views.keep(ranges, (*self.body.position, self.body.angle))
         now = [self._part(part, ranges) for part in parts]
         self._seen = [now, *(self._seen or [now] * self.task.observation.frames)][: self.task.observation.frames]
         return np.concatenate(
@@ -204,6 +212,8 @@ class PlainWorld:
                 return seen_way(ranges, bearing, self.distance, task)
             case ReachPart():
                 return seen_reach(ranges, part, task)
+            case KnownPart():
+                return self._views.seen(ranges, (*self.body.position, heading), part)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

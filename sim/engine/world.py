@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
+from sim.config import KnownPart, RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -29,6 +29,7 @@ from sim.extending.observing import Sight
 from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
+from sim.kernels.known import VIEW_DIRECTIONS
 from sim.kernels.options import bound
 from sim.kernels.random import seed_streams
 from sim.kernels.reach import DIRECTIONS
@@ -42,7 +43,7 @@ from sim.kernels.records import (
     RATE,
     ROBOT,
 )
-from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
+from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
 from sim.lidar import drawn_ray_angles, padded, ray_angles
@@ -175,7 +176,8 @@ class World:
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
         sees_trail = bool(trails)
-        sees_ways = any(isinstance(part, TrailPart | WayPart | ReachPart) for part in task.observation.parts)
+        sees_ways = any(isinstance(part, TrailPart | WayPart | ReachPart | KnownPart) for part in task.observation.parts)
+        knows = any(isinstance(part, KnownPart) for part in task.observation.parts)
         sectors = sum(part.sectors for part in task.observation.parts if isinstance(part, ReachPart))
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
@@ -203,6 +205,9 @@ class World:
             ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
             reach=np.zeros((robots, DIRECTIONS * sectors) if sectors else (0, 0)),
+            view_places=np.zeros((robots if knows else 0, VIEW_ROOM, 2), dtype=np.float32),
+            views=np.zeros((robots if knows else 0, VIEW_ROOM, VIEW_DIRECTIONS), dtype=np.uint8),
+            views_kept=np.zeros(robots if knows else 0, dtype=np.int32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )
@@ -503,7 +508,7 @@ class World:
         names = (name for name in ROBOT.names or () if name not in unread)
         state: dict[str, NDArray[np.generic]] = {name: self.robots.records[name] for name in names}
         drawn = self.task.randomisation
-        constant = {"records", "terms", "quantities"} | (set() if drawn != RandomisationConfig() else {"drawn"})
+        constant = {"records", "terms", "quantities", "reach"} | (set() if drawn != RandomisationConfig() else {"drawn"})
         constant |= set() if drawn.field_of_view else {"ray_cos", "ray_sin", "ahead"}
         arrays: dict[str, NDArray[np.generic]] = self.robots._asdict()
         # Zeros behind the rays were not part of it when there was one LiDAR only.
@@ -524,8 +529,8 @@ class World:
             ValueError: the state is of another task or number of robots.
         """
         targets = self._state()
-        # The terms of the last step were part of it once.
-        state = {name: array for name, array in state.items() if name != "terms"}
+        # The terms of the last step and the reach were part of it once.
+        state = {name: array for name, array in state.items() if name not in ("terms", "reach")}
         if state.keys() != targets.keys():
             raise ValueError(f"not a state of this environment: {sorted(state.keys() ^ targets.keys())} do not match")
         for name, target in targets.items():

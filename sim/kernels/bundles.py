@@ -115,6 +115,11 @@ class Robots(NamedTuple):
         crumbs: (N,) how many were dropped; (0,) likewise.
         reach: (N, directions) metres that the robot could go straight on, from right to left, beginning behind it; (0, 0)
             where nobody sees them.
+        view_places: (N, VIEW_ROOM, 2) x, y of where views of this attempt were kept, as `trail`; (0, VIEW_ROOM, 2) where
+            nobody sees since when it knows what it sees.
+        views: (N, VIEW_ROOM, VIEW_DIRECTIONS) uint8, what the first LiDAR read from there in each direction, FULL_RANGE at
+            its range, 0 where no ray pointed; (0, ...) likewise.
+        views_kept: (N,) how many were kept; (0,) likewise.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
@@ -141,5 +146,8 @@ class Robots(NamedTuple):
     trail: Floats
     crumbs: Integers
     reach: Doubles
+    view_places: Floats
+    views: NDArray[np.uint8]
+    views_kept: Integers
     held_ranges: Floats
     scan_ages: Integers

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim.kernels.known import see_known
 from sim.kernels.options import kernel
 from sim.kernels.reach import see_reach
 from sim.kernels.records import (
@@ -13,6 +14,7 @@ from sim.kernels.records import (
     DIRECTION_PART,
     DISTANCE_PART,
     HEADING_PART,
+    KNOWN_PART,
     OMNIDIRECTIONAL,
     RANGES_PART,
     REACH_PART,
@@ -129,7 +131,7 @@ def observe_ways(i, robots, geometry, p):
     """Write what robot i sees of its trail and of ways ahead; apart from `observe`, which it would slow for all others."""
     if p.part_places[REACH_PART] >= 0:
         see_reach(i, robots, geometry, p)
-    if p.part_places[TRAIL_PART] < 0 and p.part_places[WAY_PART] < 0:
+    if p.part_places[TRAIL_PART] < 0 and p.part_places[WAY_PART] < 0 and p.part_places[KNOWN_PART] < 0:
         return
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
@@ -140,6 +142,8 @@ def observe_ways(i, robots, geometry, p):
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
     if p.part_places[TRAIL_PART] >= 0:
         see_trail(i, x, y, heading, robots, geometry, p)
+    if p.part_places[KNOWN_PART] >= 0:
+        see_known(i, x, y, heading, robots, geometry, p)
     if p.part_places[WAY_PART] >= 0:
         dx = robots.targets[i, 0] - x
         dy = robots.targets[i, 1] - y

@@ -22,6 +22,7 @@ PART_KINDS = (
     "trail",
     "way",
     "reach",
+    "known",
 )
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
@@ -37,6 +38,7 @@ PART_KINDS = (
     TRAIL_PART,
     WAY_PART,
     REACH_PART,
+    KNOWN_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2
@@ -120,6 +122,7 @@ PARAMETERS = np.dtype(
         ("rays_per_batch", "i4"),
         ("trail_sectors", "i4"),
         ("reach_sectors", "i4"),
+        ("known_sectors", "i4"),
         ("frames", "i4"),  # moments at which anything is seen
         ("parts", "i4"),  # of the observation
         ("part_sizes", "i4", (MAX_PARTS,)),  # numbers of each at one moment

@@ -1,4 +1,4 @@
-"""How much of something one task may have: what configurations allow, and what the records have room for (no imports)."""
+"""How much of something one task may have: what configurations allow, and what records have room for (no imports)."""
 
 MAX_PARTS = 16
 """Parts of one observation, at most."""
@@ -14,3 +14,9 @@ SHORT_TRAIL_KINDS, LONG_TRAIL_KINDS = 3, 4
 
 SHORT_TRAIL_ROOM, LONG_TRAIL_ROOM = 256, 1024
 """Crumbs that a robot remembers, the newest ones: on some 60 m and on some 250 m of its way."""
+
+VIEW_ROOM = 256
+"""Views that a robot remembers, the newest ones: on some 120 m of its way."""
+
+SHORT_OF = 0.2
+"""Metres by which the end of a sight lies before what its ray meets; where that is nearer, half way there."""

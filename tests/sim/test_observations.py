@@ -18,6 +18,7 @@ from sim.config import (
     DirectionPart,
     DistancePart,
     HeadingPart,
+    KnownPart,
     LidarConfig,
     ObservationConfig,
     ObservationName,
@@ -196,6 +197,7 @@ parts = st.tuples(
     st.builds(HeadingPart, scaling=st.sampled_from(["signed", "turn"]), frames=frames),
     st.builds(DeviationPart, frames=frames),
     st.builds(TrailPart, sectors=st.sampled_from([4, 30]), frames=frames),
+    st.builds(KnownPart, sectors=st.sampled_from([4, 30]), frames=frames),
     st.builds(WayPart, frames=frames),
     st.builds(ReachPart, sectors=st.sampled_from([4, 30]), frames=frames),
 )
@@ -215,7 +217,7 @@ def test_any_list_of_parts_is_what_the_plain_twin_sees(arena: Arena, seed: int, 
     plain = PlainWorld(task, arena, (pose[0], pose[1], pose[2]), (target[0], target[1]))
     layout = observation_layout(task)
     low, high = (np.array([getattr(number, end) for number in layout.numbers]) for end in ("low", "high"))
-    by_rays = np.array([block.key in ("ranges", "trail") for block in layout.blocks for _ in block.numbers])
+    by_rays = np.array([block.key in ("ranges", "trail", "known") for block in layout.blocks for _ in block.numbers])
     # Angles may round to either side of a half turn.
     period = np.array([1.0 if number.unit == "2 pi rad" else 2.0 for number in layout.numbers])
     for linear, angular in rng.uniform([0.3, -1.0], 1.0, (12, 2)).astype(np.float32).tolist():

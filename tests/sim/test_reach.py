@@ -87,3 +87,13 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
         made.step(np.array([[random.uniform(0.3, 1.0), random.uniform(-1.0, 1.0)]], np.float32))
     assert differ <= 4
     assert np.ptp(told) > 0.5
+
+
+def test_a_state_that_was_kept_with_the_reach_goes_on_without() -> None:
+    task = TaskConfig(observation=ObservationConfig(parts=(ReachPart(sectors=4),)))
+    first, second = (NavigationVectorEnv(task, 3, seed=1) for _ in range(2))
+    first.reset()
+    assert "reach" not in first.get_state(), "it is worked out anew in every step"
+    second.set_state(first.get_state() | {"reach": np.zeros((3, 16))})
+    action = np.full((3, 2), 0.5, np.float32)
+    assert np.array_equal(first.step(action)[0], second.step(action)[0])

@@ -5,9 +5,10 @@
 | observation | `observation` (n, size) as the manifest describes it         | `action`, `velocity`                |
 | scan        | what the observation is made of, of `ranges` (n, scan),     | `observation`, `action`, `velocity` |
 |             | `pose` (n, 3), `target` (n, 2), `speeds` (n, A) and         |                                     |
-|             | `last_action` (n, A); `trail` (n, numbers), which a robot's |                                     |
-|             | program keeps (`ros2/mapless_navigator/trail.py`), and an   |                                     |
-|             | extension's part (n, numbers) by its name; where earlier    |                                     |
+|             | `last_action` (n, A); `trail` and `known` (n, numbers),     |                                     |
+|             | which a robot's program keeps (`trail.py` and `views.py` in |                                     |
+|             | `ros2/mapless_navigator`), and an extension's part          |                                     |
+|             | (n, numbers) by its name; where earlier                     |                                     |
 |             | moments are seen `previous`, see `Specification.carried`    |                                     |
 
 A policy that remembers has one more input, `memory` (n, m), zeros where a robot begins, and one more output, `next_memory`,

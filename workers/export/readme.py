@@ -6,6 +6,7 @@ from workers.export.check import CheckReport
 from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
 from workers.export.names import MEMORY, NEXT_MEMORY
 from workers.export.ros2.mapless_navigator.policy import Part, Specification
+from workers.export.ros2.mapless_navigator.views import Views
 from workers.manifest import Manifest
 
 _NUMPY_EXAMPLE = """\
@@ -20,13 +21,12 @@ policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
 pose = [0.0, 0.0, 0.0]  # x, y, heading
 frames = Frames(policy.specification)  # of one robot, from start to target
-TRAILobservation = frames.push(observe(policy.specification, ranges, [pose], [[2.0, 1.0]], [[ZEROS]]ADDED))
+WAYSobservation = frames.push(observe(policy.specification, ranges, [pose], [[2.0, 1.0]], [[ZEROS]]ADDED))
 STEPprint(f"FORMAT")
 """
 
-_TRAIL = """\
-trail = Trail(policy.specification)  # likewise
-"""
+_WAYS = {"trail": "Trail", "views": "Views"}
+"""Modules of what a robot remembers of its way, and their classes."""
 
 _NUMPY_STEP = """\
 NAMES = policy.velocities(observation)[0]
@@ -92,7 +92,10 @@ def _onnx_example(specification: Specification) -> str:
         TARGET: "np.array([[2.0, 1.0]], np.float32),",
         SPEEDS: "np.zeros((1, COUNT), np.float32),  # as measured, over their limits, or the `action` of the step before",
         LAST_ACTION: "np.zeros((1, COUNT), np.float32),  # the `action` of the step before",
-        **{part.kind: f"{_at_first(part)},  # as {_maker(part)} makes it" for part in _brought_parts(specification)},
+        **{
+            part.kind: f"{_at_first(part, specification)},  # as {_maker(part)} makes it"
+            for part in _brought_parts(specification)
+        },
         MEMORY: f"np.zeros((1, {specification.memory}), np.float32),  # of a robot that begins",
         PREVIOUS: f"np.zeros((1, {len(specification.carried)}), np.float32),  # see below",
     }
@@ -117,16 +120,18 @@ def _filled(example: str, specification: Specification) -> str:
         "ackermann": ("linear", "steering"),
     }[specification.drive]
     added = {
-        part.kind: "[trail.see(ranges[0], pose)]" if part.is_trail else str([[0.0] * part.size])
+        part.kind: f"[{_way(part)}.see(ranges[0], pose)]" if part.is_remembered else str([[0.0] * part.size])
         for part in _brought_parts(specification)
     }
     brought = ", ".join(f'"{kind}": {numbers}' for kind, numbers in added.items())
-    sees_trail = any(part.is_trail for part in specification.parts)
+    ways = {name: _WAYS[name] for name in sorted(_way(part) for part in specification.parts if part.is_remembered)}
+    imports = [f"from mapless_navigator.{module} import {name}\n" for module, name in ways.items()]
+    made = [f"{module} = {name}(policy.specification)  # likewise\n" for module, name in ways.items()]
     return (
         example.replace("NAMES", ", ".join(names))
         .replace("ADDED", f", added={{{brought}}}" if added else "")
-        .replace("IMPORTS", "from mapless_navigator.trail import Trail\n" if sees_trail else "")
-        .replace("TRAIL", _TRAIL if sees_trail else "")
+        .replace("IMPORTS", "".join(imports))
+        .replace("WAYS", "".join(made))
         .replace("FORMAT", ", ".join(f"{{{name}:.3f}} {units[name]}" for name in names))
         .replace("ZEROS", ", ".join(["0.0"] * len(names)))
         .replace("COUNT", str(len(names)))
@@ -187,15 +192,23 @@ def _brought_parts(specification: Specification) -> tuple[Part, ...]:
     return tuple(part for part in specification.parts if part.brought)
 
 
-def _at_first(part: Part) -> str:
-    """What a robot that has not moved brings, as code."""
+def _way(part: Part) -> str:
+    """The module that remembers a part's way."""
+    return "trail" if part.is_trail else "views"
+
+
+def _at_first(part: Part, specification: Specification) -> str:
+    """What a robot that has not moved, and sees nothing within its range, brings, as code."""
     if part.added:
         return f"np.zeros((1, {part.size}), np.float32)"
+    if not part.is_trail:
+        seen = Views(specification).see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0))
+        return f"np.array([{[round(number, 6) for number in seen.tolist()]}], np.float32)"
     return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / {161 if part.kind == 'long_trail' else 41}"
 
 
 def _maker(part: Part) -> str:
-    return "its extension" if part.added else "`mapless_navigator/trail.py`"
+    return "its extension" if part.added else f"`mapless_navigator/{_way(part)}.py`"
 
 
 def _added_parts(specification: Specification) -> tuple[Part, ...]:

@@ -22,6 +22,7 @@ from sim.config import (
     DifferentialDrive,
     DoubleMount,
     JackalConfig,
+    KnownPart,
     LidarConfig,
     ObservationConfig,
     RacecarConfig,
@@ -86,6 +87,7 @@ TASKS = [
         lidar=LidarConfig(rays=12, mount=TWO),
         observation=ObservationConfig(parts=(ReachPart(sectors=6, frames=2),)),
     ),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), TrailPart(sectors=8), KnownPart(sectors=8, frames=2)))),
 ]
 
 
@@ -108,6 +110,7 @@ TASKS = [
         "long trail",
         "way",
         "reach",
+        "known",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
@@ -200,8 +203,9 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
         ObservationConfig.preset("improved", frames=4),
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart())),
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(memory="long"))),
+        ObservationConfig(parts=(RangesPart(), TrailPart(), KnownPart(sectors=8))),
     ],
-    ids=["one moment", "four moments", "trail", "long trail"],
+    ids=["one moment", "four moments", "trail", "long trail", "known"],
 )
 def test_readme_examples_run_and_agree(
     make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, observation: ObservationConfig

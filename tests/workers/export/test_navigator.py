@@ -17,6 +17,7 @@ from sim.config import (
     DifferentialDrive,
     DoubleMount,
     JackalConfig,
+    KnownPart,
     LidarConfig,
     ObservationConfig,
     OmnidirectionalDrive,
@@ -31,7 +32,7 @@ from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, S
 from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles
 from workers.export.ros2.mapless_navigator.policy import Policy, read_safetensors
 
-TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart()))
+TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(), KnownPart()))
 
 
 @pytest.fixture
@@ -108,7 +109,7 @@ def test_what_is_too_near_is_measured_from_the_middle_of_the_body(
 @pytest.mark.parametrize(
     ("frames", "drive"),
     [
-        (0, DifferentialDrive()),  # sees its trail
+        (0, DifferentialDrive()),  # remembers its way
         (1, DifferentialDrive()),
         (3, DifferentialDrive()),
         (1, DifferentialDrive(reverse=0.5)),

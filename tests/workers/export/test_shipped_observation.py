@@ -13,6 +13,7 @@ from sim.config import (
     ArenaConfig,
     BearingPart,
     DoubleMount,
+    KnownPart,
     LidarConfig,
     ObservationConfig,
     RangesPart,
@@ -28,6 +29,7 @@ from workers.export.check import run_graph
 from workers.export.ros2.mapless_navigator.observation import Frames, Scan, observe, ray_angles, resample, wrap
 from workers.export.ros2.mapless_navigator.policy import PolicyFileError, Specification
 from workers.export.ros2.mapless_navigator.trail import Trail
+from workers.export.ros2.mapless_navigator.views import Views
 
 TASKS = {
     "improved": TaskConfig(arena=ArenaConfig(name="complex")),
@@ -95,31 +97,41 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
     assert starts > 1
 
 
-@pytest.mark.parametrize("part", [TrailPart(), TrailPart(memory="long")], ids=["short", "long"])
-def test_a_trail_is_the_simulators(make_checkpoint: Callable[..., Path], part: TrailPart) -> None:
+@pytest.mark.parametrize(
+    ("part", "remembers", "refusal"),
+    [
+        (TrailPart(), Trail, "sees its trail"),
+        (TrailPart(memory="long"), Trail, "sees its trail"),
+        (KnownPart(), Views, "remembers views"),
+    ],
+    ids=["short trail", "long trail", "known"],
+)
+def test_what_it_remembers_of_its_way_is_the_simulators(
+    make_checkpoint: Callable[..., Path], part: TrailPart | KnownPart, remembers: type[Trail | Views], refusal: str
+) -> None:
     listed = (RangesPart(batches=30), BearingPart(), part)
     task = TaskConfig(arena=ArenaConfig(name="complex"), observation=ObservationConfig(parts=listed))
     exported = export_checkpoint(make_checkpoint(task=task))
     env = NavigationVectorEnv(task, 1, seed=5)
     observations, _ = env.reset(seed=5)
-    rng, trail = np.random.default_rng(5), Trail(exported.specification)
+    rng, way = np.random.default_rng(5), remembers(exported.specification)
     ways = unequal = 0
     for _ in range(300):
         known = env.ranges, env.poses, env.targets, np.zeros((1, 2))
-        seen = {trail.kind: trail.see(env.ranges[0], env.poses[0])[None]}
+        seen = {way.kind: way.see(env.ranges[0], env.poses[0])[None]}
         made = observe(exported.specification, *known, added=seen)
-        # A crumb on the edge of a sector, or of what a ray meets, falls on either side.
+        # A crumb on the edge of a sector, what lies on the edge of what a ray meets, falls on either side.
         unequal += int(np.abs(made - observations).max() > 1e-4)
         scene = {"ranges": env.ranges, "pose": env.poses, "target": env.targets} | seen
         by_scan = run_graph(exported.by_scan, {name: np.array(array, np.float32) for name, array in scene.items()})
         np.testing.assert_allclose(by_scan["observation"], made, rtol=0, atol=1e-5)
         observations, _, _, _, _ = env.step(rng.uniform((0.3, -1.0), (1.0, 1.0), (1, 2)).astype(np.float32))
         if env.outcomes[0]:
-            trail.clear()
+            way.clear()
             ways += 1
     assert unequal <= 6
     assert ways > 1
-    with pytest.raises(PolicyFileError, match="sees its trail"):
+    with pytest.raises(PolicyFileError, match=refusal):
         observe(exported.specification, *known)
 
 

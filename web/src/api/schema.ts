@@ -7548,6 +7548,52 @@ export interface components {
             items: components["schemas"]["KnownKey"][];
         };
         /**
+         * KnownPart
+         * @description Since when it knows what it sees, in each direction: views that it keeps every 0.48 m, and which of them showed it.
+         */
+        "KnownPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "known";
+            /**
+             * Sectors
+             * @description Of the full turn around it, two numbers each: since when it knows the end of its sight, how near to that it has been.
+             * @default 30
+             */
+            sectors: number;
+        };
+        /**
+         * KnownPart
+         * @description Since when it knows what it sees, in each direction: views that it keeps every 0.48 m, and which of them showed it.
+         */
+        "KnownPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "known";
+            /**
+             * Sectors
+             * @description Of the full turn around it, two numbers each: since when it knows the end of its sight, how near to that it has been.
+             * @default 30
+             */
+            sectors: number;
+        };
+        /**
          * Lapse
          * @description The same scenarios by one checkpoint of a run after another.
          */
@@ -8523,7 +8569,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"])[];
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"] | components["schemas"]["KnownPart-Input"])[];
         };
         /**
          * ObservationConfig
@@ -8534,7 +8580,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"])[];
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"] | components["schemas"]["KnownPart-Output"])[];
         };
         /**
          * ObservedPart

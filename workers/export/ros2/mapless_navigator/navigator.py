@@ -13,6 +13,7 @@ import numpy as np
 from .observation import Frames, Reals, Scan, observe, refuse_unknown, resample, wrap
 from .policy import Floats, Policy, Specification
 from .trail import Trail
+from .views import Views
 
 
 class State(Enum):
@@ -118,7 +119,9 @@ class Navigator:
 
     def __init__(self, policy: Policy, safety: Safety, make_added: MakeAdded | None = None) -> None:
         if make_added is None:
-            refuse_unknown(policy.specification, ("trail", "long_trail"))
+            refuse_unknown(
+                policy.specification, tuple(part.kind for part in policy.specification.parts if part.is_remembered)
+            )
         self._policy, self._safety, self._make_added = policy, safety, make_added
         self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
         self._yaws = (safety.sensor_yaw, safety.second_sensor_yaw)[: len(self._scans)]
@@ -131,8 +134,11 @@ class Navigator:
         self._too_near = False
         self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
         self._frames = Frames(policy.specification)
-        sees_trail = any(part.is_trail for part in policy.specification.parts)
-        self._trail = Trail(policy.specification) if sees_trail else None
+        self._ways = tuple(
+            Trail(policy.specification) if part.is_trail else Views(policy.specification)
+            for part in policy.specification.parts
+            if part.is_remembered
+        )
         self._memory = policy.memory(1)
 
     def set_scan(self, at: float, scan: Scan, lidar: int = 0) -> None:
@@ -157,8 +163,9 @@ class Navigator:
         moved = (
             self._goal is None or frame != self._goal_frame or math.dist(self._goal, (x, y)) > self._safety.goal_tolerance
         )
-        if self._trail is not None and moved:
-            self._trail.clear()
+        if moved:
+            for way in self._ways:
+                way.clear()
         if frame != self._goal_frame:
             self._place = None
         self._goal, self._goal_frame, self._arrived = (x, y), frame, False
@@ -230,8 +237,7 @@ class Navigator:
             self._speeds()[None].astype(float),
         )
         added = dict(self._make_added(*known)) if self._make_added else {}
-        if self._trail is not None:
-            added[self._trail.kind] = self._trail.see(ranges, pose)[None]
+        added |= {way.kind: way.see(ranges, pose)[None] for way in self._ways}
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)
 

@@ -15,6 +15,7 @@
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
+| `known`                | since when it knows what it sees, see `views.py`: likewise                   |
 | `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
 | `reach`                | near / (near + how far it could go straight on), all around, see `reach`   |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
@@ -78,14 +79,15 @@ def observe(
         targets: (n, 2) x, y in metres, in the same frame.
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
-        added: the numbers (n, size) of each part that an extension makes, by its kind, and those of the trail (`Trail.see`);
+        added: the numbers (n, size) of each part that an extension makes, by its kind, of its trail (`Trail.see`)
+            and of its views (`Views.see`);
             `manifest.json` explains them.
 
     Returns:
         (n, numbers of the newest moment).
 
     Raises:
-        PolicyFileError: the policy sees its trail or a part of an extension, and the numbers are not given.
+        PolicyFileError: the policy sees its trail, its views or a part of an extension, and the numbers are not given.
     """
     refuse_unknown(specification, () if added is None else tuple(added))
     pose, target = np.asarray(poses, np.float64), np.asarray(targets, np.float64)
@@ -130,6 +132,10 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
         if part.is_trail and part.kind not in known:
             raise PolicyFileError(
                 f"this policy sees its trail: give what Trail.see tells to observe(added={{{part.kind!r}: [numbers]}})"
+            )
+        if part.kind == "known" and part.kind not in known:
+            raise PolicyFileError(
+                "this policy remembers views: give what Views.see tells to observe(added={'known': [numbers]})"
             )
         if part.added and part.kind not in known:
             raise PolicyFileError(

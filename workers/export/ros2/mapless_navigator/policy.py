@@ -43,6 +43,7 @@ KINDS = (
     "long_trail",
     "way",
     "reach",
+    "known",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
@@ -76,9 +77,14 @@ class Part:
         return self.kind in ("trail", "long_trail")
 
     @property
+    def is_remembered(self) -> bool:
+        """Whether it takes a memory of the robot's way: its trail, or its views, see `views.py`."""
+        return self.is_trail or self.kind == "known"
+
+    @property
     def brought(self) -> bool:
         """Whether its numbers are no function of scan, pose, target and commands of one moment: whoever asks brings them."""
-        return self.added or self.is_trail
+        return self.added or self.is_remembered
 
 
 @dataclass(frozen=True)
