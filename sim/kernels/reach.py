@@ -39,15 +39,19 @@ def see_reach(i, robots, geometry, p):
     angles = geometry.ray_angles
     rays = angles.shape[0]
     for lidar in range(p.lidars):
+        mount_x = p.mounts[lidar, 0]
+        mount_y = p.mounts[lidar, 1]
         for ray in range(rays):
             reading = np.float64(robots.ranges[i, lidar * rays + ray])
             if reading >= p.range:
                 continue
-            angle = angles[ray] + p.mounts[lidar, 2]
-            x = p.mounts[lidar, 0] + reading * math.cos(angle)
-            y = p.mounts[lidar, 1] + reading * math.sin(angle)
-            distance = math.sqrt(x * x + y * y)
-            towards = math.atan2(y, x)
+            distance = reading
+            towards = angles[ray] + p.mounts[lidar, 2]
+            if mount_x != 0.0 or mount_y != 0.0:
+                x = mount_x + reading * math.cos(towards)
+                y = mount_y + reading * math.sin(towards)
+                distance = math.sqrt(x * x + y * y)
+                towards = math.atan2(y, x)
             # In the directions that pass it at less than d: of what is nearer than d, half of all.
             half = math.asin(near / distance) if distance > near else 0.5 * math.pi
             first = np.int64(math.ceil((towards - half + math.pi) / step - 0.5))
@@ -55,11 +59,12 @@ def see_reach(i, robots, geometry, p):
             aside = (first + 0.5) * step - math.pi - towards
             along = distance * math.cos(aside)
             across = distance * math.sin(aside)
-            for direction in range(first, last + 1):
+            k = first % count
+            for _ in range(first, last + 1):
                 free = max(along - math.sqrt(max(near * near - across * across, 0.0)), 0.0)
-                k = direction % count
                 reach[i, k] = min(reach[i, k], free)
                 along, across = along * turn_cos - across * turn_sin, across * turn_cos + along * turn_sin
+                k = k + 1 if k + 1 < count else 0
     at = p.part_places[REACH_PART]
     for sector in range(sectors):
         farthest = 0.0
