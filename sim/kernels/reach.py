@@ -42,7 +42,7 @@ def see_reach(i, robots, geometry, p):
         mount_x = p.mounts[lidar, 0]
         mount_y = p.mounts[lidar, 1]
         for ray in range(rays):
-            reading = np.float64(robots.ranges[i, lidar * rays + ray])
+            reading = float(robots.ranges[i, lidar * rays + ray])
             if reading >= p.range:
                 continue
             distance = reading
