@@ -1,10 +1,20 @@
-"""Random arenas for the property tests, and LiDARs of every kind."""
+"""Random arenas for the property tests, LiDARs of every kind, and a training that is interrupted."""
 
 import numpy as np
 from hypothesis import strategies as st
 
 from sim.arenas import Arena
-from sim.config import DoubleMount, LidarConfig
+from sim.config import (
+    BearingPart,
+    DoubleMount,
+    GeneratedArenaConfig,
+    LidarConfig,
+    ObservationConfig,
+    ObservationPart,
+    RangesPart,
+    TaskConfig,
+)
+from sim.envs.vector import NavigationVectorEnv
 
 
 def random_arena(seed: int) -> Arena:
@@ -37,3 +47,22 @@ LIDARS = {
     "turned": LidarConfig(rays=31, field_of_view=270.0, mount={"name": "single", "x": 0.05, "yaw": 40.0}),
     "two": LidarConfig(rays=20, mount=DoubleMount()),
 }
+
+
+def goes_on_bit_for_bit(part: ObservationPart) -> None:
+    """Robots that see a part besides ranges and bearing: from a state that was kept they go on as those that drove on."""
+    task = TaskConfig(
+        arena=GeneratedArenaConfig(name="varied", maps=4),
+        observation=ObservationConfig(parts=(RangesPart(), BearingPart(), part)),
+        arrival_ends=True,
+    )
+    first, second = (NavigationVectorEnv(task, 8, seed=1) for _ in range(2))
+    first.reset()
+    actions = np.random.default_rng(0).uniform([0.3, -1.0], 1.0, (200, 8, 2)).astype(np.float32)
+    for action in actions[:100]:
+        first.step(action)
+    second.set_state(first.get_state())
+    for action in actions[100:]:
+        ours, theirs = (env.step(action) for env in (first, second))
+        for one, other in zip(ours[:4], theirs[:4], strict=True):
+            assert np.array_equal(one, other)

@@ -6,12 +6,10 @@ import pytest
 from sim.arenas import Arena
 from sim.config import (
     ArenaConfig,
-    BearingPart,
     GeneratedArenaConfig,
     LidarConfig,
     ObservationConfig,
     OdometryConfig,
-    RangesPart,
     TaskConfig,
     TrailPart,
 )
@@ -20,7 +18,7 @@ from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM
 from sim.observations import observation_layout
-from tests.sim.scenes import LIDARS
+from tests.sim.scenes import LIDARS, goes_on_bit_for_bit
 
 WALL = np.array([[0.0, 1.5, 1.0, 0.1, 0.0]])
 FULL = LIDARS["full circle"]
@@ -152,21 +150,7 @@ def test_a_new_target_and_a_new_episode_begin_a_new_trail() -> None:
 
 
 def test_a_training_goes_on_bit_for_bit() -> None:
-    task = TaskConfig(
-        arena=GeneratedArenaConfig(name="varied", maps=4),
-        observation=ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(frames=2))),
-        arrival_ends=True,
-    )
-    first, second = (NavigationVectorEnv(task, 8, seed=1) for _ in range(2))
-    first.reset()
-    actions = np.random.default_rng(0).uniform([0.3, -1.0], 1.0, (200, 8, 2)).astype(np.float32)
-    for action in actions[:100]:
-        first.step(action)
-    second.set_state(first.get_state())
-    for action in actions[100:]:
-        ours, theirs = (env.step(action) for env in (first, second))
-        for one, other in zip(ours[:4], theirs[:4], strict=True):
-            assert np.array_equal(one, other)
+    goes_on_bit_for_bit(TrailPart(frames=2))
 
 
 def test_its_numbers_have_names_and_stay_in_their_ranges() -> None:
