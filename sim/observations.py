@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.actions import ActionComponent, action_layout
 from sim.config import (
@@ -33,7 +34,7 @@ from sim.config import (
 from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS
-from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS, SHORT_OF, VIEW_ROOM
+from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS, REACH_DIRECTIONS, SHORT_OF, VIEW_ROOM
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -107,6 +108,12 @@ def _robot_sizes(task: TaskConfig) -> tuple[int, int]:
 def near_distance(task: TaskConfig) -> float:
     """Distance at which an inverse range reaches 1, metres: the collision distance or the body."""
     return max(task.collision_distance, task.robot.inscribed_radius)
+
+
+def reach_directions(task: TaskConfig) -> NDArray[np.float64]:
+    """Directions of what is told of the reach, (n,) radians against the heading, from right to left; none if none is."""
+    count = REACH_DIRECTIONS * sum(part.sectors for part in task.observation.parts if isinstance(part, ReachPart))
+    return np.asarray((np.arange(count) + 0.5) * (2.0 * np.pi / max(count, 1)) - np.pi)
 
 
 def observation_layout(task: TaskConfig) -> ObservationLayout:
@@ -228,28 +235,37 @@ def _way(task: TaskConfig) -> Iterator[ObservationNumber]:
 def _known(part: KnownPart, task: TaskConfig) -> Iterator[ObservationNumber]:
     limit, width = task.lidar.range, 360.0 / part.sectors
     end = f"the end of the farthest sight in this sector ({SHORT_OF:g} m before what its ray meets, at least half way there)"
-    kinds = (
+    kinds = [
         (
             "known freshness",
             f"1 - ln(1 + m) / ln({VIEW_ROOM + 1}), m = views kept since the oldest one that showed {end}; 1 where none did",
         ),
         ("known nearness", f"1 - d / {limit:g} m, d = distance of {end} from the nearest view, at least 0"),
-    )
+    ]
+    if part.progress:
+        kinds.append(("known progress", f"{_progress(task)} to {end}"))
     for name, formula in kinds:
         for k in range(part.sectors):
             where = f"{k * width - 180.0:g} to {(k + 1) * width - 180.0:g} degrees against the heading"
-            yield ObservationNumber(f"{name} {k}", f"{formula}; {where}; 0 without a ray", 0.0, 1.0)
+            low = -1.0 if name.endswith("progress") else 0.0
+            yield ObservationNumber(f"{name} {k}", f"{formula}; {where}; 0 without a ray", low, 1.0)
 
 
 def _reach(part: ReachPart, task: TaskConfig) -> Iterator[ObservationNumber]:
     near, width = near_distance(task), 360.0 / part.sectors
-    for k in range(part.sectors):
-        where = f"f = metres straight on, {k * width - 180.0:g} to {(k + 1) * width - 180.0:g} degrees against the heading"
-        formula = (
-            f"{near:g} / ({near:g} + f), {where}, where it is largest, until a reading ends less than {near:g} m from the "
-            "middle of the body, at most the LiDAR's range"
-        )
+    edges = [k * width - 180.0 for k in range(part.sectors)]
+    wheres = [f"{edge:g} to {edge + width:g} degrees against the heading" for edge in edges]
+    until = f"until a reading ends less than {near:g} m from the middle of the body, at most the LiDAR's range"
+    for k, where in enumerate(wheres):
+        formula = f"{near:g} / ({near:g} + f), f = metres straight on, {where}, where it is largest, {until}"
         yield ObservationNumber(f"reach {k}", formula, near / (near + task.lidar.range), 1.0)
+    for k, where in enumerate(wheres if part.progress else ()):
+        formula = f"{_progress(task)} straight on, {where}, where it is largest, {until}"
+        yield ObservationNumber(f"reach progress {k}", formula, -1.0, 1.0)
+
+
+def _progress(task: TaskConfig) -> str:
+    return f"(metres by which the target comes nearer) / {task.lidar.range:g} m, going"
 
 
 def pack_parts(task: TaskConfig) -> dict[str, object]:
@@ -295,5 +311,7 @@ def _option(part: ObservationPart) -> int:
             return int(part.encoding == "sine_cosine")
         case TrailPart():
             return int(part.memory == "long")
+        case ReachPart() | KnownPart():
+            return int(part.progress)
         case _:
             return 0

@@ -164,6 +164,12 @@ class KnownPart(Frozen):
         "that it has been.",
         json_schema_extra=ADVANCED,
     )
+    progress: bool = Field(
+        False,
+        title="Progress",
+        description="Also one number each for how much nearer to the target that end is.",
+        json_schema_extra=ADVANCED,
+    )
     frames: int = _frames()
 
 
@@ -177,6 +183,12 @@ class ReachPart(Frozen):
         le=120,
         title="Sectors",
         description="Of the full turn around it, one number each: how far it could go where it could go farthest.",
+        json_schema_extra=ADVANCED,
+    )
+    progress: bool = Field(
+        False,
+        title="Progress",
+        description="Also one number each for how much nearer to the target going there would bring it.",
         json_schema_extra=ADVANCED,
     )
     frames: int = _frames()
@@ -324,9 +336,9 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
         case TrailPart():
             return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1
         case ReachPart():
-            return part.sectors
+            return (1 + part.progress) * part.sectors
         case KnownPart():
-            return 2 * part.sectors
+            return (2 + part.progress) * part.sectors
         case AddedObservationPart():
             return len(part.numbers())
         case _:

@@ -211,9 +211,9 @@ class PlainWorld:
             case WayPart():
                 return seen_way(ranges, bearing, self.distance, task)
             case ReachPart():
-                return seen_reach(ranges, part, task)
+                return seen_reach(ranges, bearing, self.distance, part, task)
             case KnownPart():
-                return self._views.seen(ranges, (*self.body.position, heading), part)
+                return self._views.seen(ranges, (*self.body.position, heading), self.target, part)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

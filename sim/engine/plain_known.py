@@ -39,9 +39,15 @@ class PlainViews:
         readings = np.where(told, ranges[: len(self._angles)][rays], 0.0)
         self._views.append((place, np.floor(readings / self._range * FULL_RANGE + 0.5) * self._range / FULL_RANGE))
 
-    def seen(self, ranges: NDArray[np.float64], pose: Sequence[float], part: KnownPart) -> NDArray[np.float64]:
-        """Since when a robot at a pose knows what it sees, given its scan, metres: a part's numbers, (2 * sectors,)."""
-        age, nearness = np.zeros((2, part.sectors))
+    def seen(
+        self, ranges: NDArray[np.float64], pose: Sequence[float], target: Sequence[float], part: KnownPart
+    ) -> NDArray[np.float64]:
+        """Since when a robot at a pose knows what it sees, given its scan, metres: a part's numbers.
+
+        Returns:
+            (2 * sectors,), or (3 * sectors,) with progress.
+        """
+        age, nearness, progress = np.zeros((3, part.sectors))
         angles = _wrapped(self._angles)
         sectors = np.minimum((angles + math.pi) / math.tau * part.sectors + SECTOR_EDGE, part.sectors - 1).astype(int)
         views = self._views[-VIEW_ROOM:]
@@ -57,7 +63,8 @@ class PlainViews:
             followed = len(views) - 1 - shown[0] if shown else 0
             age[sector] = 1.0 - math.log(1.0 + followed) / math.log(1.0 + VIEW_ROOM)
             nearness[sector] = max(1.0 - distances.min(initial=math.inf) / self._range, 0.0)
-        return np.concatenate([age, nearness])
+            progress[sector] = (math.dist(pose[:2], target) - math.dist((x, y), target)) / self._range
+        return np.concatenate([age, nearness, *[progress][: part.progress]])
 
     def _shows(self, view: tuple[tuple[float, float], NDArray[np.float64]], x: float, y: float) -> bool:
         """Whether a place was in sight in a view."""

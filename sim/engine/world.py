@@ -32,7 +32,7 @@ from sim.kernels.disturbances import rays_ahead
 from sim.kernels.known import VIEW_DIRECTIONS
 from sim.kernels.options import bound
 from sim.kernels.random import seed_streams
-from sim.kernels.reach import DIRECTIONS
+from sim.kernels.reach import TOGETHER
 from sim.kernels.records import (
     ARRIVAL,
     DISTANCE_NOISE,
@@ -47,7 +47,7 @@ from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
 from sim.lidar import drawn_ray_angles, padded, ray_angles
-from sim.observations import observation_size
+from sim.observations import observation_size, reach_directions
 from sim.streams import ENVIRONMENT, Stream
 
 Restart = Literal["same step", "next step", "reset"]
@@ -149,6 +149,9 @@ class World:
         angles = drawn_ray_angles(task.lidar, fields)
         lidars = len(task.lidar.mount.places)
         ray_cos, ray_sin = padded(np.cos(angles), lidars), padded(np.sin(angles), lidars)
+        believed = drawn_ray_angles(task.lidar, task.lidar.field_of_view)
+        directions = reach_directions(task)
+        directions = np.resize(directions, 2 * len(directions) + TOGETHER) if len(directions) else directions
         ray_x, ray_y, scan = np.empty((3, ray_cos.shape[1] // lidars), dtype=np.float32)
         self.geometry = Geometry(
             bounds=bounds,
@@ -161,6 +164,10 @@ class World:
             chances=self._sampling.chances if self._sampling else np.empty(0),
             origins=origins,
             ray_angles=ray_angles(task.lidar),
+            scan_cos=np.cos(believed).astype(np.float32),
+            scan_sin=np.sin(believed).astype(np.float32),
+            reach_cos=np.cos(directions).astype(np.float32),
+            reach_sin=np.sin(directions).astype(np.float32),
             ray_x=ray_x,
             ray_y=ray_y,
             scan=scan,
@@ -178,7 +185,6 @@ class World:
         sees_trail = bool(trails)
         sees_ways = any(isinstance(part, TrailPart | WayPart | ReachPart | KnownPart) for part in task.observation.parts)
         knows = any(isinstance(part, KnownPart) for part in task.observation.parts)
-        sectors = sum(part.sectors for part in task.observation.parts if isinstance(part, ReachPart))
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -204,7 +210,7 @@ class World:
                 (robots if sees_trail else 0, LONG_TRAIL_ROOM if "long" in trails else SHORT_TRAIL_ROOM, 2), dtype=np.float32
             ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
-            reach=np.zeros((robots, DIRECTIONS * sectors) if sectors else (0, 0)),
+            reach=np.zeros((robots, len(directions)) if len(directions) else (0, 0), dtype=np.float32),
             view_places=np.zeros((robots if knows else 0, VIEW_ROOM, 2), dtype=np.float32),
             views=np.zeros((robots if knows else 0, VIEW_ROOM, VIEW_DIRECTIONS), dtype=np.uint8),
             views_kept=np.zeros(robots if knows else 0, dtype=np.int32),

@@ -22,6 +22,10 @@ class Geometry(NamedTuple):
         chances: (M,) float64 that an episode begins in an arena or one before it; (0,) where all are as likely.
         origins: (tiles, 2) float64, centre of each tile in the Space.
         ray_angles: (rays,) float64 where the rays of a LiDAR point that the policy believes in, radians against its axis.
+        scan_cos, scan_sin: (scan,) directions of those of each LiDAR in turn against the robot's heading.
+        reach_cos, reach_sin: (2 * directions + TOGETHER,) of what is told of the reach, likewise, from right to left,
+            beginning behind, and round again, so that what lies on both sides of that is one stretch; (0,) where nobody
+            sees it.
         ray_x, ray_y: (rays or some more, see `sim.lidar.padded`) scratch for those of one LiDAR's rays in its arena.
         scan: likewise, for what they read.
         near: (most shapes of a kind + 1,) scratch for those that one robot may see.
@@ -38,6 +42,10 @@ class Geometry(NamedTuple):
     chances: Doubles
     origins: Doubles
     ray_angles: Doubles
+    scan_cos: Floats
+    scan_sin: Floats
+    reach_cos: Floats
+    reach_sin: Floats
     ray_x: Floats
     ray_y: Floats
     scan: Floats
@@ -113,8 +121,8 @@ class Robots(NamedTuple):
         trail: (N, TRAIL_ROOM, 2) x, y of the crumbs of this attempt, where the robot believed to be when it dropped them,
             crumb n in row n modulo the room; (0, TRAIL_ROOM, 2) where nobody sees them.
         crumbs: (N,) how many were dropped; (0,) likewise.
-        reach: (N, directions) metres that the robot could go straight on, from right to left, beginning behind it; (0, 0)
-            where nobody sees them.
+        reach: (N, 2 * directions + TOGETHER) scratch for the metres that the robot could go straight on, in those of
+            `Geometry.reach_cos`; (0, 0) where nobody sees them.
         view_places: (N, VIEW_ROOM, 2) x, y of where views of this attempt were kept, as `trail`; (0, VIEW_ROOM, 2) where
             nobody sees since when it knows what it sees.
         views: (N, VIEW_ROOM, VIEW_DIRECTIONS) uint8, what the first LiDAR read from there in each direction, FULL_RANGE at
@@ -145,7 +153,7 @@ class Robots(NamedTuple):
     commands: Floats
     trail: Floats
     crumbs: Integers
-    reach: Doubles
+    reach: Floats
     view_places: Floats
     views: NDArray[np.uint8]
     views_kept: Integers

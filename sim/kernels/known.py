@@ -90,13 +90,17 @@ def _find_farthest(i, readings, towards, sectors, robots, geometry, p):
 
 
 @kernel(fastmath=FAST)
-def see_known(i, x, y, heading, robots, geometry, p):
-    """Keep a view, and write since when robot i knows what it sees, by sectors from right to left, beginning behind it.
+def see_known(i, x, y, to_x, to_y, heading, robots, geometry, p):
+    """Keep a view, and write since when robot i knows what it sees.
+
+    If it is told, also how much nearer to its target that is. Sector by sector from right to left, beginning behind it.
 
     Args:
         i: the robot.
         x: metres, where it believes to be.
         y: likewise.
+        to_x: metres from there to its target.
+        to_y: likewise.
         heading: likewise, radians.
         robots: `sim.kernels.bundles.Robots`; `view_places`, `views`, `views_kept` and `observations` are written.
         geometry: `sim.kernels.bundles.Geometry`.
@@ -107,6 +111,9 @@ def see_known(i, x, y, heading, robots, geometry, p):
     sectors = p.known_sectors
     freshness = p.part_places[KNOWN_PART]
     nearness = freshness + sectors
+    progress = nearness + sectors
+    is_told = p.part_options[KNOWN_PART]
+    left = np.float32(math.sqrt(to_x * to_x + to_y * to_y))
     _find_farthest(i, freshness, nearness, sectors, robots, geometry, p)
     range_squared = p.range * p.range
     for k in range(sectors):
@@ -114,11 +121,19 @@ def see_known(i, x, y, heading, robots, geometry, p):
         if reading < ZERO:
             out[i, freshness + k] = ZERO
             out[i, nearness + k] = ZERO
+            if is_told:
+                out[i, progress + k] = ZERO
             continue
         ahead = max(reading - _SHORT, reading * _HALF)
         towards = out[i, nearness + k] + heading
-        end_x = x + ahead * np.float32(math.cos(towards))
-        end_y = y + ahead * np.float32(math.sin(towards))
+        ahead_x = ahead * np.float32(math.cos(towards))
+        ahead_y = ahead * np.float32(math.sin(towards))
+        if is_told:
+            beside_x = to_x - ahead_x
+            beside_y = to_y - ahead_y
+            out[i, progress + k] = (left - np.float32(math.sqrt(beside_x * beside_x + beside_y * beside_y))) / p.range
+        end_x = x + ahead_x
+        end_y = y + ahead_y
         nearest = range_squared
         first = kept - 1  # of the views that showed the end; the newest one tells no more than now
         for number in range(max(0, kept - VIEW_ROOM), kept):

@@ -129,10 +129,6 @@ def observe(i, robots, geometry, p):
 @kernel(fastmath=FAST)
 def observe_ways(i, robots, geometry, p):
     """Write what robot i sees of its trail and of ways ahead; apart from `observe`, which it would slow for all others."""
-    if p.part_places[REACH_PART] >= 0:
-        see_reach(i, robots, geometry, p)
-    if p.part_places[TRAIL_PART] < 0 and p.part_places[WAY_PART] < 0 and p.part_places[KNOWN_PART] < 0:
-        return
     x = robots.poses[i, 0]
     y = robots.poses[i, 1]
     heading = robots.poses[i, 2]
@@ -140,13 +136,15 @@ def observe_ways(i, robots, geometry, p):
         x += np.float32(robots.drift[i, 0])
         y += np.float32(robots.drift[i, 1])
         heading = wrapped(heading + np.float32(robots.drift[i, 2]))
+    dx = robots.targets[i, 0] - x
+    dy = robots.targets[i, 1] - y
+    if p.part_places[REACH_PART] >= 0:
+        see_reach(i, dx, dy, heading, robots, geometry, p)
     if p.part_places[TRAIL_PART] >= 0:
         see_trail(i, x, y, heading, robots, geometry, p)
     if p.part_places[KNOWN_PART] >= 0:
-        see_known(i, x, y, heading, robots, geometry, p)
+        see_known(i, x, y, dx, dy, heading, robots, geometry, p)
     if p.part_places[WAY_PART] >= 0:
-        dx = robots.targets[i, 0] - x
-        dy = robots.targets[i, 1] - y
         see_way(i, bearing_of(dx, dy, heading), np.float32(math.sqrt(dx * dx + dy * dy)), robots, geometry, p)
 
 

@@ -20,3 +20,6 @@ VIEW_ROOM = 256
 
 SHORT_OF = 0.2
 """Metres by which the end of a sight lies before what its ray meets; where that is nearer, half way there."""
+
+REACH_DIRECTIONS = 4
+"""Of each sector of the reach, of which the farthest is told: a narrow gap beside its middle is not missed."""

@@ -24,8 +24,8 @@ from tests.sim.scenes import LIDARS, goes_on_bit_for_bit
 FULL = LIDARS["full circle"]
 
 
-def seen(sectors: int = 4, lidar: LidarConfig = FULL, **task: object) -> TaskConfig:
-    parts = (KnownPart(sectors=sectors),)
+def seen(sectors: int = 4, lidar: LidarConfig = FULL, *, progress: bool = False, **task: object) -> TaskConfig:
+    parts = (KnownPart(sectors=sectors, progress=progress),)
     return TaskConfig.model_validate({"lidar": lidar, "observation": ObservationConfig(parts=parts), **task})
 
 
@@ -86,10 +86,19 @@ def test_a_bay_whose_end_was_seen_from_afar_is_known_without_having_been_entered
     assert nearness[right] == pytest.approx(1 - 2.25 / 3.5, abs=0.02)  # nobody entered it
 
 
+def test_progress_is_how_much_nearer_the_target_is_to_the_end_of_a_sight() -> None:
+    # Behind it a wall at 2.5 m, nothing within 3.5 m in the directions of the other rays, the target 5 m away straight ahead.
+    made = world(seen(4, LidarConfig(rays=4, field_of_view=360.0), progress=True))
+    made.reset(poses=(-2.5, 0.0, 0.0), targets=(2.5, 0.0))
+    behind, aside = (5.0 - math.hypot(5.0 + 2.3, 0.0)) / 3.5, (5.0 - math.hypot(5.0, 3.3)) / 3.5
+    assert made.robots.observations[0, 8:] == pytest.approx([behind, aside, 3.3 / 3.5, aside], abs=1e-5)
+
+
 @pytest.mark.parametrize("lidar", LIDARS.values(), ids=LIDARS)
 def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     noisy = OdometryConfig(distance_noise=0.05, heading_noise=0.05)
-    task = seen(24, lidar, arena=ArenaConfig(name="complex"), odometry=noisy, step_limit=2000, arrival_distance=0.05)
+    complex_arena = ArenaConfig(name="complex")
+    task = seen(24, lidar, progress=True, arena=complex_arena, odometry=noisy, step_limit=2000, arrival_distance=0.05)
     part = task.observation.parts[0]
     assert isinstance(part, KnownPart)
     made = World(task, NavigationVectorEnv(task, 1).arenas, 1, seed=3)
@@ -100,7 +109,7 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     for _ in range(400):
         believed = (robots.poses[0] + robots.drift[0]).astype(float)
         plain.keep(robots.ranges[0].astype(float), believed)
-        expected = plain.seen(robots.ranges[0].astype(float), believed, part)
+        expected = plain.seen(robots.ranges[0].astype(float), believed, robots.targets[0].astype(float), part)
         # What lies on the edge of what a view showed falls on either side, and two readings are equally far.
         compared += bool((np.abs(robots.observations[0] - expected) < 1e-3).all())
         old += int(np.count_nonzero(expected[:24] < 0.9))
@@ -122,7 +131,8 @@ def test_the_oldest_views_are_forgotten() -> None:
         drive(made, 1, 1.0, 0.5)
         plain.keep(made.robots.ranges[0].astype(float), made.robots.poses[0].astype(float))
     assert made.robots.views_kept[0] > VIEW_ROOM
-    expected = plain.seen(made.robots.ranges[0].astype(float), made.robots.poses[0].astype(float), part)
+    robots = made.robots
+    expected = plain.seen(robots.ranges[0].astype(float), robots.poses[0].astype(float), (4.5, 4.5), part)
     assert made.robots.observations[0] == pytest.approx(expected, abs=0.02)
     assert 0.0 <= made.robots.observations[0].min() < 0.01
 

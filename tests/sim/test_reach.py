@@ -61,13 +61,14 @@ def test_what_touches_it_leaves_it_the_way_away() -> None:
     # The wall is 0.15 m to its left, and a collision would have been at 0.2 m.
     task = TaskConfig(lidar=FINE, collision_distance=0.1)
     ranges = np.where(np.arange(360) == 270, 0.05, 3.5)  # one reading, straight to the left
-    seen = seen_reach(ranges, ReachPart(sectors=4), task)
+    part = ReachPart(sectors=4)
+    seen = seen_reach(ranges, 0.0, 4.0, part, task.model_copy(update={"observation": ObservationConfig(parts=(part,))}))
     assert seen == pytest.approx([0.105 / 3.605] * 2 + [1.0] * 2)
 
 
 @pytest.mark.parametrize("lidar", LIDARS.values(), ids=LIDARS)
 def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
-    part = ReachPart(sectors=24)
+    part = ReachPart(sectors=24, progress=True)
     task = TaskConfig(
         lidar=lidar,
         observation=ObservationConfig(parts=(part,)),
@@ -79,14 +80,45 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     made.reset()
     random = np.random.default_rng(0)
     differ, told = 0, []
+    robots = made.robots
     for _ in range(400):
-        expected: NDArray[np.float64] = seen_reach(made.robots.ranges[0].astype(float), part, task)
+        x, y, heading = robots.poses[0] + robots.drift[0]
+        dx, dy = robots.targets[0] - (x, y)
+        bearing, distance = np.arctan2(dy, dx) - heading, np.hypot(dx, dy)
+        expected: NDArray[np.float64] = seen_reach(robots.ranges[0].astype(float), bearing, distance, part, task)
         # A direction that passes a reading's end at the very distance of a collision falls on either side.
-        differ += int(np.count_nonzero(np.abs(made.robots.observations[0] - expected) > 1e-3))
+        differ += int(np.count_nonzero(np.abs(robots.observations[0] - expected) > 1e-3))
         told.append(expected)
         made.step(np.array([[random.uniform(0.3, 1.0), random.uniform(-1.0, 1.0)]], np.float32))
     assert differ <= 4
     assert np.ptp(told) > 0.5
+
+
+def test_progress_is_how_much_nearer_the_target_would_be() -> None:
+    # Free all around, the target 5 m away: straight at it would be all of the range. Of a sector's four directions that
+    # nearest to the target is told.
+    observation = ObservationConfig(parts=(ReachPart(sectors=12, progress=True),))
+    made = World(TaskConfig(lidar=FINE, observation=observation), (Arena("room", 9.0, 9.0),), 1, seed=0)
+    made.reset(poses=(0.0, 0.0, np.pi / 2), targets=(3.0, 4.0))
+    bearing = np.arctan2(4.0, 3.0) - np.pi / 2
+    progress = made.robots.observations[0, 12:]
+    for sector in range(12):
+        aside = np.deg2rad(30.0 * sector - 180.0 + np.array([3.75, 11.25, 18.75, 26.25])) - bearing
+        # The third side of a triangle of 5 m and 3.5 m.
+        left = np.sqrt(25.0 + 3.5**2 - 2 * 5.0 * 3.5 * np.cos(aside)).min()
+        assert progress[sector] == pytest.approx((5.0 - left) / 3.5, abs=1e-5)
+    assert progress.argmax() == 4, "37 degrees to its right"
+    assert progress.max() > 0.99
+
+
+def test_behind_a_wall_progress_ends_before_it() -> None:
+    # The face is 1 m ahead: 0.8 m are left, or a little more aside of the middle, to a target 4 m straight ahead.
+    observation = ObservationConfig(parts=(ReachPart(sectors=60, progress=True),))
+    wall = Arena("room", 5.0, 5.0, boxes=np.array([(1.1, 0.0, 0.1, 3.0, 0.0)]))
+    made = World(TaskConfig(lidar=FINE, observation=observation), (wall,), 1, seed=0)
+    made.reset(poses=(0.0, 0.0, 0.0), targets=(4.0, 0.0))
+    ahead = made.robots.observations[0, 60 + 29 : 60 + 31]
+    assert ahead == pytest.approx([0.8 / 3.5] * 2, abs=2e-3)
 
 
 def test_a_state_that_was_kept_with_the_reach_goes_on_without() -> None:

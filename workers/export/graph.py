@@ -32,7 +32,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from sim.actions import ActionComponent
 from workers.export.names import ACTION, MEMORY, NEXT_MEMORY, OBSERVATION
-from workers.export.ros2.mapless_navigator.observation import DIRECTIONS, READ_OFF_SCAN, ray_angles
+from workers.export.ros2.mapless_navigator.observation import DIRECTIONS, READ_OFF_SCAN, ray_angles, reach_directions
 from workers.export.ros2.mapless_navigator.policy import Forward, Part, Specification
 from workers.export.tracing import trace
 from workers.kernels.constants import LEAKY_SLOPE
@@ -80,7 +80,7 @@ def scan_inputs(specification: Specification) -> dict[str, int]:
     """The inputs of a scan graph, and how many columns each has: what this policy's observation is made of."""
     kinds = {part.kind for part in specification.parts}
     actions = len(specification.action_limits)
-    inputs = {RANGES: specification.scan_size} if kinds & {*READ_OFF_SCAN, "way"} else {}
+    inputs = {RANGES: specification.scan_size} if kinds & {*READ_OFF_SCAN, "way", "reach_progress"} else {}
     brought = {part.kind: part.size for part in specification.parts if part.brought}
     if kinds - brought.keys() - {*READ_OFF_SCAN, "speeds", "actions"}:
         inputs |= {POSE: 3, TARGET: 2}
@@ -186,12 +186,13 @@ class _Graph:
             "heading_turn": lambda: self._part_of_turn(heading),
             "deviation": lambda: self._node("Div", self._node("Abs", bearing), pi),
             "way": lambda: self._free_way(specification, bearing, distance),
+            "reach_progress": lambda: self._reach_and_progress(specification, bearing, distance),
         }
 
     def _seen(self, specification: Specification, part: Part) -> str:
         """The scan as the policy sees it."""
         if part.kind == "reach":
-            return self._reach(specification, part.size)
+            return self._nearness_of_reach(specification, self._reach(specification, part.size))
         scan = self._node("Min", RANGES, self._number(specification.range))
         batches = np.array([-1, part.size, specification.scan_size // part.size], np.int64)
         nearest = self._node("ReduceMin", self._node("Reshape", scan, self._constant(batches)), axes=[2], keepdims=0)
@@ -219,10 +220,30 @@ class _Graph:
         whole = self._node("Cast", self._node("GreaterOrEqual", free, length), to=TensorProto.FLOAT)
         return self._node("Concat", self._node("Where", is_left, share, self._number(1.0)), whole, axis=1)
 
+    def _nearness_of_reach(self, specification: Specification, reach: str) -> str:
+        """What is told of the reach: of each sector's directions the farthest."""
+        near = self._number(specification.near)
+        farthest = self._node("ReduceMax", reach, axes=[2], keepdims=0)
+        return self._node("Div", near, self._node("Add", near, farthest))
+
+    def _reach_and_progress(self, specification: Specification, bearing: str, distance: str) -> str:
+        """What is told of the reach, and how much nearer to the target it would bring the robot."""
+        (size,) = (part.size for part in specification.parts if part.kind == "reach_progress")
+        reach = self._reach(specification, size // 2)
+        directions = reach_directions(size // 2).reshape(1, -1, DIRECTIONS)
+        one_each = self._constant(np.array([-1, 1, 1], np.int64))
+        squares = []
+        for operator, turned in (("Cos", np.cos(directions)), ("Sin", np.sin(directions))):
+            to_go = self._node("Reshape", self._node("Mul", distance, self._node(operator, bearing)), one_each)
+            left = self._node("Sub", to_go, self._node("Mul", reach, self._numbers(turned)))
+            squares.append(self._node("Mul", left, left))
+        least = self._node("ReduceMin", self._node("Sqrt", self._node("Add", *squares)), axes=[2], keepdims=0)
+        progress = self._node("Div", self._node("Sub", distance, least), self._number(specification.range))
+        return self._node("Concat", self._nearness_of_reach(specification, reach), progress, axis=1)
+
     def _reach(self, specification: Specification, sectors: int) -> str:
-        """How far the robot could go in each sector: along each direction, and of them the farthest."""
-        count, near = sectors * DIRECTIONS, self._number(specification.near)
-        directions = (((np.arange(count) + 0.5) / count - 0.5) * 2.0 * math.pi)[:, None]
+        """How far the robot could go along each direction of each sector, (n, sectors, directions)."""
+        near, directions = self._number(specification.near), reach_directions(sectors)[:, None]
         cos, sin = self._numbers(np.cos(directions)), self._numbers(np.sin(directions))
         rays = self._constant(np.array([-1, 1, specification.scan_size], np.int64))
         x, y, is_short = (self._node("Reshape", values, rays) for values in self._ends(specification))
@@ -236,9 +257,7 @@ class _Graph:
         until = self._node("Max", self._node("Sub", along, before), self._number(0.0))
         free = self._node("Where", meets, until, self._number(specification.range))
         nearest = self._node("ReduceMin", free, axes=[2], keepdims=0)
-        in_sectors = self._node("Reshape", nearest, self._constant(np.array([-1, sectors, DIRECTIONS], np.int64)))
-        farthest = self._node("ReduceMax", in_sectors, axes=[2], keepdims=0)
-        return self._node("Div", near, self._node("Add", near, farthest))
+        return self._node("Reshape", nearest, self._constant(np.array([-1, sectors, DIRECTIONS], np.int64)))
 
     def _ends(self, specification: Specification) -> tuple[str, str, str]:
         """Where readings end, x and y in the robot's frame, and whether they end within the range."""

@@ -19,9 +19,9 @@ from mapless_navigator.policy import Policy
 IMPORTS
 policy = Policy.load("policy")
 ranges = [[3.5] * policy.specification.scan_size]  # metres, from right to left
-pose = [0.0, 0.0, 0.0]  # x, y, heading
+pose, target = [0.0, 0.0, 0.0], [2.0, 1.0]  # x, y, heading; x, y
 frames = Frames(policy.specification)  # of one robot, from start to target
-WAYSobservation = frames.push(observe(policy.specification, ranges, [pose], [[2.0, 1.0]], [[ZEROS]]ADDED))
+WAYSobservation = frames.push(observe(policy.specification, ranges, [pose], [target], [[ZEROS]]ADDED))
 STEPprint(f"FORMAT")
 """
 
@@ -120,7 +120,7 @@ def _filled(example: str, specification: Specification) -> str:
         "ackermann": ("linear", "steering"),
     }[specification.drive]
     added = {
-        part.kind: f"[{_way(part)}.see(ranges[0], pose)]" if part.is_remembered else str([[0.0] * part.size])
+        part.kind: f"[{_seen(part)}]" if part.is_remembered else str([[0.0] * part.size])
         for part in _brought_parts(specification)
     }
     brought = ", ".join(f'"{kind}": {numbers}' for kind, numbers in added.items())
@@ -197,12 +197,17 @@ def _way(part: Part) -> str:
     return "trail" if part.is_trail else "views"
 
 
+def _seen(part: Part) -> str:
+    """What that module tells, as code."""
+    return "trail.see(ranges[0], pose)" if part.is_trail else "views.see(ranges[0], pose, target)"
+
+
 def _at_first(part: Part, specification: Specification) -> str:
     """What a robot that has not moved, and sees nothing within its range, brings, as code."""
     if part.added:
         return f"np.zeros((1, {part.size}), np.float32)"
     if not part.is_trail:
-        seen = Views(specification).see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0))
+        seen = Views(specification).see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0), (2.0, 1.0))
         return f"np.array([{[round(number, 6) for number in seen.tolist()]}], np.float32)"
     return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / {161 if part.kind == 'long_trail' else 41}"
 

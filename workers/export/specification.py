@@ -15,9 +15,11 @@ from sim.config import (
     BearingPart,
     DistancePart,
     HeadingPart,
+    KnownPart,
     ObservationPart,
     OmnidirectionalDrive,
     RangesPart,
+    ReachPart,
     TaskConfig,
     TrailPart,
 )
@@ -110,6 +112,8 @@ def _kind(part: ObservationPart) -> str:
             return "heading_turn"
         case TrailPart(memory="long"):
             return "long_trail"
+        case ReachPart(progress=True) | KnownPart(progress=True):
+            return f"{part.name}_progress"
         case _:
             return part.name
 

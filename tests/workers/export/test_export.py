@@ -87,7 +87,13 @@ TASKS = [
         lidar=LidarConfig(rays=12, mount=TWO),
         observation=ObservationConfig(parts=(ReachPart(sectors=6, frames=2),)),
     ),
+    TaskConfig(
+        robot=JackalConfig(),
+        lidar=LidarConfig(rays=12, mount=TWO),
+        observation=ObservationConfig(parts=(ReachPart(sectors=6, progress=True, frames=2), BearingPart())),
+    ),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), TrailPart(sectors=8), KnownPart(sectors=8, frames=2)))),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), KnownPart(sectors=8, progress=True)))),
 ]
 
 
@@ -110,7 +116,9 @@ TASKS = [
         "long trail",
         "way",
         "reach",
+        "reach with progress",
         "known",
+        "known with progress",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
@@ -204,8 +212,9 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart())),
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(memory="long"))),
         ObservationConfig(parts=(RangesPart(), TrailPart(), KnownPart(sectors=8))),
+        ObservationConfig(parts=(RangesPart(), ReachPart(progress=True), KnownPart(sectors=8, progress=True))),
     ],
-    ids=["one moment", "four moments", "trail", "long trail", "known"],
+    ids=["one moment", "four moments", "trail", "long trail", "known", "progress"],
 )
 def test_readme_examples_run_and_agree(
     make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, observation: ObservationConfig

@@ -103,8 +103,9 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
         (TrailPart(), Trail, "sees its trail"),
         (TrailPart(memory="long"), Trail, "sees its trail"),
         (KnownPart(), Views, "remembers views"),
+        (KnownPart(progress=True), Views, "remembers views"),
     ],
-    ids=["short trail", "long trail", "known"],
+    ids=["short trail", "long trail", "known", "known with progress"],
 )
 def test_what_it_remembers_of_its_way_is_the_simulators(
     make_checkpoint: Callable[..., Path], part: TrailPart | KnownPart, remembers: type[Trail | Views], refusal: str
@@ -118,7 +119,8 @@ def test_what_it_remembers_of_its_way_is_the_simulators(
     ways = unequal = 0
     for _ in range(300):
         known = env.ranges, env.poses, env.targets, np.zeros((1, 2))
-        seen = {way.kind: way.see(env.ranges[0], env.poses[0])[None]}
+        sight = env.ranges[0], env.poses[0]
+        seen = {way.kind: (way.see(*sight, env.targets[0]) if isinstance(way, Views) else way.see(*sight))[None]}
         made = observe(exported.specification, *known, added=seen)
         # A crumb on the edge of a sector, what lies on the edge of what a ray meets, falls on either side.
         unequal += int(np.abs(made - observations).max() > 1e-4)

@@ -7564,6 +7564,12 @@ export interface components {
              */
             name: "known";
             /**
+             * Progress
+             * @description Also one number each for how much nearer to the target that end is.
+             * @default false
+             */
+            progress: boolean;
+            /**
              * Sectors
              * @description Of the full turn around it, two numbers each: since when it knows the end of its sight, how near to that it has been.
              * @default 30
@@ -7586,6 +7592,12 @@ export interface components {
              * @enum {string}
              */
             name: "known";
+            /**
+             * Progress
+             * @description Also one number each for how much nearer to the target that end is.
+             * @default false
+             */
+            progress: boolean;
             /**
              * Sectors
              * @description Of the full turn around it, two numbers each: since when it knows the end of its sight, how near to that it has been.
@@ -10461,6 +10473,12 @@ export interface components {
              */
             name: "reach";
             /**
+             * Progress
+             * @description Also one number each for how much nearer to the target going there would bring it.
+             * @default false
+             */
+            progress: boolean;
+            /**
              * Sectors
              * @description Of the full turn around it, one number each: how far it could go where it could go farthest.
              * @default 60
@@ -10483,6 +10501,12 @@ export interface components {
              * @enum {string}
              */
             name: "reach";
+            /**
+             * Progress
+             * @description Also one number each for how much nearer to the target going there would bring it.
+             * @default false
+             */
+            progress: boolean;
             /**
              * Sectors
              * @description Of the full turn around it, one number each: how far it could go where it could go farthest.

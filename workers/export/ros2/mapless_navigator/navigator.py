@@ -237,7 +237,9 @@ class Navigator:
             self._speeds()[None].astype(float),
         )
         added = dict(self._make_added(*known)) if self._make_added else {}
-        added |= {way.kind: way.see(ranges, pose)[None] for way in self._ways}
+        for way in self._ways:
+            seen = way.see(ranges, pose, goal) if isinstance(way, Views) else way.see(ranges, pose)
+            added[way.kind] = seen[None]
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)
 

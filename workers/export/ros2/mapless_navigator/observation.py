@@ -15,9 +15,10 @@
 | `heading_turn`         | (heading mod 2 pi) / 2 pi                                                  |
 | `deviation`            | |bearing| / pi                                                             |
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
-| `known`                | since when it knows what it sees, see `views.py`: likewise                   |
+| `known`, `known_progress` | since when it knows what it sees, see `views.py`: likewise              |
 | `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
 | `reach`                | near / (near + how far it could go straight on), all around, see `reach`   |
+| `reach_progress`       | the same, and how much nearer to the target / range that would bring it    |
 | `extension.part`       | what an extension's code makes: whoever calls brings them along            |
 
 Rays go from right to left, of one LiDAR after the other. Poses and targets stand in one fixed frame (the odometry's), whose
@@ -112,6 +113,9 @@ def observe(
     scan = np.asarray(ranges, np.float64)
     if any(part.kind == "way" for part in specification.parts):
         told["way"] = free_way(specification, scan, bearing, distance)
+    for part in specification.parts:
+        if part.kind == "reach_progress":
+            told[part.kind] = reach_and_progress(specification, scan, bearing, distance, part.size // 2)
     columns = [
         _seen(specification, part, scan) if part.kind in READ_OFF_SCAN else told[part.kind] for part in specification.parts
     ]
@@ -133,9 +137,9 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
             raise PolicyFileError(
                 f"this policy sees its trail: give what Trail.see tells to observe(added={{{part.kind!r}: [numbers]}})"
             )
-        if part.kind == "known" and part.kind not in known:
+        if part.is_remembered and part.kind not in known:
             raise PolicyFileError(
-                "this policy remembers views: give what Views.see tells to observe(added={'known': [numbers]})"
+                f"this policy remembers views: give what Views.see tells to observe(added={{{part.kind!r}: [numbers]}})"
             )
         if part.added and part.kind not in known:
             raise PolicyFileError(
@@ -178,18 +182,44 @@ def reach(specification: Specification, scan: Reals, sectors: int) -> Reals:
         sectors: of the full turn around it.
 
     Returns:
-        (n, sectors) metres, in each the farthest of four directions, at most the LiDAR's range; from right to left,
-        beginning behind it.
+        (n, sectors, 4) metres in the directions of each sector, at most the LiDAR's range; from right to left, beginning
+        behind it.
     """
     x, y = (values[:, None] for values in _ends(specification, scan))
-    count, near = sectors * DIRECTIONS, specification.near
-    directions = (((np.arange(count) + 0.5) / count - 0.5) * _TURN)[:, None]
+    near, directions = specification.near, reach_directions(sectors)[:, None]
     along, across = x * np.cos(directions) + y * np.sin(directions), y * np.cos(directions) - x * np.sin(directions)
     until = np.maximum(along - np.sqrt(np.maximum(near**2 - across**2, 0.0)), 0.0)
     meets = (scan < specification.range)[:, None] & (along > 0.0) & (np.abs(across) < near)
-    free = np.where(meets, until, specification.range).min(axis=2)
-    farthest: Reals = free.reshape(len(scan), sectors, DIRECTIONS).max(axis=2)
-    return farthest
+    free: Reals = np.where(meets, until, specification.range).min(axis=2)
+    return free.reshape(len(scan), sectors, DIRECTIONS)
+
+
+def reach_and_progress(specification: Specification, scan: Reals, bearing: Reals, distance: Reals, sectors: int) -> Reals:
+    """How far a robot could go, and how much nearer to its target that would bring it: what `reach_progress` tells.
+
+    Args:
+        specification: the policy's.
+        scan: (n, scan) metres.
+        bearing: (n,) radians, of the target against the heading.
+        distance: (n,) metres.
+        sectors: of the full turn around it.
+
+    Returns:
+        (n, 2 * sectors): from 0 to 1 of the farthest of four directions, from -1 to 1 of that which brings it nearest.
+    """
+    free = reach(specification, scan, sectors)
+    directions = reach_directions(sectors).reshape(sectors, DIRECTIONS)
+    to_x, to_y = (distance * np.cos(bearing))[:, None, None], (distance * np.sin(bearing))[:, None, None]
+    left = np.hypot(to_x - free * np.cos(directions), to_y - free * np.sin(directions))
+    progress = (distance[:, None] - left.min(axis=2)) / specification.range
+    return np.concatenate((specification.near / (specification.near + free.max(axis=2)), progress), axis=1)
+
+
+def reach_directions(sectors: int) -> Reals:
+    """Directions of which the reach is told, (4 * sectors,) radians against the heading, from right to left."""
+    count = sectors * DIRECTIONS
+    directions: Reals = ((np.arange(count) + 0.5) / count - 0.5) * _TURN
+    return directions
 
 
 def _ends(specification: Specification, scan: Reals) -> tuple[Reals, Reals]:
@@ -202,7 +232,8 @@ def _ends(specification: Specification, scan: Reals) -> tuple[Reals, Reals]:
 def _seen(specification: Specification, part: Part, scan: Reals) -> Reals:
     """A scan (n, rays) as the policy sees it, (n, numbers of the part)."""
     if part.kind == "reach":
-        return specification.near / (specification.near + reach(specification, scan, part.size))
+        farthest: Reals = reach(specification, scan, part.size).max(axis=2)
+        return specification.near / (specification.near + farthest)
     nearest: Reals = scan.reshape(len(scan), part.size, -1).min(axis=2)
     if part.kind == "ranges":
         return nearest / specification.range

@@ -43,7 +43,9 @@ KINDS = (
     "long_trail",
     "way",
     "reach",
+    "reach_progress",
     "known",
+    "known_progress",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
@@ -79,7 +81,7 @@ class Part:
     @property
     def is_remembered(self) -> bool:
         """Whether it takes a memory of the robot's way: its trail, or its views, see `views.py`."""
-        return self.is_trail or self.kind == "known"
+        return self.is_trail or self.kind in ("known", "known_progress")
 
     @property
     def brought(self) -> bool:

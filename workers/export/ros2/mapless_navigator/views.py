@@ -9,6 +9,7 @@ is asked for in them:
 |-----------|---------------------------------------------------------------------------------------------------|
 | freshness | of the oldest view that showed it, 1 - ln(1 + m) / ln(257), m views kept since; 1 where none did    |
 | nearness  | 1 - distance of the nearest view / range of the LiDAR, at least 0                                  |
+| progress  | how much nearer to the target that end is than the robot / range; in `known_progress` only         |
 
 sector by sector each, 0 in sectors without a ray. A view showed a place where what it read towards it is at most 0.1 m less
 than how far that is.
@@ -42,8 +43,9 @@ class Views:
     """
 
     def __init__(self, specification: Specification) -> None:
-        (part,) = (part for part in specification.parts if part.kind == "known")
-        self.kind, self._sectors = part.kind, part.size // 2
+        (part,) = (part for part in specification.parts if part.kind in ("known", "known_progress"))
+        self.kind, kinds = part.kind, 3 if part.kind == "known_progress" else 2
+        self._sectors, self._kinds = part.size // kinds, kinds
         self._range = specification.range
         self._angles = wrap(ray_angles(specification) + specification.mounts[0][2])
         self._reach = (ray_angles(specification)[1] - ray_angles(specification)[0]) / 2.0
@@ -58,34 +60,38 @@ class Views:
         self._places.clear()
         self._readings.clear()
 
-    def see(self, ranges: ArrayLike, pose: ArrayLike) -> Reals:
+    def see(self, ranges: ArrayLike, pose: ArrayLike, target: ArrayLike) -> Reals:
         """Keep a view where it is time to, and tell what it showed before; once per control period.
 
         Args:
             ranges: (scan,) metres, as the policy sees them.
             pose: x, y in metres and heading in radians.
+            target: x, y in metres, in the same frame.
 
         Returns:
-            (2 * sectors,).
+            (2 * sectors,), with progress (3 * sectors,).
         """
         scan = np.asarray(ranges, np.float64)[: len(self._angles)]
         x, y, heading = np.asarray(pose, np.float64)
         if not self._places or np.hypot(self._places[-1][0] - x, self._places[-1][1] - y) >= SPACING:
             self._places.append((x, y))
             self._readings.append(self._all_round(scan, heading))
-        freshness, nearness = np.zeros((2, self._sectors))
+        goal = np.asarray(target, np.float64)
+        freshness, nearness, progress = np.zeros((3, self._sectors))
         for sector in np.unique(self._of_rays):
             rays = np.flatnonzero(self._of_rays == sector)
             ray = rays[scan[rays].argmax()]
             ahead = max(scan[ray] - SHORT_OF, 0.5 * scan[ray])
             towards = self._angles[ray] + heading
-            offsets = np.array((x + ahead * np.cos(towards), y + ahead * np.sin(towards))) - np.array(self._places)
+            end = np.array((x + ahead * np.cos(towards), y + ahead * np.sin(towards)))
+            offsets = end - np.array(self._places)
             distances = np.hypot(*offsets.T)
             showed = np.flatnonzero(self._show(offsets, distances))
             followed = len(distances) - 1 - showed[0] if len(showed) else 0
             freshness[sector] = 1.0 - np.log1p(followed) / np.log1p(ROOM)
             nearness[sector] = max(1.0 - distances.min() / self._range, 0.0)
-        return np.concatenate((freshness, nearness))
+            progress[sector] = (np.hypot(*(goal - (x, y))) - np.hypot(*(goal - end))) / self._range
+        return np.concatenate((freshness, nearness, progress)[: self._kinds])
 
     def _all_round(self, scan: Reals, heading: float) -> Reals:
         """What a scan reads in each direction of a view, (DIRECTIONS,) metres; 0 where no ray points."""
