@@ -87,7 +87,7 @@ def test_a_bay_whose_end_was_seen_from_afar_is_known_without_having_been_entered
 
 
 def test_progress_is_how_much_nearer_the_target_is_to_the_end_of_a_sight() -> None:
-    # Behind it a wall at 2.5 m, nothing within 3.5 m in the directions of the other rays, the target 5 m away straight ahead.
+    # Behind it a wall at 2.5 m, nothing within 3.5 m where the other rays point, the target 5 m away straight ahead.
     made = world(seen(4, LidarConfig(rays=4, field_of_view=360.0), progress=True))
     made.reset(poses=(-2.5, 0.0, 0.0), targets=(2.5, 0.0))
     behind, aside = (5.0 - math.hypot(5.0 + 2.3, 0.0)) / 3.5, (5.0 - math.hypot(5.0, 3.3)) / 3.5
