@@ -80,13 +80,12 @@ def see_reach(i, to_x, to_y, heading, robots, geometry, p):
         if reading < p.range:
             x = np.float32(p.mounts[ray // rays, 0]) + reading * geometry.scan_cos[ray]
             y = np.float32(p.mounts[ray // rays, 1]) + reading * geometry.scan_sin[ray]
+            distance = reading
+            towards = np.float32(geometry.ray_angles[ray % rays])
             if p.mounted:
                 distance = np.float32(math.sqrt(x * x + y * y))
                 towards = np.float32(math.atan2(y, x))
-                _shorten(reach, cos, sin, count, p.near, x, y, distance, towards)
-            else:
-                towards = np.float32(geometry.ray_angles[ray])
-                _shorten(reach, cos, sin, count, p.near, x, y, reading, towards)
+            _shorten(reach, cos, sin, count, p.near, x, y, distance, towards)
     for turn in range(count, reach.shape[0], count):
         for k in range(min(count, reach.shape[0] - turn)):
             reach[k] = min(reach[k], reach[turn + k])
