@@ -23,6 +23,7 @@ from sim.config import (
     HeadingPart,
     KnownPart,
     ObservationPart,
+    OpeningsPart,
     RangesPart,
     ReachPart,
     SpeedsPart,
@@ -188,6 +189,8 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return tuple(_reach(part, task))
         case KnownPart():
             return tuple(_known(part, task))
+        case OpeningsPart():
+            return tuple(_openings(part, task))
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -249,6 +252,31 @@ def _known(part: KnownPart, task: TaskConfig) -> Iterator[ObservationNumber]:
             where = f"{k * width - 180.0:g} to {(k + 1) * width - 180.0:g} degrees against the heading"
             low = -1.0 if name.endswith("progress") else 0.0
             yield ObservationNumber(f"{name} {k}", f"{formula}; {where}; 0 without a ray", low, 1.0)
+
+
+def _openings(part: OpeningsPart, task: TaskConfig) -> Iterator[ObservationNumber]:
+    for k in range(part.count):
+        place = f"the place to go to first on the way to opening {k}"
+        yield ObservationNumber(
+            f"opening {k}, sine of bearing", f"sin(bearing of {place}); 0 where there is none", -1.0, 1.0
+        )
+        yield ObservationNumber(
+            f"opening {k}, cosine of bearing", f"cos(bearing of {place}); 0 where there is none", -1.0, 1.0
+        )
+        yield ObservationNumber(
+            f"opening {k}, nearness", f"1 - d / {task.lidar.range:g} m, d = distance of {place}, at least 0", 0.0, 1.0
+        )
+        yield ObservationNumber(
+            f"opening {k}, way",
+            f"w / (w + 1 m), w = metres from the newest view to opening {k} by ways that it knows",
+            0.0,
+            1.0,
+        )
+        yield ObservationNumber(
+            f"opening {k}, rest", f"r / (r + 1 m), r = metres straight on from opening {k} to the target", 0.0, 1.0
+        )
+        free = f"1 where the body can go straight on to opening {k} from the view that saw it, else 0"
+        yield ObservationNumber(f"opening {k}, free", free, 0.0, 1.0)
 
 
 def _reach(part: ReachPart, task: TaskConfig) -> Iterator[ObservationNumber]:
@@ -313,5 +341,7 @@ def _option(part: ObservationPart) -> int:
             return int(part.memory == "long")
         case ReachPart() | KnownPart():
             return int(part.progress)
+        case OpeningsPart():
+            return part.count
         case _:
             return 0

@@ -13,7 +13,7 @@ from sim.config.base import ADVANCED, Frozen
 from sim.extending.discovery import added, complete, with_added
 from sim.extending.parts import ObservationPart as AddedPart
 from sim.extending.parts import check_numbers
-from sim.kernels.room import LONG_TRAIL_KINDS, MAX_FRAMES, MAX_PARTS, SHORT_TRAIL_KINDS
+from sim.kernels.room import LONG_TRAIL_KINDS, MAX_FRAMES, MAX_LEADS, MAX_PARTS, OPENING_KINDS, SHORT_TRAIL_KINDS
 
 MAX_NUMBERS = 4_000
 """Numbers of one observation, at most: all rays of a full scanner at all moments, and some more."""
@@ -173,6 +173,22 @@ class KnownPart(Frozen):
     frames: int = _frames()
 
 
+class OpeningsPart(Frozen):
+    """Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free."""
+
+    name: Literal["openings"] = Field("openings", title="Openings to look into")
+    count: int = Field(
+        2,
+        ge=1,
+        le=MAX_LEADS,
+        title="Openings",
+        description="The best ones, five numbers each: where to go first on the way there, how far it is, how far on from "
+        "there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.",
+        json_schema_extra=ADVANCED,
+    )
+    frames: int = _frames()
+
+
 class ReachPart(Frozen):
     """How far its body could go straight on in each direction, as its scan shows: gaps that it fits through."""
 
@@ -218,6 +234,7 @@ BuiltInPart = (
     | WayPart
     | ReachPart
     | KnownPart
+    | OpeningsPart
 )
 
 if TYPE_CHECKING:
@@ -337,6 +354,8 @@ def part_size(part: ObservationPart, actions: int, scanners: int) -> int:
             return (LONG_TRAIL_KINDS if part.memory == "long" else SHORT_TRAIL_KINDS) * part.sectors + 1
         case ReachPart():
             return (1 + part.progress) * part.sectors
+        case OpeningsPart():
+            return OPENING_KINDS * part.count
         case KnownPart():
             return (2 + part.progress) * part.sectors
         case AddedObservationPart():

@@ -25,6 +25,7 @@ from sim.config import (
     HeadingPart,
     KnownPart,
     ObservationPart,
+    OpeningsPart,
     RangesPart,
     ReachPart,
     RewardTerm,
@@ -37,9 +38,11 @@ from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
-from sim.engine.plain_known import PlainViews
+from sim.engine.plain_known import seen_known
+from sim.engine.plain_openings import PlainOpenings
 from sim.engine.plain_reach import seen_reach
 from sim.engine.plain_trail import PlainTrail
+from sim.engine.plain_views import PlainViews
 from sim.engine.plain_way import seen_way
 from sim.engine.rewards import constants, evaluate, parameters_of, program_of
 from sim.extending.observing import Sight
@@ -125,9 +128,9 @@ class PlainWorld:
         self._trail = PlainTrail(task.lidar)
         self._trail.drop(pose[:2])
         self._views = PlainViews(task.lidar)
-        self._sees_views = any(isinstance(part, KnownPart) for part in task.observation.parts)
-        if self._sees_views:
-            self._views.keep(self.scan(), pose)
+        self._openings = PlainOpenings(task.lidar, near_distance(task), self._views)
+        self._sees_views = any(isinstance(part, KnownPart | OpeningsPart) for part in task.observation.parts)
+        self._keep_view(self.scan())
         self._seen: list[list[NDArray[np.float64]]] = []
         self._added_parts = AddedParts(task)
         if task.observation.frames > 1:
@@ -175,13 +178,16 @@ class PlainWorld:
         """The task's observation after a step: what it sees now before what it saw earlier, see `sim.observations`."""
         parts = self.task.observation.parts
         self._trail.drop(self.body.position)
-        if self._sees_views:
-            self._views.keep(ranges, (*self.body.position, self.body.angle))
+        self._keep_view(ranges)
         now = [self._part(part, ranges) for part in parts]
         self._seen = [now, *(self._seen or [now] * self.task.observation.frames)][: self.task.observation.frames]
         return np.concatenate(
             [seen[k] for age, seen in enumerate(self._seen) for k, part in enumerate(parts) if age < part.frames]
         )
+
+    def _keep_view(self, ranges: NDArray[np.float64]) -> None:
+        if self._sees_views and self._views.keep(ranges, (*self.body.position, self.body.angle)):
+            self._openings.look()
 
     def _part(self, part: ObservationPart, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
         """The numbers of one part, see `sim.config.observation`."""
@@ -213,7 +219,9 @@ class PlainWorld:
             case ReachPart():
                 return seen_reach(ranges, bearing, self.distance, part, task)
             case KnownPart():
-                return self._views.seen(ranges, (*self.body.position, heading), self.target, part)
+                return seen_known(self._views.kept, ranges, (*self.body.position, heading), self.target, part, task.lidar)
+            case OpeningsPart():
+                return self._openings.seen(ranges, (*self.body.position, heading), self.target, part)
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

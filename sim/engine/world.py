@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import KnownPart, RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
+from sim.config import KnownPart, OpeningsPart, RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -29,7 +29,7 @@ from sim.extending.observing import Sight
 from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
-from sim.kernels.known import VIEW_DIRECTIONS
+from sim.kernels.openings import LEAD_NUMBERS
 from sim.kernels.options import bound
 from sim.kernels.random import seed_streams
 from sim.kernels.reach import TOGETHER
@@ -43,9 +43,10 @@ from sim.kernels.records import (
     RATE,
     ROBOT,
 )
-from sim.kernels.room import LONG_TRAIL_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
+from sim.kernels.room import LINK_ROOM, LONG_TRAIL_ROOM, MAX_LEADS, OPENING_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
+from sim.kernels.views import VIEW_DIRECTIONS
 from sim.lidar import drawn_ray_angles, padded, ray_angles
 from sim.observations import observation_size, reach_directions
 from sim.streams import ENVIRONMENT, Stream
@@ -183,8 +184,11 @@ class World:
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
         trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
         sees_trail = bool(trails)
-        sees_ways = any(isinstance(part, TrailPart | WayPart | ReachPart | KnownPart) for part in task.observation.parts)
-        knows = any(isinstance(part, KnownPart) for part in task.observation.parts)
+        sees_ways = any(
+            isinstance(part, TrailPart | WayPart | ReachPart | KnownPart | OpeningsPart) for part in task.observation.parts
+        )
+        knows = any(isinstance(part, KnownPart | OpeningsPart) for part in task.observation.parts)
+        looks = robots if any(isinstance(part, OpeningsPart) for part in task.observation.parts) else 0
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
         self.robots = Robots(
             records=np.zeros(robots, dtype=ROBOT),
@@ -214,6 +218,14 @@ class World:
             view_places=np.zeros((robots if knows else 0, VIEW_ROOM, 2), dtype=np.float32),
             views=np.zeros((robots if knows else 0, VIEW_ROOM, VIEW_DIRECTIONS), dtype=np.uint8),
             views_kept=np.zeros(robots if knows else 0, dtype=np.int32),
+            view_links=np.zeros((looks, VIEW_ROOM, LINK_ROOM), dtype=np.int32),
+            view_ways=np.zeros((looks, VIEW_ROOM), dtype=np.float32),
+            view_next=np.zeros((looks, VIEW_ROOM), dtype=np.int32),
+            view_sights=np.zeros((looks, VIEW_ROOM), dtype=np.uint8),
+            opening_places=np.zeros((looks, OPENING_ROOM, 2), dtype=np.float32),
+            opening_views=np.zeros((looks, OPENING_ROOM), dtype=np.int32),
+            opening_frees=np.zeros((looks, OPENING_ROOM), dtype=np.bool_),
+            leads=np.zeros((looks, MAX_LEADS, LEAD_NUMBERS), dtype=np.float32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),
         )

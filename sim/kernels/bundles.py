@@ -128,6 +128,16 @@ class Robots(NamedTuple):
         views: (N, VIEW_ROOM, VIEW_DIRECTIONS) uint8, what the first LiDAR read from there in each direction, FULL_RANGE at
             its range, 0 where no ray pointed; (0, ...) likewise.
         views_kept: (N,) how many were kept; (0,) likewise.
+        view_links: (N, VIEW_ROOM, LINK_ROOM) numbers of earlier views that a view is linked to, behind them -1; (0, ...)
+            where nobody sees openings.
+        view_ways: (N, VIEW_ROOM) metres from the newest view to each other one by links; (0, ...) likewise.
+        view_next: (N, VIEW_ROOM) number of the view by which it goes there, -1 for the newest; (0, ...) likewise.
+        view_sights: (N, VIEW_ROOM) uint8, 0 where it did not show the target, 2 where the way there is free; (0, ...)
+            likewise.
+        opening_places: (N, OPENING_ROOM, 2) x, y of openings, as `trail`; (0, ...) likewise.
+        opening_views: (N, OPENING_ROOM) number of the view that saw it, -1 where there is no opening; (0, ...) likewise.
+        opening_frees: (N, OPENING_ROOM) whether the body can go straight on from that view; (0, ...) likewise.
+        leads: (N, MAX_LEADS, LEAD_NUMBERS) those that are told, view -1 where there is none; (0, ...) likewise.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
     """
@@ -157,5 +167,13 @@ class Robots(NamedTuple):
     view_places: Floats
     views: NDArray[np.uint8]
     views_kept: Integers
+    view_links: Integers
+    view_ways: Floats
+    view_next: Integers
+    view_sights: NDArray[np.uint8]
+    opening_places: Floats
+    opening_views: Integers
+    opening_frees: NDArray[np.bool_]
+    leads: Floats
     held_ranges: Floats
     scan_ages: Integers

@@ -14,15 +14,7 @@ from sim.kernels.records import KNOWN_PART
 from sim.kernels.room import SHORT_OF, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.trail import SEEN_BEHIND
-
-VIEW_SPACING = 0.48
-"""Metres from the last view at which the next one is kept."""
-
-VIEW_DIRECTIONS = 120
-"""Readings of a view, all around from the direction in which the robot believes -pi to be."""
-
-FULL_RANGE = 255
-"""What a view's reading of the LiDAR's range is kept as: in a byte, shorter ones in proportion."""
+from sim.kernels.views import FULL_RANGE, VIEW_DIRECTIONS
 
 SECTOR_EDGE = 1e-3
 """Of a sector: a ray that lies so near to its end belongs to the next one, however it is rounded."""
@@ -32,45 +24,12 @@ ONE = np.float32(1.0)
 PI = np.float32(math.pi)
 TWO_PI = np.float32(2.0 * math.pi)
 _PER_RADIAN = np.float32(VIEW_DIRECTIONS / (2.0 * math.pi))
-_SPACING = np.float32(VIEW_SPACING)
 _BEHIND = np.float32(SEEN_BEHIND)
 _SHORT = np.float32(SHORT_OF)
 _HALF = np.float32(0.5)
 _FULL = np.float32(FULL_RANGE)
 _EDGE = np.float32(SECTOR_EDGE)
 _WHOLE_MEMORY = np.float32(math.log(1.0 + VIEW_ROOM))
-
-
-@kernel(fastmath=FAST)
-def _keep(i, x, y, heading, robots, geometry, p):
-    """Let robot i keep its view where the last one was kept far enough away; returns how many it has kept."""
-    places = robots.view_places
-    kept = robots.views_kept[i]
-    if kept > 0:
-        last = (kept - 1) % VIEW_ROOM
-        dx = x - places[i, last, 0]
-        dy = y - places[i, last, 1]
-        if dx * dx + dy * dy < _SPACING * _SPACING:
-            return kept
-    row = kept % VIEW_ROOM
-    places[i, row, 0] = x
-    places[i, row, 1] = y
-    angles = geometry.ray_angles
-    rays = angles.shape[0]
-    step = angles[1] - angles[0]
-    all_round = step * rays > 2.0 * math.pi - 1e-6
-    for k in range(VIEW_DIRECTIONS):
-        direction = ((k + 0.5) / VIEW_DIRECTIONS - 0.5) * 2.0 * math.pi
-        # Against the first ray, in one turn that begins half a step before it.
-        turned = direction - heading - p.mounts[0, 2] - angles[0]
-        turned -= 2.0 * math.pi * math.floor((turned + 0.5 * step) / (2.0 * math.pi))
-        ray = np.int64(math.floor(turned / step + 0.5))
-        if all_round:
-            ray = ray % rays
-        reading = robots.ranges[i, ray] if ray < rays else ZERO
-        robots.views[i, row, k] = np.uint8(math.floor(reading / p.range * _FULL + _HALF))
-    robots.views_kept[i] = kept + 1
-    return kept + 1
 
 
 @kernel(fastmath=FAST)
@@ -91,7 +50,7 @@ def _find_farthest(i, readings, towards, sectors, robots, geometry, p):
 
 @kernel(fastmath=FAST)
 def see_known(i, x, y, to_x, to_y, heading, robots, geometry, p):
-    """Keep a view, and write since when robot i knows what it sees.
+    """Write since when robot i knows what it sees, from the views that it has kept.
 
     If it is told, also how much nearer to its target that is. Sector by sector from right to left, beginning behind it.
 
@@ -102,11 +61,11 @@ def see_known(i, x, y, to_x, to_y, heading, robots, geometry, p):
         to_x: metres from there to its target.
         to_y: likewise.
         heading: likewise, radians.
-        robots: `sim.kernels.bundles.Robots`; `view_places`, `views`, `views_kept` and `observations` are written.
+        robots: `sim.kernels.bundles.Robots`; `observations` is written.
         geometry: `sim.kernels.bundles.Geometry`.
         p: a row of PARAMETERS.
     """
-    kept = _keep(i, x, y, heading, robots, geometry, p)
+    kept = robots.views_kept[i]
     out = robots.observations
     sectors = p.known_sectors
     freshness = p.part_places[KNOWN_PART]

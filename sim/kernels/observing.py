@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sim.kernels.known import see_known
+from sim.kernels.openings import see_openings
 from sim.kernels.options import kernel
 from sim.kernels.reach import see_reach
 from sim.kernels.records import (
@@ -16,6 +17,7 @@ from sim.kernels.records import (
     HEADING_PART,
     KNOWN_PART,
     OMNIDIRECTIONAL,
+    OPENINGS_PART,
     RANGES_PART,
     REACH_PART,
     SPEEDS_PART,
@@ -24,6 +26,7 @@ from sim.kernels.records import (
 )
 from sim.kernels.sensing import FAST, nearest_of
 from sim.kernels.trail import see_trail
+from sim.kernels.views import keep_view
 from sim.kernels.way import see_way
 
 ZERO = np.float32(0.0)
@@ -142,6 +145,12 @@ def observe_ways(i, robots, geometry, p):
         see_reach(i, dx, dy, heading, robots, geometry, p)
     if p.part_places[TRAIL_PART] >= 0:
         see_trail(i, x, y, heading, robots, geometry, p)
+    sees_openings = p.part_places[OPENINGS_PART] >= 0
+    is_kept = False
+    if p.part_places[KNOWN_PART] >= 0 or sees_openings:
+        is_kept = keep_view(i, x, y, heading, robots, geometry, p)
+    if sees_openings:
+        see_openings(i, x, y, dx, dy, heading, is_kept, robots, geometry, p)
     if p.part_places[KNOWN_PART] >= 0:
         see_known(i, x, y, dx, dy, heading, robots, geometry, p)
     if p.part_places[WAY_PART] >= 0:

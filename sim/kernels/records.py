@@ -23,6 +23,7 @@ PART_KINDS = (
     "way",
     "reach",
     "known",
+    "openings",
 )
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
@@ -39,6 +40,7 @@ PART_KINDS = (
     WAY_PART,
     REACH_PART,
     KNOWN_PART,
+    OPENINGS_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2

@@ -18,6 +18,18 @@ SHORT_TRAIL_ROOM, LONG_TRAIL_ROOM = 256, 1024
 VIEW_ROOM = 256
 """Views that a robot remembers, the newest ones: on some 120 m of its way."""
 
+OPENING_ROOM = 64
+"""Openings that a robot remembers, the newest ones."""
+
+OPENING_KINDS = 6
+"""Numbers of each opening that a robot is told."""
+
+MAX_LEADS = 3
+"""Openings that a robot is told, at most."""
+
+LINK_ROOM = 8
+"""Earlier views that a view is linked to, at most."""
+
 SHORT_OF = 0.2
 """Metres by which the end of a sight lies before what its ray meets; where that is nearer, half way there."""
 

@@ -14,7 +14,8 @@ from sim.config import (
     OdometryConfig,
     TaskConfig,
 )
-from sim.engine.plain_known import PlainViews
+from sim.engine.plain_known import seen_known
+from sim.engine.plain_views import PlainViews
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.room import VIEW_ROOM
@@ -109,7 +110,9 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig) -> None:
     for _ in range(400):
         believed = (robots.poses[0] + robots.drift[0]).astype(float)
         plain.keep(robots.ranges[0].astype(float), believed)
-        expected = plain.seen(robots.ranges[0].astype(float), believed, robots.targets[0].astype(float), part)
+        expected = seen_known(
+            plain.kept, robots.ranges[0].astype(float), believed, robots.targets[0].astype(float), part, task.lidar
+        )
         # What lies on the edge of what a view showed falls on either side, and two readings are equally far.
         compared += bool((np.abs(robots.observations[0] - expected) < 1e-3).all())
         old += int(np.count_nonzero(expected[:24] < 0.9))
@@ -132,7 +135,7 @@ def test_the_oldest_views_are_forgotten() -> None:
         plain.keep(made.robots.ranges[0].astype(float), made.robots.poses[0].astype(float))
     assert made.robots.views_kept[0] > VIEW_ROOM
     robots = made.robots
-    expected = plain.seen(robots.ranges[0].astype(float), robots.poses[0].astype(float), (4.5, 4.5), part)
+    expected = seen_known(plain.kept, robots.ranges[0].astype(float), robots.poses[0].astype(float), (4.5, 4.5), part, FULL)
     assert made.robots.observations[0] == pytest.approx(expected, abs=0.02)
     assert 0.0 <= made.robots.observations[0].min() < 0.01
 

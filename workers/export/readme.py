@@ -1,11 +1,14 @@
 """The bundle's README: what the files are, what the policy expects, and how to run it."""
 
 import math
+from collections.abc import Mapping
 
 from workers.export.check import CheckReport
 from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
 from workers.export.names import MEMORY, NEXT_MEMORY
+from workers.export.ros2.mapless_navigator.openings import Openings
 from workers.export.ros2.mapless_navigator.policy import Part, Specification
+from workers.export.ros2.mapless_navigator.trail import Trail
 from workers.export.ros2.mapless_navigator.views import Views
 from workers.manifest import Manifest
 
@@ -25,7 +28,7 @@ WAYSobservation = frames.push(observe(policy.specification, ranges, [pose], [tar
 STEPprint(f"FORMAT")
 """
 
-_WAYS = {"trail": "Trail", "views": "Views"}
+_WAYS: Mapping[str, type[Trail | Views | Openings]] = {"trail": Trail, "views": Views, "openings": Openings}
 """Modules of what a robot remembers of its way, and their classes."""
 
 _NUMPY_STEP = """\
@@ -120,11 +123,14 @@ def _filled(example: str, specification: Specification) -> str:
         "ackermann": ("linear", "steering"),
     }[specification.drive]
     added = {
-        part.kind: f"[{_seen(part)}]" if part.is_remembered else str([[0.0] * part.size])
+        part.kind: f"[{_seen(part)}]" if part.remembered_by else str([[0.0] * part.size])
         for part in _brought_parts(specification)
     }
     brought = ", ".join(f'"{kind}": {numbers}' for kind, numbers in added.items())
-    ways = {name: _WAYS[name] for name in sorted(_way(part) for part in specification.parts if part.is_remembered)}
+    ways = {
+        name: _WAYS[name].__name__
+        for name in sorted(part.remembered_by for part in specification.parts if part.remembered_by)
+    }
     imports = [f"from mapless_navigator.{module} import {name}\n" for module, name in ways.items()]
     made = [f"{module} = {name}(policy.specification)  # likewise\n" for module, name in ways.items()]
     return (
@@ -192,28 +198,25 @@ def _brought_parts(specification: Specification) -> tuple[Part, ...]:
     return tuple(part for part in specification.parts if part.brought)
 
 
-def _way(part: Part) -> str:
-    """The module that remembers a part's way."""
-    return "trail" if part.is_trail else "views"
-
-
 def _seen(part: Part) -> str:
-    """What that module tells, as code."""
-    return "trail.see(ranges[0], pose)" if part.is_trail else "views.see(ranges[0], pose, target)"
+    """What the memory of its way tells, as code."""
+    name = part.remembered_by
+    return f"{name}.see(ranges[0], pose)" if name == "trail" else f"{name}.see(ranges[0], pose, target)"
 
 
 def _at_first(part: Part, specification: Specification) -> str:
     """What a robot that has not moved, and sees nothing within its range, brings, as code."""
     if part.added:
         return f"np.zeros((1, {part.size}), np.float32)"
-    if not part.is_trail:
-        seen = Views(specification).see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0), (2.0, 1.0))
+    memory = _WAYS[part.remembered_by](specification)
+    if not isinstance(memory, Trail):
+        seen = memory.see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0), (2.0, 1.0))
         return f"np.array([{[round(number, 6) for number in seen.tolist()]}], np.float32)"
     return f"np.eye(1, {part.size}, {part.size - 1}, dtype=np.float32) / {161 if part.kind == 'long_trail' else 41}"
 
 
 def _maker(part: Part) -> str:
-    return "its extension" if part.added else f"`mapless_navigator/{_way(part)}.py`"
+    return "its extension" if part.added else f"`mapless_navigator/{part.remembered_by}.py`"
 
 
 def _added_parts(specification: Specification) -> tuple[Part, ...]:

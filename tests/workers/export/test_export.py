@@ -25,6 +25,7 @@ from sim.config import (
     KnownPart,
     LidarConfig,
     ObservationConfig,
+    OpeningsPart,
     RacecarConfig,
     RangesPart,
     ReachPart,
@@ -94,6 +95,7 @@ TASKS = [
     ),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), TrailPart(sectors=8), KnownPart(sectors=8, frames=2)))),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), KnownPart(sectors=8, progress=True)))),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), OpeningsPart(count=3, frames=2)))),
 ]
 
 
@@ -119,6 +121,7 @@ TASKS = [
         "reach with progress",
         "known",
         "known with progress",
+        "openings",
     ],
 )
 def test_every_form_equals_torch(make_checkpoint: Callable[..., Path], network: Network, task: TaskConfig) -> None:
@@ -213,8 +216,9 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(memory="long"))),
         ObservationConfig(parts=(RangesPart(), TrailPart(), KnownPart(sectors=8))),
         ObservationConfig(parts=(RangesPart(), ReachPart(progress=True), KnownPart(sectors=8, progress=True))),
+        ObservationConfig(parts=(RangesPart(), TrailPart(), OpeningsPart())),
     ],
-    ids=["one moment", "four moments", "trail", "long trail", "known", "progress"],
+    ids=["one moment", "four moments", "trail", "long trail", "known", "progress", "openings"],
 )
 def test_readme_examples_run_and_agree(
     make_checkpoint: Callable[..., Path], tmp_path: Path, network: Network, observation: ObservationConfig

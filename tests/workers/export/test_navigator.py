@@ -21,6 +21,7 @@ from sim.config import (
     LidarConfig,
     ObservationConfig,
     OmnidirectionalDrive,
+    OpeningsPart,
     RangesPart,
     SingleMount,
     TaskConfig,
@@ -32,7 +33,7 @@ from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, S
 from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles
 from workers.export.ros2.mapless_navigator.policy import Policy, read_safetensors
 
-TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(), KnownPart()))
+TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(), KnownPart(), OpeningsPart()))
 
 
 @pytest.fixture

@@ -8581,7 +8581,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"] | components["schemas"]["KnownPart-Input"])[];
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"] | components["schemas"]["KnownPart-Input"] | components["schemas"]["OpeningsPart-Input"])[];
         };
         /**
          * ObservationConfig
@@ -8592,7 +8592,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"] | components["schemas"]["KnownPart-Output"])[];
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"] | components["schemas"]["KnownPart-Output"] | components["schemas"]["OpeningsPart-Output"])[];
         };
         /**
          * ObservedPart
@@ -8694,6 +8694,52 @@ export interface components {
              * @default 1
              */
             sideways: number;
+        };
+        /**
+         * OpeningsPart
+         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free.
+         */
+        "OpeningsPart-Input": {
+            /**
+             * Openings
+             * @description The best ones, five numbers each: where to go first on the way there, how far it is, how far on from there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
+             * @default 2
+             */
+            count: number;
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "openings";
+        };
+        /**
+         * OpeningsPart
+         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free.
+         */
+        "OpeningsPart-Output": {
+            /**
+             * Openings
+             * @description The best ones, five numbers each: where to go first on the way there, how far it is, how far on from there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
+             * @default 2
+             */
+            count: number;
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "openings";
         };
         /**
          * OwnScenario

@@ -11,9 +11,12 @@ from enum import Enum
 import numpy as np
 
 from .observation import Frames, Reals, Scan, observe, refuse_unknown, resample, wrap
+from .openings import Openings
 from .policy import Floats, Policy, Specification
 from .trail import Trail
 from .views import Views
+
+_MEMORIES: Mapping[str, type[Trail | Views | Openings]] = {"trail": Trail, "views": Views, "openings": Openings}
 
 
 class State(Enum):
@@ -120,7 +123,7 @@ class Navigator:
     def __init__(self, policy: Policy, safety: Safety, make_added: MakeAdded | None = None) -> None:
         if make_added is None:
             refuse_unknown(
-                policy.specification, tuple(part.kind for part in policy.specification.parts if part.is_remembered)
+                policy.specification, tuple(part.kind for part in policy.specification.parts if part.remembered_by)
             )
         self._policy, self._safety, self._make_added = policy, safety, make_added
         self._scans: list[tuple[float, Scan] | None] = [None] * len(policy.specification.mounts)
@@ -135,9 +138,7 @@ class Navigator:
         self._last_action = np.zeros(len(policy.specification.action_limits), np.float32)
         self._frames = Frames(policy.specification)
         self._ways = tuple(
-            Trail(policy.specification) if part.is_trail else Views(policy.specification)
-            for part in policy.specification.parts
-            if part.is_remembered
+            _MEMORIES[part.remembered_by](policy.specification) for part in policy.specification.parts if part.remembered_by
         )
         self._memory = policy.memory(1)
 
@@ -238,7 +239,7 @@ class Navigator:
         )
         added = dict(self._make_added(*known)) if self._make_added else {}
         for way in self._ways:
-            seen = way.see(ranges, pose, goal) if isinstance(way, Views) else way.see(ranges, pose)
+            seen = way.see(ranges, pose) if isinstance(way, Trail) else way.see(ranges, pose, goal)
             added[way.kind] = seen[None]
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)

@@ -16,6 +16,7 @@
 | `deviation`            | |bearing| / pi                                                             |
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
 | `known`, `known_progress` | since when it knows what it sees, see `views.py`: likewise              |
+| `openings`             | which openings it had better look into, see `openings.py`: likewise        |
 | `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
 | `reach`                | near / (near + how far it could go straight on), all around, see `reach`   |
 | `reach_progress`       | the same, and how much nearer to the target / range that would bring it    |
@@ -80,15 +81,15 @@ def observe(
         targets: (n, 2) x, y in metres, in the same frame.
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
-        added: the numbers (n, size) of each part that an extension makes, by its kind, of its trail (`Trail.see`)
-            and of its views (`Views.see`);
+        added: the numbers (n, size) of each part that an extension makes, by its kind, of its trail (`Trail.see`),
+            of its views (`Views.see`) and of its openings (`Openings.see`);
             `manifest.json` explains them.
 
     Returns:
         (n, numbers of the newest moment).
 
     Raises:
-        PolicyFileError: the policy sees its trail, its views or a part of an extension, and the numbers are not given.
+        PolicyFileError: the policy remembers its way or sees a part of an extension, and the numbers are not given.
     """
     refuse_unknown(specification, () if added is None else tuple(added))
     pose, target = np.asarray(poses, np.float64), np.asarray(targets, np.float64)
@@ -133,13 +134,11 @@ def refuse_unknown(specification: Specification, known: tuple[str, ...] = ()) ->
         PolicyFileError: there is such a part; says which.
     """
     for part in specification.parts:
-        if part.is_trail and part.kind not in known:
+        if part.remembered_by and part.kind not in known:
+            name = part.remembered_by
             raise PolicyFileError(
-                f"this policy sees its trail: give what Trail.see tells to observe(added={{{part.kind!r}: [numbers]}})"
-            )
-        if part.is_remembered and part.kind not in known:
-            raise PolicyFileError(
-                f"this policy remembers views: give what Views.see tells to observe(added={{{part.kind!r}: [numbers]}})"
+                f"this policy remembers its way: give what {name.title()}.see of {name}.py tells to "
+                f"observe(added={{{part.kind!r}: [numbers]}})"
             )
         if part.added and part.kind not in known:
             raise PolicyFileError(

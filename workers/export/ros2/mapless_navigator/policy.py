@@ -46,8 +46,17 @@ KINDS = (
     "reach_progress",
     "known",
     "known_progress",
+    "openings",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
+
+_MEMORIES = {
+    "trail": "trail",
+    "long_trail": "trail",
+    "known": "views",
+    "known_progress": "views",
+    "openings": "openings",
+}
 
 _LEAKY_SLOPE = np.float32(0.01)
 
@@ -74,19 +83,14 @@ class Part:
         return "." in self.kind
 
     @property
-    def is_trail(self) -> bool:
-        """Whether it tells where the robot has been, see `trail.py`."""
-        return self.kind in ("trail", "long_trail")
-
-    @property
-    def is_remembered(self) -> bool:
-        """Whether it takes a memory of the robot's way: its trail, or its views, see `views.py`."""
-        return self.is_trail or self.kind in ("known", "known_progress")
+    def remembered_by(self) -> str:
+        """Which memory of the robot's way makes it, each in a file of that name: trail, views or openings; '' for none."""
+        return _MEMORIES.get(self.kind, "")
 
     @property
     def brought(self) -> bool:
         """Whether its numbers are no function of scan, pose, target and commands of one moment: whoever asks brings them."""
-        return self.added or self.is_remembered
+        return self.added or bool(self.remembered_by)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Trail:
     """
 
     def __init__(self, specification: Specification) -> None:
-        (part,) = (part for part in specification.parts if part.is_trail)
+        (part,) = (part for part in specification.parts if part.remembered_by == "trail")
         self.kind, self._is_long = part.kind, part.kind == "long_trail"
         self._sectors = (part.size - 1) // (4 if self._is_long else 3)
         self._range = specification.range

@@ -32,8 +32,49 @@ FULL_RANGE = 255
 SECTOR_EDGE = 1e-3
 
 
-class Views:
-    """The views of one robot on its way to one goal.
+class KeptViews:
+    """The views that a robot keeps on its way to one goal.
+
+    Args:
+        specification: of a policy that remembers views.
+
+    Attributes:
+        places: (x, y) of each in metres, the oldest first.
+        readings: what was read there, (DIRECTIONS,) metres each.
+        kept: how many were, those that are forgotten counted.
+    """
+
+    def __init__(self, specification: Specification) -> None:
+        self.places: deque[tuple[float, float]] = deque(maxlen=ROOM)
+        self.readings: deque[Reals] = deque(maxlen=ROOM)
+        self.kept = 0
+        self._range = specification.range
+        self._angles = wrap(ray_angles(specification) + specification.mounts[0][2])
+        self._half_ray = (ray_angles(specification)[1] - ray_angles(specification)[0]) / 2.0
+
+    def clear(self) -> None:
+        """Forget them: a new way begins."""
+        self.places.clear()
+        self.readings.clear()
+        self.kept = 0
+
+    def keep(self, scan: Reals, pose: Reals) -> bool:
+        """Keep a view of the first LiDAR's scan, metres, where it is time to; returns whether it was."""
+        x, y, heading = pose
+        if self.places and np.hypot(self.places[-1][0] - x, self.places[-1][1] - y) < SPACING:
+            return False
+        directions = ((np.arange(DIRECTIONS) + 0.5) / DIRECTIONS - 0.5) * 2.0 * np.pi
+        off = np.abs(wrap(directions[:, None] - heading - self._angles))
+        rays = off.argmin(axis=1)
+        told: Reals = np.where(off[np.arange(DIRECTIONS), rays] <= self._half_ray + 1e-9, scan[rays], 0.0)
+        self.places.append((x, y))
+        self.readings.append(np.floor(told / self._range * FULL_RANGE + 0.5) * self._range / FULL_RANGE)
+        self.kept += 1
+        return True
+
+
+class Views(KeptViews):
+    """Since when one robot knows what it sees on its way to one goal.
 
     Args:
         specification: of a policy that sees since when it knows what it sees.
@@ -43,22 +84,13 @@ class Views:
     """
 
     def __init__(self, specification: Specification) -> None:
-        (part,) = (part for part in specification.parts if part.kind in ("known", "known_progress"))
+        super().__init__(specification)
+        (part,) = (part for part in specification.parts if part.remembered_by == "views")
         self.kind, kinds = part.kind, 3 if part.kind == "known_progress" else 2
         self._sectors, self._kinds = part.size // kinds, kinds
-        self._range = specification.range
-        self._angles = wrap(ray_angles(specification) + specification.mounts[0][2])
-        self._reach = (ray_angles(specification)[1] - ray_angles(specification)[0]) / 2.0
         self._of_rays = np.minimum(
             (self._angles + np.pi) / (2.0 * np.pi) * self._sectors + SECTOR_EDGE, self._sectors - 1
         ).astype(int)
-        self._places: deque[tuple[float, float]] = deque(maxlen=ROOM)
-        self._readings: deque[Reals] = deque(maxlen=ROOM)
-
-    def clear(self) -> None:
-        """Forget them: a new way begins."""
-        self._places.clear()
-        self._readings.clear()
 
     def see(self, ranges: ArrayLike, pose: ArrayLike, target: ArrayLike) -> Reals:
         """Keep a view where it is time to, and tell what it showed before; once per control period.
@@ -73,9 +105,7 @@ class Views:
         """
         scan = np.asarray(ranges, np.float64)[: len(self._angles)]
         x, y, heading = np.asarray(pose, np.float64)
-        if not self._places or np.hypot(self._places[-1][0] - x, self._places[-1][1] - y) >= SPACING:
-            self._places.append((x, y))
-            self._readings.append(self._all_round(scan, heading))
+        self.keep(scan, np.asarray(pose, np.float64))
         goal = np.asarray(target, np.float64)
         freshness, nearness, progress = np.zeros((3, self._sectors))
         for sector in np.unique(self._of_rays):
@@ -84,7 +114,7 @@ class Views:
             ahead = max(scan[ray] - SHORT_OF, 0.5 * scan[ray])
             towards = self._angles[ray] + heading
             end = np.array((x + ahead * np.cos(towards), y + ahead * np.sin(towards)))
-            offsets = end - np.array(self._places)
+            offsets = end - np.array(self.places)
             distances = np.hypot(*offsets.T)
             showed = np.flatnonzero(self._show(offsets, distances))
             followed = len(distances) - 1 - showed[0] if len(showed) else 0
@@ -93,18 +123,10 @@ class Views:
             progress[sector] = (np.hypot(*(goal - (x, y))) - np.hypot(*(goal - end))) / self._range
         return np.concatenate((freshness, nearness, progress)[: self._kinds])
 
-    def _all_round(self, scan: Reals, heading: float) -> Reals:
-        """What a scan reads in each direction of a view, (DIRECTIONS,) metres; 0 where no ray points."""
-        directions = ((np.arange(DIRECTIONS) + 0.5) / DIRECTIONS - 0.5) * 2.0 * np.pi
-        off = np.abs(wrap(directions[:, None] - heading - self._angles))
-        rays = off.argmin(axis=1)
-        told: Reals = np.where(off[np.arange(DIRECTIONS), rays] <= self._reach + 1e-9, scan[rays], 0.0)
-        return np.floor(told / self._range * FULL_RANGE + 0.5) * self._range / FULL_RANGE
-
     def _show(self, offsets: Reals, distances: Reals) -> Reals:
         """Which views show a place so far from each of them, (views, 2) and (views,)."""
         directions = np.arctan2(offsets[:, 1], offsets[:, 0])
         which = np.minimum((directions + np.pi) / (2.0 * np.pi) * DIRECTIONS, DIRECTIONS - 1).astype(int)
-        sights = np.array(self._readings)[np.arange(len(distances)), which] + BEHIND
+        sights = np.array(self.readings)[np.arange(len(distances)), which] + BEHIND
         shown: Reals = (distances < self._range) & (distances < sights)
         return shown

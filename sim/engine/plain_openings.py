@@ -1,0 +1,261 @@
+"""Which openings one robot had better look into, in plain Python: the reference of `sim.kernels.openings`."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.config import LidarConfig, OpeningsPart
+from sim.engine.plain_views import PlainView, PlainViews, wrapped
+from sim.kernels.find_openings import FLAT_RUN, JUMP, SAME_OPENING, SLACK
+from sim.kernels.openings import APART, AT_HAND, DETOUR
+from sim.kernels.room import LINK_ROOM, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
+from sim.kernels.views import FULL_RANGE, SLIM, VIEW_DIRECTIONS
+from sim.lidar import ray_angles
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """A place beyond which nothing was seen yet.
+
+    Attributes:
+        place: metres.
+        view: number of the view that it was seen from.
+        is_free: whether the body can go there straight on from that.
+    """
+
+    place: Place
+    view: int
+    is_free: bool
+
+
+@dataclass(frozen=True)
+class _Lead:
+    """An opening, or the target if a view shows it, the metres to it by known ways and those straight on to the target."""
+
+    opening: _Opening
+    way: float
+    rest: float
+
+    @property
+    def whole(self) -> float:
+        """Metres that the way to the target is taken to have."""
+        return self.way + self.rest + (0.0 if self.opening.is_free else DETOUR)
+
+
+@dataclass
+class PlainOpenings:
+    """The openings of one attempt.
+
+    Attributes:
+        lidar: of the robot.
+        near: metres, see `sim.observations.near_distance`.
+        views: that it keeps; whoever keeps one calls `look`.
+    """
+
+    lidar: LidarConfig
+    near: float
+    views: PlainViews
+    _links: list[list[int]] = field(default_factory=list)
+    _slots: list[_Opening | None] = field(default_factory=lambda: [None] * OPENING_ROOM)
+    _ways: dict[int, float] = field(default_factory=dict)
+    _next: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def _remembered(self) -> range:
+        """Numbers of the views that are remembered."""
+        count = len(self.views.kept)
+        return range(max(0, count - VIEW_ROOM), count)
+
+    @property
+    def _farthest(self) -> float:
+        """What a view keeps where a ray meets nothing, metres; rounded as it is there."""
+        return FULL_RANGE * self.lidar.range / FULL_RANGE
+
+    def look(self) -> None:
+        """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
+        newest = self.views.kept[-1]
+        self._links.append(self._links_of(newest))
+        for slot, opening in enumerate(self._slots):
+            if opening and (opening.view not in self._remembered or self._shows(newest, opening.place, SLACK)):
+                self._slots[slot] = None
+        for place, is_free in self._edges(newest):
+            if not any(self._shows(self.views.kept[number], place, SLACK) for number in self._remembered[:-1]):
+                self._open(_Opening(place, self._remembered[-1], is_free))
+        self._measure_ways()
+
+    def _links_of(self, newest: PlainView) -> list[int]:
+        """The view before it, and the oldest and the nearest of each run of earlier ones that it can go to."""
+        *earlier, _ = self._remembered
+        if not earlier:
+            return []
+        links = [earlier[-1]]
+        in_sight = groupby(reversed(earlier[:-1]), key=lambda number: self._links_to(newest, self.views.kept[number].place))
+        for run in (list(numbers) for is_passable, numbers in in_sight if is_passable):
+            nearest = min(run, key=lambda number: math.dist(self.views.kept[number].place, newest.place))
+            links += [run[-1]] if nearest == run[-1] else [run[-1], nearest]
+        return links[:LINK_ROOM]
+
+    def _links_to(self, view: PlainView, place: Place) -> bool:
+        return self._shows(view, place, 0.0) and self._is_passable(view, place)
+
+    def _edges(self, view: PlainView) -> Iterator[tuple[Place, bool]]:
+        """Places where a view's readings jump, or end at the LiDAR's range, and whether the way to them is free."""
+        run = 0
+        for k, (right, left) in enumerate(zip(view.readings, np.roll(view.readings, -1), strict=True)):
+            if right == 0.0 or left == 0.0:
+                run = 0
+                continue
+            if abs(right - left) > JUMP and not self._is_narrow(view, k):
+                nearer, direction = min(right, left), (k + 1) % VIEW_DIRECTIONS - 0.5
+                is_free = self._is_free(view, float(_angle(direction)), nearer - self.near)
+                yield _place(view, direction, (right + left) / 2.0), is_free
+            run = run + 1 if right >= self._farthest else 0
+            if run and (run == FLAT_RUN or left < self._farthest):
+                if run > 1:
+                    is_free = self._is_free(view, float(_angle(k - run // 2)), self.lidar.range)
+                    yield _place(view, k - run // 2, self.lidar.range), is_free
+                run = 0
+
+    def _is_narrow(self, view: PlainView, k: int) -> bool:
+        """Whether the body does not fit through the opening between directions k and k + 1."""
+        following = (k + 1) % VIEW_DIRECTIONS
+        is_right = view.readings[k] < view.readings[following]
+        near, beyond, step = (k, following, 1) if is_right else (following, k, -1)
+        edge = _place(view, near, view.readings[near])
+        across = ((beyond + step * n) % VIEW_DIRECTIONS for n in range(VIEW_DIRECTIONS // 4))
+        return any(math.dist(edge, _place(view, j, view.readings[j])) < 2.0 * SLIM * self.near for j in across)
+
+    def _open(self, opening: _Opening) -> None:
+        """Remember an opening: in place of the same one, in an empty slot, or in that of the one seen the longest ago.
+
+        One with a free way stays before the same one without.
+        """
+        taken = [-1 if one is None else one.view for one in self._slots]
+        slots = enumerate(self._slots)
+        same = next((k for k, one in slots if one and math.dist(one.place, opening.place) < SAME_OPENING), None)
+        known = None if same is None else self._slots[same]
+        if known is None or opening.is_free or not known.is_free:
+            self._slots[taken.index(min(taken)) if same is None else same] = opening
+
+    def _shows(self, view: PlainView, place: Place, slack: float) -> bool:
+        """Whether neither of the two readings beside a place ends more than the slack before it."""
+        dx, dy = place[0] - view.place[0], place[1] - view.place[1]
+        k = math.floor((math.atan2(dy, dx) + math.pi) / math.tau * VIEW_DIRECTIONS - 0.5)
+        sight = min(view.readings[k % VIEW_DIRECTIONS], view.readings[(k + 1) % VIEW_DIRECTIONS])
+        return bool(math.hypot(dx, dy) <= sight + slack)
+
+    def _is_free(self, view: PlainView, angle: float, until: float) -> bool:
+        """Whether the body can go straight on from a view in a direction, for so many metres, as its readings show."""
+        off = _angle(np.arange(VIEW_DIRECTIONS)) - angle
+        along, across = view.readings * np.cos(off), np.abs(view.readings * np.sin(off))
+        meets = (view.readings < self._farthest) & (along > 0.0) & (along < until) & (across < SLIM * self.near)
+        return not meets.any()
+
+    def _is_passable(self, view: PlainView, place: Place) -> bool:
+        """Whether the body can go straight on from a view to a place that it shows."""
+        distance = math.dist(view.place, place)
+        angle = math.atan2(place[1] - view.place[1], place[0] - view.place[0])
+        return distance < SLIM * self.near or self._is_free(view, angle, distance)
+
+    def _measure_ways(self) -> None:
+        """How far it is from the newest view to every other one by links, and by which view it goes there (Dijkstra)."""
+        neighbours: dict[int, set[int]] = {number: set() for number in self._remembered}
+        for one in self._remembered:
+            for other in self._links[one]:
+                if other in neighbours:
+                    neighbours[one].add(other)
+                    neighbours[other].add(one)
+        self._ways = dict.fromkeys(self._remembered, math.inf)
+        self._ways[self._remembered[-1]] = 0.0
+        self._next, left = {}, set(self._remembered)
+        while left:
+            one = min(left, key=lambda number: self._ways[number])
+            left.remove(one)
+            for other in neighbours[one]:
+                way = self._ways[one] + math.dist(self.views.kept[one].place, self.views.kept[other].place)
+                if way < self._ways[other]:
+                    self._ways[other], self._next[other] = way, one
+
+    def _leads(self, target: Place, count: int) -> list[_Lead]:
+        """The openings by which the target would be nearest, the best one first."""
+        views = ((number, self.views.kept[number]) for number in self._remembered)
+        sights = [
+            _Opening(target, number, self._is_passable(view, target))
+            for number, view in views
+            if self._shows(view, target, 0.0)
+        ]
+        found = []
+        for one in (*sights, *filter(None, self._slots)):
+            way = self._ways[one.view] + math.dist(self.views.kept[one.view].place, one.place)
+            found.append(_Lead(one, way, math.dist(one.place, target)))
+        chosen: list[_Lead] = []
+        for lead in sorted(found, key=lambda lead: lead.whole):
+            if all(math.dist(lead.opening.place, other.opening.place) >= APART for other in chosen):
+                chosen.append(lead)
+        return chosen[:count]
+
+    def seen(
+        self, ranges: NDArray[np.float64], pose: Sequence[float], target: Sequence[float], part: OpeningsPart
+    ) -> NDArray[np.float64]:
+        """Which openings a robot at a pose had better look into, given its scan, metres: a part's numbers.
+
+        Returns:
+            (6 * count,).
+        """
+        numbers = np.zeros((part.count, OPENING_KINDS))
+        for row, lead in zip(numbers, self._leads((target[0], target[1]), part.count), strict=False):
+            dx, dy = self._first_place(lead.opening, ranges, pose)
+            bearing = math.atan2(dy, dx) - pose[2]
+            row[:] = (
+                math.sin(bearing),
+                math.cos(bearing),
+                1.0 - min(math.hypot(dx, dy) / self.lidar.range, 1.0),
+                lead.way / (lead.way + 1.0),
+                lead.rest / (lead.rest + 1.0),
+                float(lead.opening.is_free),
+            )
+        return numbers.reshape(-1)
+
+    def _first_place(self, opening: _Opening, ranges: NDArray[np.float64], pose: Sequence[float]) -> Place:
+        """Metres to the last place on the way to an opening that is in sight."""
+        to = opening.place[0] - pose[0], opening.place[1] - pose[1]
+        if self._is_in_sight(to, ranges, pose[2], SLACK, farthest=True):
+            return to
+        view: int | None = opening.view
+        while view is not None:
+            place = self.views.kept[view].place
+            here = place[0] - pose[0], place[1] - pose[1]
+            if math.hypot(*here) < AT_HAND:
+                return to
+            if self._is_in_sight(here, ranges, pose[2], 0.0, farthest=False):
+                return here
+            to, view = here, self._next.get(view)
+        return to
+
+    def _is_in_sight(self, to: Place, ranges: NDArray[np.float64], heading: float, slack: float, *, farthest: bool) -> bool:
+        """Whether the farthest or the nearest of the three rays towards a place ends there or beyond."""
+        distance = math.hypot(*to)
+        angles = ray_angles(self.lidar) + self.lidar.mount.places[0][2]
+        off = np.abs(wrapped(math.atan2(to[1], to[0]) - heading - angles))
+        ray = int(off.argmin())
+        if distance >= self.lidar.range or off[ray] > (angles[1] - angles[0]) / 2.0:
+            return False
+        beside = [ranges[(ray + k) % len(angles)] for k in (-1, 0, 1)]
+        return bool(distance <= (max(beside) if farthest else min(beside)) + slack)
+
+
+def _angle(direction: ArrayLike) -> NDArray[np.float64]:
+    """Where a direction of a view points, radians."""
+    return np.asarray(((np.asarray(direction) + 0.5) / VIEW_DIRECTIONS * 2.0 - 1.0) * math.pi)
+
+
+def _place(view: PlainView, direction: float, distance: float) -> Place:
+    """Where a reading of a view ends."""
+    angle = float(_angle(direction))
+    return view.place[0] + distance * math.cos(angle), view.place[1] + distance * math.sin(angle)

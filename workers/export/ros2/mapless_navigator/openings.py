@@ -1,0 +1,301 @@
+"""Which openings a robot had better look into: edges of what its views show, and the ways to them that it knows.
+
+As in training it keeps views (`views.py`). An opening is where two readings side by side of a view differ by more than
+0.4 m, half way between their ends, if the body fits through; or the middle of up to ten that all read the LiDAR's range. It
+is open while no other view shows it: while in each of them one of the two readings beside it ends more than 0.2 m before it.
+The newest 64 are remembered, two within 0.4 m are one. Each view is linked to the one before it, and to the oldest and the
+nearest of each run of earlier ones that the body can go to straight on (eight at most); by these links it is so and so far
+to every view, and on to its openings.
+
+Told are those by which the goal would be nearest if all beyond them were free, at least 1 m apart, the goal itself where a
+view shows it among them; where the body can't go straight on from the view the way is taken to be 4 m longer. For each:
+
+| number   | what it is                                                                                     |
+|----------|------------------------------------------------------------------------------------------------|
+| sine     | of the bearing of the place to go to first, the last one on the way to it that is in sight      |
+| cosine   | likewise                                                                                        |
+| nearness | 1 - its distance / range of the LiDAR, at least 0                                               |
+| way      | w / (w + 1 m), w the metres from the newest view to the opening                                 |
+| rest     | r / (r + 1 m), r the metres straight on from there to the goal                                  |
+| free     | 1 where the body can go there straight on from the view that saw it                             |
+
+0 where there is none.
+"""
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .observation import Reals, ray_angles, wrap
+from .policy import Specification
+from .views import DIRECTIONS, FULL_RANGE, KeptViews
+
+JUMP = 0.4
+SLACK = 0.2
+SAME = 0.4
+APART = 1.0
+SLIM = 0.95
+DETOUR = 4.0
+AT_HAND = 0.35
+FLAT_RUN = 10
+OPENING_ROOM = 64
+LINK_ROOM = 8
+NUMBERS = 6
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """A place beyond which nothing was seen yet, the number of the view that saw it, and whether the way is free."""
+
+    place: Reals
+    view: int
+    is_free: bool
+
+
+@dataclass(frozen=True)
+class _Lead:
+    """An opening, the metres to it by known ways, and those straight on from it to the goal."""
+
+    opening: _Opening
+    way: float
+    rest: float
+
+    @property
+    def whole(self) -> float:
+        """Metres that the way to the goal is taken to have."""
+        return self.way + self.rest + (0.0 if self.opening.is_free else DETOUR)
+
+
+class Openings(KeptViews):
+    """The openings of one robot on its way to one goal.
+
+    Args:
+        specification: of a policy that is told openings.
+
+    Attributes:
+        kind: of the part that it makes the numbers of.
+    """
+
+    def __init__(self, specification: Specification) -> None:
+        super().__init__(specification)
+        (part,) = (part for part in specification.parts if part.remembered_by == "openings")
+        self.kind, self._count = part.kind, part.size // NUMBERS
+        self._slim = SLIM * specification.near
+        self._near = specification.near
+        # What a view keeps where a ray meets nothing, rounded as it is there.
+        self._farthest = FULL_RANGE * specification.range / FULL_RANGE
+        self._spacing = float(ray_angles(specification)[1] - ray_angles(specification)[0])
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all: a new way begins."""
+        super().clear()
+        self._links: dict[int, set[int]] = {}
+        self._slots: list[_Opening | None] = [None] * OPENING_ROOM
+        self._ways: dict[int, float] = {}
+        self._next: dict[int, int] = {}
+
+    def see(self, ranges: ArrayLike, pose: ArrayLike, target: ArrayLike) -> Reals:
+        """Keep a view where it is time to, and tell which openings to look into; once per control period.
+
+        Args:
+            ranges: (scan,) metres, as the policy sees them.
+            pose: x, y in metres and heading in radians.
+            target: x, y in metres, in the same frame.
+
+        Returns:
+            (6 * openings,).
+        """
+        scan, goal = np.asarray(ranges, np.float64)[: len(self._angles)], np.asarray(target, np.float64)
+        here = np.asarray(pose, np.float64)
+        if self.keep(scan, here):
+            self._look()
+        numbers = np.zeros((self._count, NUMBERS))
+        for row, lead in zip(numbers, self._leads(goal), strict=False):
+            dx, dy = self._first_place(lead.opening, scan, here)
+            bearing = np.arctan2(dy, dx) - here[2]
+            nearness = 1.0 - min(np.hypot(dx, dy) / self._range, 1.0)
+            row[:3] = np.sin(bearing), np.cos(bearing), nearness
+            row[3:] = lead.way / (lead.way + 1.0), lead.rest / (lead.rest + 1.0), lead.opening.is_free
+        return numbers.reshape(-1)
+
+    @property
+    def _oldest(self) -> int:
+        """Number of the oldest view that is remembered."""
+        return self.kept - len(self.places)
+
+    def _look(self) -> None:
+        """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
+        newest = self.kept - 1
+        self._link(newest)
+        for slot, one in enumerate(self._slots):
+            if one and (one.view < self._oldest or self._which_show(one.place, SLACK)[-1]):
+                self._slots[slot] = None
+        for place, is_free in self._edges():
+            if not self._which_show(place, SLACK)[:-1].any():
+                self._open(_Opening(place, newest, is_free))
+        self._measure_ways(newest)
+
+    def _which_show(self, place: Reals, slack: float) -> Reals:
+        """In which views neither of the two readings beside a place ends more than the slack before it, (views,) bool."""
+        offsets = place - np.array(self.places)
+        beside = (np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) / (2.0 * np.pi) * DIRECTIONS - 0.5
+        right, rows = np.floor(beside).astype(int), np.arange(len(offsets))
+        readings = np.array(self.readings)
+        sights = np.minimum(readings[rows, right % DIRECTIONS], readings[rows, (right + 1) % DIRECTIONS])
+        shown: Reals = np.hypot(*offsets.T) <= sights + slack
+        return shown
+
+    def _link(self, newest: int) -> None:
+        """Link the newest view to the one before, and to the oldest and the nearest of each run that it can go to."""
+        self._links[newest] = set()
+        self._links.pop(self._oldest - 1, None)
+        if newest == self._oldest:
+            return
+        here, links = np.array(self.places[-1]), [newest - 1]
+        run: list[int] = []
+        for number in range(newest - 2, self._oldest - 2, -1):
+            if number >= self._oldest and self._is_passable(-1, self._place_of(number)):
+                run.append(number)
+            elif run:
+                nearest = min(run, key=lambda one: np.hypot(*(self._place_of(one) - here)))
+                links += [run[-1]] if nearest == run[-1] else [run[-1], nearest]
+                run = []
+        for number in links[:LINK_ROOM]:
+            self._links[newest].add(number)
+            self._links[number].add(newest)
+
+    def _is_passable(self, row: int, place: Reals) -> bool:
+        """Whether a view shows a place, and that the body can go there straight on."""
+        offset = place - np.array(self.places[row])
+        distance, angle = float(np.hypot(*offset)), float(np.arctan2(offset[1], offset[0]))
+        right = int(np.floor((angle + np.pi) / (2.0 * np.pi) * DIRECTIONS - 0.5))
+        readings = self.readings[row]
+        if distance > min(readings[right % DIRECTIONS], readings[(right + 1) % DIRECTIONS]):
+            return False
+        return distance < self._slim or self._is_free(row, angle, distance)
+
+    def _is_free(self, row: int, angle: float, until: float) -> bool:
+        """Whether the body can go straight on from a view in a direction, for so many metres, as its readings show."""
+        readings, off = self.readings[row], _angles(np.arange(DIRECTIONS)) - angle
+        along, across = readings * np.cos(off), np.abs(readings * np.sin(off))
+        return not ((readings < self._farthest) & (along > 0.0) & (along < until) & (across < self._slim)).any()
+
+    def _place_of(self, number: int) -> Reals:
+        """Where a view was kept, (2,) metres."""
+        return np.array(self.places[number - self._oldest])
+
+    def _edges(self) -> Iterator[tuple[Reals, bool]]:
+        """Places where the newest view's readings jump, or end at the LiDAR's range, and whether the way to them is free."""
+        readings, run = self.readings[-1], 0
+        ends = self._ends(np.arange(DIRECTIONS), readings)
+        for k in range(DIRECTIONS):
+            right, left = readings[k], readings[(k + 1) % DIRECTIONS]
+            if right == 0.0 or left == 0.0:
+                run = 0
+                continue
+            if abs(right - left) > JUMP and not self._is_narrow(ends, k, right < left):
+                nearer, direction = min(right, left), (k + 1) % DIRECTIONS - 0.5
+                is_free = self._is_free(-1, float(_angles(direction)), nearer - self._near)
+                yield self._ends(direction, (right + left) / 2.0), is_free
+            run = run + 1 if right >= self._farthest else 0
+            if run and (run == FLAT_RUN or left < self._farthest):
+                if run > 1:
+                    yield self._ends(k - run // 2, self._range), self._is_free(-1, float(_angles(k - run // 2)), self._range)
+                run = 0
+
+    def _is_narrow(self, ends: Reals, k: int, is_right: bool) -> bool:
+        """Whether the body does not fit through the opening between directions k and k + 1."""
+        near, beyond, step = (k, k + 1, 1) if is_right else (k + 1, k, -1)
+        across = ends[(beyond + step * np.arange(DIRECTIONS // 4)) % DIRECTIONS]
+        return bool((np.hypot(*(across - ends[near % DIRECTIONS]).T) < 2.0 * self._slim).any())
+
+    def _ends(self, directions: ArrayLike, readings: ArrayLike) -> Reals:
+        """Where readings in directions of the newest view end, (..., 2) metres."""
+        angles = _angles(directions)
+        away: Reals = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * np.asarray(readings)[..., None]
+        ends: Reals = away + np.array(self.places[-1])
+        return ends
+
+    def _open(self, opening: _Opening) -> None:
+        """Remember an opening: in place of the same one, in an empty slot, or in that of the one seen the longest ago.
+
+        One with a free way stays before the same one without.
+        """
+        taken = [one.view if one else -1 for one in self._slots]
+        slots = enumerate(self._slots)
+        same = next((k for k, one in slots if one and np.hypot(*(one.place - opening.place)) < SAME), None)
+        known = None if same is None else self._slots[same]
+        if known is None or opening.is_free or not known.is_free:
+            self._slots[taken.index(min(taken)) if same is None else same] = opening
+
+    def _measure_ways(self, newest: int) -> None:
+        """How far it is from the newest view to every other one by links, and by which view it goes there (Dijkstra)."""
+        self._ways, self._next = {newest: 0.0}, {}
+        reached, queue = set(), [(0.0, newest)]
+        while queue:
+            way, one = heapq.heappop(queue)
+            if one in reached:
+                continue
+            reached.add(one)
+            for other in self._links[one]:
+                farther = (
+                    way + float(np.hypot(*(self._place_of(one) - self._place_of(other))))
+                    if other >= self._oldest
+                    else np.inf
+                )
+                if farther < self._ways.get(other, np.inf):
+                    self._ways[other], self._next[other] = farther, one
+                    heapq.heappush(queue, (farther, other))
+
+    def _leads(self, goal: Reals) -> list[_Lead]:
+        """The openings by which the goal would be nearest, the best one first."""
+        rows = np.flatnonzero(self._which_show(goal, 0.0))
+        sights = [_Opening(goal, int(row) + self._oldest, self._is_passable(int(row), goal)) for row in rows]
+        found = [
+            _Lead(one, self._way(one.view, one.place), float(np.hypot(*(goal - one.place))))
+            for one in (*sights, *filter(None, self._slots))
+        ]
+        chosen: list[_Lead] = []
+        for lead in sorted(found, key=lambda lead: lead.whole):
+            if all(np.hypot(*(lead.opening.place - other.opening.place)) >= APART for other in chosen):
+                chosen.append(lead)
+        return chosen[: self._count]
+
+    def _way(self, view: int, place: Reals) -> float:
+        """Metres from the newest view to a place that another one shows."""
+        return self._ways.get(view, np.inf) + float(np.hypot(*(place - self._place_of(view))))
+
+    def _first_place(self, opening: _Opening, scan: Reals, pose: Reals) -> Reals:
+        """Metres to the last place on the way to an opening that is in sight, (2,)."""
+        to: Reals = opening.place - pose[:2]
+        if self._is_in_sight(to, scan, pose[2], SLACK, farthest=True):
+            return to
+        view: int | None = opening.view
+        while view is not None:
+            here = self._place_of(view) - pose[:2]
+            if np.hypot(*here) < AT_HAND:
+                return to
+            if self._is_in_sight(here, scan, pose[2], 0.0, farthest=False):
+                return here
+            to, view = here, self._next.get(view)
+        return to
+
+    def _is_in_sight(self, to: Reals, scan: Reals, heading: float, slack: float, *, farthest: bool) -> bool:
+        """Whether the farthest or the nearest of the three rays towards a place ends there or beyond."""
+        distance = float(np.hypot(*to))
+        off = np.abs(wrap(np.arctan2(to[1], to[0]) - heading - self._angles))
+        ray = int(off.argmin())
+        if distance >= self._range or off[ray] > self._spacing / 2.0 + 1e-9:
+            return False
+        beside = scan[(ray + np.array((-1, 0, 1))) % len(scan)]
+        return bool(distance <= (beside.max() if farthest else beside.min()) + slack)
+
+
+def _angles(directions: ArrayLike) -> Reals:
+    """Where directions of a view point, radians."""
+    angles: Reals = ((np.asarray(directions) + 0.5) / DIRECTIONS - 0.5) * 2.0 * np.pi
+    return angles
