@@ -1,6 +1,8 @@
 """What a worker does where the machine or the server's store fails it: it waits, or says what is wrong."""
 
 import hashlib
+import os
+import resource
 import signal
 import stat
 import sys
@@ -206,6 +208,33 @@ def test_a_slot_whose_trainers_die_while_they_start_takes_no_run_and_says_why(
         keeper.keep_running()
         place = places(tmp_path, keeper.door)
         with pytest.raises(UnfitError, match=r"ended with status 3\. It printed last:\nno such library"):
+            place.slot.take_trainer()
+
+
+@pytest.fixture
+def many_files() -> Iterator[None]:
+    """As many open files as a descriptor of one more is beyond what `select` can wait for."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, 4096)), hard))
+    descriptors = [os.open(os.devnull, os.O_RDONLY)]
+    while descriptors[-1] < 1100:
+        descriptors.append(os.dup(descriptors[0]))
+    yield
+    for descriptor in descriptors:
+        os.close(descriptor)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+@pytest.mark.usefixtures("many_files")
+def test_a_worker_with_many_open_files_hears_why_no_trainer_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, places: Callable[..., Place]
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    with closing(NurseryKeeper()) as keeper:
+        assert keeper.door > 1024
+        keeper.keep_running()
+        place = places(tmp_path, keeper.door)
+        with pytest.raises(UnfitError, match="No process can be started"):
             place.slot.take_trainer()
 
 

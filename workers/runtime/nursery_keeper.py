@@ -69,7 +69,10 @@ class NurseryKeeper:
                 connection.send(refusal)
 
     def _waiting(self) -> Iterator[int]:
-        while select.select([self._inside], [], [], 0.0)[0]:
+        # Not `select.select`, which refuses descriptors from 1,024 on.
+        waiting = select.poll()
+        waiting.register(self._inside, select.POLLIN)
+        while waiting.poll(0):
             yield from socket.recv_fds(self._inside, MAX_PACKET_BYTES, 1)[1]
 
 
