@@ -99,7 +99,7 @@ def test_all_five_are_launched_from_the_form_learn_and_leave_the_house(
     page.get_by_role("button", name="Advanced").click()
     fill(page, "Robots", 256)
     fill(page, "Learning rate", 0.01)
-    page.get_by_role("checkbox", name="Opening").check()
+    page.get_by_role("checkbox", name="Opening", exact=True).check()
     page.get_by_role("button", name="Add a term").click()
     page.get_by_role("menuitem", name=re.compile("^Gentle turns")).click()
     page.get_by_role("button", name="Launch").click()
