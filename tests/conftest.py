@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import settings
+from kombu.transport.sqlalchemy import Channel
 
 from server.database.engine import Database
 from server.database.migrate import upgrade
@@ -41,6 +42,15 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(10_000, 10, 10)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def brokers_are_left() -> Iterator[None]:
+    """kombu keeps the files of embedded brokers open for as long as the process lasts: thousands, of servers that ended."""
+    yield
+    for engine, _ in Channel._engines.values():
+        engine.dispose()
+    Channel._engines.clear()
 
 
 @pytest.fixture(autouse=True)
