@@ -20,6 +20,7 @@ from sim.config import (
     DeviationPart,
     DirectionPart,
     DistancePart,
+    DwellPart,
     HeadingPart,
     KnownPart,
     ObservationPart,
@@ -35,7 +36,17 @@ from sim.config import (
 from sim.config.observation import part_size
 from sim.extending.parts import ObservationNumber
 from sim.kernels.records import PART_KINDS
-from sim.kernels.room import LONG_TRAIL_ROOM, MAX_FRAMES, MAX_PARTS, REACH_DIRECTIONS, SHORT_OF, VIEW_ROOM
+from sim.kernels.room import (
+    AWAY,
+    DETOUR,
+    LONG_STAY,
+    LONG_TRAIL_ROOM,
+    MAX_FRAMES,
+    MAX_PARTS,
+    REACH_DIRECTIONS,
+    SHORT_OF,
+    VIEW_ROOM,
+)
 
 _BEARING = "where bearing = atan2(dy, dx) - heading"
 
@@ -191,6 +202,9 @@ def _numbers(part: ObservationPart, task: TaskConfig) -> tuple[ObservationNumber
             return tuple(_known(part, task))
         case OpeningsPart():
             return tuple(_openings(part, task))
+        case DwellPart():
+            staying = f"t / (t + {LONG_STAY:g} s), t = time since it last came {AWAY:g} m away from where it then was"
+            return (ObservationNumber("dwell", staying, 0.0, 1.0),)
         case AddedObservationPart():
             return tuple(part.numbers())
 
@@ -273,7 +287,11 @@ def _openings(part: OpeningsPart, task: TaskConfig) -> Iterator[ObservationNumbe
             1.0,
         )
         yield ObservationNumber(
-            f"opening {k}, rest", f"r / (r + 1 m), r = metres straight on from opening {k} to the target", 0.0, 1.0
+            f"opening {k}, rest",
+            f"r / (r + 1 m), r = metres straight on from opening {k} to the target, {DETOUR:g} more for each wall that was "
+            "seen between",
+            0.0,
+            1.0,
         )
         free = f"1 where the body can go straight on to opening {k} from the view that saw it, else 0"
         yield ObservationNumber(f"opening {k}, free", free, 0.0, 1.0)

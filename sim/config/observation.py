@@ -174,7 +174,7 @@ class KnownPart(Frozen):
 
 
 class OpeningsPart(Frozen):
-    """Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free."""
+    """Where it has not looked yet: edges of what it has seen by which its target is nearest if what was not seen is free."""
 
     name: Literal["openings"] = Field("openings", title="Openings to look into")
     count: int = Field(
@@ -182,10 +182,18 @@ class OpeningsPart(Frozen):
         ge=1,
         le=MAX_LEADS,
         title="Openings",
-        description="The best ones, five numbers each: where to go first on the way there, how far it is, how far on from "
-        "there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.",
+        description="The best ones, six numbers each: where to go first on the way there, how far it is, how far on from "
+        "there, and whether it saw the way to be free. They come from views that it keeps every 0.48 m, and from which of "
+        "them are in sight of one another.",
         json_schema_extra=ADVANCED,
     )
+    frames: int = _frames()
+
+
+class DwellPart(Frozen):
+    """How long it has stayed about where it is: what tells a robot that turns about on one spot that it does."""
+
+    name: Literal["dwell"] = Field("dwell", title="Time on one spot")
     frames: int = _frames()
 
 
@@ -235,6 +243,7 @@ BuiltInPart = (
     | ReachPart
     | KnownPart
     | OpeningsPart
+    | DwellPart
 )
 
 if TYPE_CHECKING:

@@ -21,6 +21,7 @@ from sim.config import (
     DeviationPart,
     DirectionPart,
     DistancePart,
+    DwellPart,
     FormulaTerm,
     HeadingPart,
     KnownPart,
@@ -38,6 +39,7 @@ from sim.engine.added_parts import AddedParts
 from sim.engine.footprint import rectangle_clearance
 from sim.engine.paths import Paths
 from sim.engine.physics import add_arena, robot_body
+from sim.engine.plain_dwell import PlainDwell
 from sim.engine.plain_known import seen_known
 from sim.engine.plain_openings import PlainOpenings
 from sim.engine.plain_reach import seen_reach
@@ -127,6 +129,7 @@ class PlainWorld:
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
         self._trail = PlainTrail(task.lidar)
         self._trail.drop(pose[:2])
+        self._dwell = PlainDwell(pose, task.control_period)
         self._views = PlainViews(task.lidar)
         self._openings = PlainOpenings(task.lidar, near_distance(task), self._views)
         self._sees_views = any(isinstance(part, KnownPart | OpeningsPart) for part in task.observation.parts)
@@ -186,8 +189,9 @@ class PlainWorld:
         )
 
     def _keep_view(self, ranges: NDArray[np.float64]) -> None:
-        if self._sees_views and self._views.keep(ranges, (*self.body.position, self.body.angle)):
-            self._openings.look()
+        if self._sees_views:
+            is_kept = self._views.keep(ranges, (*self.body.position, self.body.angle))
+            self._openings.follow(self.steps, (float(self.target[0]), float(self.target[1])), is_kept=is_kept)
 
     def _part(self, part: ObservationPart, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
         """The numbers of one part, see `sim.config.observation`."""
@@ -221,7 +225,9 @@ class PlainWorld:
             case KnownPart():
                 return seen_known(self._views.kept, ranges, (*self.body.position, heading), self.target, part, task.lidar)
             case OpeningsPart():
-                return self._openings.seen(ranges, (*self.body.position, heading), self.target, part)
+                return self._openings.seen(ranges, (*self.body.position, heading), part)
+            case DwellPart():
+                return np.array([self._dwell.seen(self.body.position, self.steps)])
             case AddedObservationPart():
                 return np.asarray(self._added_parts.seen(self._sight(ranges))[part.name][0], np.float64)
 

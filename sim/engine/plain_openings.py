@@ -2,18 +2,20 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
+from dataclasses import dataclass, field, replace
+from itertools import chain, groupby
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.config import LidarConfig, OpeningsPart
 from sim.engine.plain_views import PlainView, PlainViews, wrapped
-from sim.kernels.find_openings import FLAT_RUN, JUMP, SAME_OPENING, SLACK
-from sim.kernels.openings import APART, AT_HAND, DETOUR
-from sim.kernels.room import LINK_ROOM, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
+from sim.kernels.find_openings import FLAT_RUN, SAME_OPENING, SLACK
+from sim.kernels.openings import APART, AT_HAND
+from sim.kernels.patience import DUE, NEARER, PATIENCE
+from sim.kernels.room import DETOUR, LINK_ROOM, MAX_LEADS, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
 from sim.kernels.views import FULL_RANGE, SLIM, VIEW_DIRECTIONS
+from sim.kernels.walls import CHORD_DIRECTIONS, CHORDS, JUMP, MARGIN, WALL_BITS, WALL_SPACING
 from sim.lidar import ray_angles
 
 Place = tuple[float, float]
@@ -27,25 +29,53 @@ class _Opening:
         place: metres.
         view: number of the view that it was seen from.
         is_free: whether the body can go there straight on from that.
+        crossed: pieces of the line from there to the target that walls cross, numbered from the opening on.
     """
 
     place: Place
     view: int
     is_free: bool
+    crossed: frozenset[int] = frozenset()
+
+    @property
+    def walls(self) -> int:
+        """How many walls those are: pieces side by side are of one."""
+        return sum(piece - 1 not in self.crossed for piece in self.crossed)
+
+
+@dataclass
+class _Patience:
+    """What is known of an opening, or of the target, since it was told first.
+
+    Attributes:
+        due: metres that it counts farther.
+        nearest: the least way to it that there was then, metres.
+    """
+
+    due: float = 0.0
+    nearest: float = math.inf
+
+    def wait(self, way: float, steps: int) -> None:
+        """After so many steps in which it was told first, with so long a way, metres: was the robot coming nearer?"""
+        if way < self.nearest - NEARER:
+            self.nearest = way
+        else:
+            self.due += DUE * steps
 
 
 @dataclass(frozen=True)
 class _Lead:
-    """An opening, or the target if a view shows it, the metres to it by known ways and those straight on to the target."""
+    """An opening, or the target if a view shows it, the metres to it by known ways and those that are taken to be left."""
 
     opening: _Opening
     way: float
     rest: float
+    patience: _Patience
 
     @property
     def whole(self) -> float:
         """Metres that the way to the target is taken to have."""
-        return self.way + self.rest + (0.0 if self.opening.is_free else DETOUR)
+        return self.way + self.rest + self.patience.due + (0.0 if self.opening.is_free else DETOUR)
 
 
 @dataclass
@@ -55,7 +85,7 @@ class PlainOpenings:
     Attributes:
         lidar: of the robot.
         near: metres, see `sim.observations.near_distance`.
-        views: that it keeps; whoever keeps one calls `look`.
+        views: that it keeps.
     """
 
     lidar: LidarConfig
@@ -63,6 +93,10 @@ class PlainOpenings:
     views: PlainViews
     _links: list[list[int]] = field(default_factory=list)
     _slots: list[_Opening | None] = field(default_factory=lambda: [None] * OPENING_ROOM)
+    _patience: list[_Patience] = field(default_factory=lambda: [_Patience() for _ in range(OPENING_ROOM)])
+    _patience_with_target: _Patience = field(default_factory=_Patience)
+    _leads: list[_Lead] = field(default_factory=list)
+    _chosen_at: int = 0
     _ways: dict[int, float] = field(default_factory=dict)
     _next: dict[int, int] = field(default_factory=dict)
 
@@ -77,17 +111,53 @@ class PlainOpenings:
         """What a view keeps where a ray meets nothing, metres; rounded as it is there."""
         return FULL_RANGE * self.lidar.range / FULL_RANGE
 
-    def look(self) -> None:
+    def follow(self, step: int, target: Place, *, is_kept: bool) -> None:
+        """Choose what is told after so many steps: where a view was kept in the last of them, and else every 16."""
+        if is_kept or step - self._chosen_at >= PATIENCE:
+            if self._leads:
+                self._leads[0].patience.wait(self._leads[0].way, step - self._chosen_at)
+            if is_kept:
+                self._look(target)
+            self._leads, self._chosen_at = self._choose(target), step
+
+    def _look(self, target: Place) -> None:
         """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
         newest = self.views.kept[-1]
         self._links.append(self._links_of(newest))
         for slot, opening in enumerate(self._slots):
             if opening and (opening.view not in self._remembered or self._shows(newest, opening.place, SLACK)):
                 self._slots[slot] = None
+            elif opening:
+                crossed = opening.crossed.union(self._walls_across(newest, opening.place, target))
+                self._slots[slot] = replace(opening, crossed=crossed)
         for place, is_free in self._edges(newest):
             if not any(self._shows(self.views.kept[number], place, SLACK) for number in self._remembered[:-1]):
-                self._open(_Opening(place, self._remembered[-1], is_free))
+                views = (self.views.kept[number] for number in self._remembered)
+                crossed = frozenset(chain.from_iterable(self._walls_across(view, place, target) for view in views))
+                self._open(_Opening(place, self._remembered[-1], is_free, crossed))
         self._measure_ways()
+
+    def _walls_across(self, view: PlainView, place: Place, target: Place) -> Iterator[int]:
+        """Pieces of the line from a place to the target that walls of a view cross."""
+        solid = [self._is_solid(view, chord) for chord in range(CHORDS)]
+        length = math.dist(place, target)
+        for chord in range(CHORDS):
+            if not (solid[chord - 1] and solid[chord] and solid[(chord + 1) % CHORDS]) or length <= 2.0 * MARGIN:
+                continue
+            ends = [(chord + k) * CHORD_DIRECTIONS % VIEW_DIRECTIONS for k in (0, 1)]
+            (one_along, one_across), (other_along, other_across) = (
+                _along_and_across(_place(view, k, view.readings[k]), place, target) for k in ends
+            )
+            if (one_across > 0.0) != (other_across > 0.0):
+                along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
+                if MARGIN < along < length - MARGIN:
+                    yield min(int(along / WALL_SPACING), WALL_BITS - 1)
+
+    def _is_solid(self, view: PlainView, chord: int) -> bool:
+        """Whether all readings of a chord met something, and one thing."""
+        readings = np.take(view.readings, CHORD_DIRECTIONS * chord + np.arange(CHORD_DIRECTIONS + 1), mode="wrap")
+        meets = (readings > 0.0) & (readings < self._farthest)
+        return bool(meets.all() and (np.abs(np.diff(readings)) <= JUMP).all())
 
     def _links_of(self, newest: PlainView) -> list[int]:
         """The view before it, and the oldest and the nearest of each run of earlier ones that it can go to."""
@@ -141,7 +211,10 @@ class PlainOpenings:
         same = next((k for k, one in slots if one and math.dist(one.place, opening.place) < SAME_OPENING), None)
         known = None if same is None else self._slots[same]
         if known is None or opening.is_free or not known.is_free:
-            self._slots[taken.index(min(taken)) if same is None else same] = opening
+            slot = taken.index(min(taken)) if same is None else same
+            self._slots[slot] = opening
+            if same is None:
+                self._patience[slot] = _Patience()
 
     def _shows(self, view: PlainView, place: Place, slack: float) -> bool:
         """Whether neither of the two readings beside a place ends more than the slack before it."""
@@ -182,34 +255,33 @@ class PlainOpenings:
                 if way < self._ways[other]:
                     self._ways[other], self._next[other] = way, one
 
-    def _leads(self, target: Place, count: int) -> list[_Lead]:
+    def _choose(self, target: Place) -> list[_Lead]:
         """The openings by which the target would be nearest, the best one first."""
         views = ((number, self.views.kept[number]) for number in self._remembered)
         sights = [
-            _Opening(target, number, self._is_passable(view, target))
+            (_Opening(target, number, self._is_passable(view, target)), self._patience_with_target)
             for number, view in views
             if self._shows(view, target, 0.0)
         ]
         found = []
-        for one in (*sights, *filter(None, self._slots)):
-            way = self._ways[one.view] + math.dist(self.views.kept[one.view].place, one.place)
-            found.append(_Lead(one, way, math.dist(one.place, target)))
+        for one, patience in (*sights, *zip(self._slots, self._patience, strict=True)):
+            if one is not None:
+                way = self._ways[one.view] + math.dist(self.views.kept[one.view].place, one.place)
+                found.append(_Lead(one, way, math.dist(one.place, target) + DETOUR * one.walls, patience))
         chosen: list[_Lead] = []
         for lead in sorted(found, key=lambda lead: lead.whole):
             if all(math.dist(lead.opening.place, other.opening.place) >= APART for other in chosen):
                 chosen.append(lead)
-        return chosen[:count]
+        return chosen[:MAX_LEADS]
 
-    def seen(
-        self, ranges: NDArray[np.float64], pose: Sequence[float], target: Sequence[float], part: OpeningsPart
-    ) -> NDArray[np.float64]:
+    def seen(self, ranges: NDArray[np.float64], pose: Sequence[float], part: OpeningsPart) -> NDArray[np.float64]:
         """Which openings a robot at a pose had better look into, given its scan, metres: a part's numbers.
 
         Returns:
             (6 * count,).
         """
         numbers = np.zeros((part.count, OPENING_KINDS))
-        for row, lead in zip(numbers, self._leads((target[0], target[1]), part.count), strict=False):
+        for row, lead in zip(numbers, self._leads, strict=False):
             dx, dy = self._first_place(lead.opening, ranges, pose)
             bearing = math.atan2(dy, dx) - pose[2]
             row[:] = (
@@ -248,6 +320,14 @@ class PlainOpenings:
             return False
         beside = [ranges[(ray + k) % len(angles)] for k in (-1, 0, 1)]
         return bool(distance <= (max(beside) if farthest else min(beside)) + slack)
+
+
+def _along_and_across(place: Place, begin: Place, end: Place) -> tuple[float, float]:
+    """Metres of a place along the line from one to another, and to the left of it."""
+    length = math.dist(begin, end)
+    cos, sin = (end[0] - begin[0]) / length, (end[1] - begin[1]) / length
+    x, y = place[0] - begin[0], place[1] - begin[1]
+    return x * cos + y * sin, y * cos - x * sin
 
 
 def _angle(direction: ArrayLike) -> NDArray[np.float64]:

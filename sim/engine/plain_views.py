@@ -50,7 +50,7 @@ class PlainViews:
         directions = ((np.arange(VIEW_DIRECTIONS) + 0.5) / VIEW_DIRECTIONS * 2.0 - 1.0) * math.pi
         off = np.abs(wrapped(directions[:, None] - pose[2] - self._angles))
         rays = off.argmin(axis=1)
-        told = off[np.arange(len(off)), rays] <= self._reach
+        told = off[np.arange(len(off)), rays] <= self._reach + 1e-9
         readings = np.where(told, ranges[: len(self._angles)][rays], 0.0)
         self.kept.append(PlainView(place, np.floor(readings / self._range * FULL_RANGE + 0.5) * self._range / FULL_RANGE))
         return True

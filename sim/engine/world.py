@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.actions import action_layout, fastest_way, twists
 from sim.arenas import Arena, free_distance
 from sim.arenas.freespace import SPAWN_MARGIN, FreeSpace, free_space
-from sim.config import KnownPart, OpeningsPart, RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
+from sim.config import DwellPart, KnownPart, OpeningsPart, RandomisationConfig, ReachPart, TaskConfig, TrailPart, WayPart
 from sim.engine.added_parts import AddedParts
 from sim.engine.disturbances import longest_delay, quantity_spans
 from sim.engine.footprint import rectangle_clearance
@@ -29,6 +29,7 @@ from sim.extending.observing import Sight
 from sim.kernels.bundles import Geometry, Robots
 from sim.kernels.commands import write_commands
 from sim.kernels.disturbances import rays_ahead
+from sim.kernels.dwell import STAY_NUMBERS
 from sim.kernels.openings import LEAD_NUMBERS
 from sim.kernels.options import bound
 from sim.kernels.random import seed_streams
@@ -185,8 +186,10 @@ class World:
         trails = [part.memory for part in task.observation.parts if isinstance(part, TrailPart)]
         sees_trail = bool(trails)
         sees_ways = any(
-            isinstance(part, TrailPart | WayPart | ReachPart | KnownPart | OpeningsPart) for part in task.observation.parts
+            isinstance(part, TrailPart | WayPart | ReachPart | KnownPart | OpeningsPart | DwellPart)
+            for part in task.observation.parts
         )
+        stays = robots if any(isinstance(part, DwellPart) for part in task.observation.parts) else 0
         knows = any(isinstance(part, KnownPart | OpeningsPart) for part in task.observation.parts)
         looks = robots if any(isinstance(part, OpeningsPart) for part in task.observation.parts) else 0
         drifts, holds = spans[[DISTANCE_NOISE, HEADING_NOISE]].any(), spans[RATE].any()
@@ -215,6 +218,7 @@ class World:
             ),
             crumbs=np.zeros(robots if sees_trail else 0, dtype=np.int32),
             reach=np.zeros((robots, len(directions)) if len(directions) else (0, 0), dtype=np.float32),
+            stays=np.zeros((stays, STAY_NUMBERS), dtype=np.float32),
             view_places=np.zeros((robots if knows else 0, VIEW_ROOM, 2), dtype=np.float32),
             views=np.zeros((robots if knows else 0, VIEW_ROOM, VIEW_DIRECTIONS), dtype=np.uint8),
             views_kept=np.zeros(robots if knows else 0, dtype=np.int32),
@@ -225,6 +229,11 @@ class World:
             opening_places=np.zeros((looks, OPENING_ROOM, 2), dtype=np.float32),
             opening_views=np.zeros((looks, OPENING_ROOM), dtype=np.int32),
             opening_frees=np.zeros((looks, OPENING_ROOM), dtype=np.bool_),
+            view_walls=np.zeros((looks, VIEW_ROOM), dtype=np.int32),
+            opening_walls=np.zeros((looks, OPENING_ROOM), dtype=np.int64),
+            opening_dues=np.zeros((looks, OPENING_ROOM + 1), dtype=np.float32),
+            opening_nearest=np.zeros((looks, OPENING_ROOM + 1), dtype=np.float32),
+            followed=np.zeros((looks, 2), dtype=np.int32),
             leads=np.zeros((looks, MAX_LEADS, LEAD_NUMBERS), dtype=np.float32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),
             scan_ages=np.zeros(robots if holds else 0, dtype=np.int32),

@@ -123,6 +123,8 @@ class Robots(NamedTuple):
         crumbs: (N,) how many were dropped; (0,) likewise.
         reach: (N, 2 * directions + TOGETHER) scratch for the metres that the robot could go straight on, in those of
             `Geometry.reach_cos`; (0, 0) where nobody sees them.
+        stays: (N, STAY_NUMBERS) where it believed to be when it began to stay about there, and for how many steps, see
+            `sim.kernels.dwell`; (0, STAY_NUMBERS) where nobody sees them.
         view_places: (N, VIEW_ROOM, 2) x, y of where views of this attempt were kept, as `trail`; (0, VIEW_ROOM, 2) where
             nobody sees since when it knows what it sees.
         views: (N, VIEW_ROOM, VIEW_DIRECTIONS) uint8, what the first LiDAR read from there in each direction, FULL_RANGE at
@@ -134,9 +136,16 @@ class Robots(NamedTuple):
         view_next: (N, VIEW_ROOM) number of the view by which it goes there, -1 for the newest; (0, ...) likewise.
         view_sights: (N, VIEW_ROOM) uint8, 0 where it did not show the target, 2 where the way there is free; (0, ...)
             likewise.
+        view_walls: (N, VIEW_ROOM) bits, which chords of it are walls, see `sim.kernels.walls`; (0, ...) likewise.
         opening_places: (N, OPENING_ROOM, 2) x, y of openings, as `trail`; (0, ...) likewise.
         opening_views: (N, OPENING_ROOM) number of the view that saw it, -1 where there is no opening; (0, ...) likewise.
         opening_frees: (N, OPENING_ROOM) whether the body can go straight on from that view; (0, ...) likewise.
+        opening_walls: (N, OPENING_ROOM) bits, where walls cross the line from there to the target; (0, ...) likewise.
+        opening_dues: (N, OPENING_ROOM + 1) metres that it counts farther, see `sim.kernels.patience`, behind them the
+            target; (0, ...) likewise.
+        opening_nearest: (N, OPENING_ROOM + 1) metres on known ways to it, the least when it was told first; (0, ...)
+            likewise.
+        followed: (N, 2) row of what is told first, -1 for none, and steps since it was chosen; (0, 2) likewise.
         leads: (N, MAX_LEADS, LEAD_NUMBERS) those that are told, view -1 where there is none; (0, ...) likewise.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
         scan_ages: (N,) steps since this episode's first scan; (0,) likewise.
@@ -164,6 +173,7 @@ class Robots(NamedTuple):
     trail: Floats
     crumbs: Integers
     reach: Floats
+    stays: Floats
     view_places: Floats
     views: NDArray[np.uint8]
     views_kept: Integers
@@ -171,9 +181,14 @@ class Robots(NamedTuple):
     view_ways: Floats
     view_next: Integers
     view_sights: NDArray[np.uint8]
+    view_walls: Integers
     opening_places: Floats
     opening_views: Integers
     opening_frees: NDArray[np.bool_]
+    opening_walls: NDArray[np.int64]
+    opening_dues: Floats
+    opening_nearest: Floats
+    followed: Integers
     leads: Floats
     held_ranges: Floats
     scan_ages: Integers

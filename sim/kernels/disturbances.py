@@ -61,10 +61,6 @@ def begin_episode(i, robots, geometry, p):
         robots.pending[i] = ZERO
     if robots.commands.shape[0]:
         robots.commands[i] = ZERO
-    if robots.crumbs.shape[0]:
-        robots.crumbs[i] = 0
-    if robots.views_kept.shape[0]:
-        robots.views_kept[i] = 0
     if robots.scan_ages.shape[0]:
         robots.scan_ages[i] = 0
 
@@ -76,6 +72,8 @@ def find_itself(i, robots):
         robots.drift[i] = 0.0
     if robots.crumbs.shape[0]:
         robots.crumbs[i] = 0
+    if robots.stays.shape[0]:
+        robots.stays[i, 2] = -1.0
     if robots.views_kept.shape[0]:
         robots.views_kept[i] = 0
 

@@ -5,12 +5,11 @@ import math
 import numpy as np
 
 from sim.kernels.options import kernel
+from sim.kernels.patience import forgive
 from sim.kernels.room import OPENING_ROOM, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.views import FULL_RANGE, SLIM, VIEW_COS, VIEW_DIRECTIONS, VIEW_SIN, is_free_way, shows
-
-JUMP = 0.4
-"""Metres by which two readings side by side differ where there is an opening between them."""
+from sim.kernels.walls import JUMP, find_walls, walls_across, walls_seen_across
 
 SLACK = 0.2
 """Metres by which a view may fall short of an opening that it shows: a wall that is seen at a flat angle has none."""
@@ -62,7 +61,7 @@ def _is_narrow(i, row, near, beyond, step, robots, p):
 
 
 @kernel(fastmath=FAST)
-def _open(i, x, y, is_free, number, first, robots, p):
+def _open(i, x, y, is_free, number, first, target_x, target_y, robots, p):
     """Remember an opening of the newest view, unless an earlier one shows it."""
     for other in range(first, number):
         if shows(i, other % VIEW_ROOM, x, y, _SLACK, robots, p):
@@ -71,6 +70,7 @@ def _open(i, x, y, is_free, number, first, robots, p):
     seen_from = robots.opening_views
     # In place of the same one, or of the one that was seen the longest ago.
     place = 0
+    is_new = True
     for k in range(OPENING_ROOM):
         if seen_from[i, k] >= 0:
             dx = places[i, k, 0] - x
@@ -79,19 +79,24 @@ def _open(i, x, y, is_free, number, first, robots, p):
                 if robots.opening_frees[i, k] and not is_free:
                     return
                 place = k
+                is_new = False
                 break
         if seen_from[i, k] < seen_from[i, place]:
             place = k
     places[i, place, 0] = x
     places[i, place, 1] = y
+    if is_new:
+        forgive(i, place, robots)
+    robots.opening_walls[i, place] = walls_seen_across(i, x, y, target_x, target_y, number, first, robots, p)
     seen_from[i, place] = number
     robots.opening_frees[i, place] = is_free
 
 
 @kernel(fastmath=FAST)
-def look_for_openings(i, number, first, robots, p):
-    """Close the openings that the newest view shows, and open those that it has."""
+def look_for_openings(i, number, first, target_x, target_y, robots, p):
+    """Close the openings that the newest view shows, open those that it has; see what walls it has before the target."""
     row = number % VIEW_ROOM
+    find_walls(i, row, robots, p)
     seen_from = robots.opening_views
     for k in range(OPENING_ROOM):
         if number == first:
@@ -101,6 +106,8 @@ def look_for_openings(i, number, first, robots, p):
             y = robots.opening_places[i, k, 1]
             if seen_from[i, k] < first or shows(i, row, x, y, _SLACK, robots, p):
                 seen_from[i, k] = -1
+            else:
+                robots.opening_walls[i, k] |= walls_across(i, row, x, y, target_x, target_y, robots, p)
     here_x = robots.view_places[i, row, 0]
     here_y = robots.view_places[i, row, 1]
     scale = p.range / _FULL
@@ -125,12 +132,14 @@ def look_for_openings(i, number, first, robots, p):
                 is_free = is_free_way(i, row, _EDGE_COS[k], _EDGE_SIN[k], nearer - p.near, robots, p)
                 away = (right + left) * _HALF
                 x = here_x + away * _EDGE_COS[k]
-                _open(i, x, here_y + away * _EDGE_SIN[k], is_free, number, first, robots, p)
+                _open(i, x, here_y + away * _EDGE_SIN[k], is_free, number, first, target_x, target_y, robots, p)
         run = run + 1 if a == FULL_RANGE else 0
         if run > 0 and (run == FLAT_RUN or b != FULL_RANGE):
             middle_of_run = k - run // 2
             if run > 1:
                 is_free = is_free_way(i, row, VIEW_COS[middle_of_run], VIEW_SIN[middle_of_run], p.range, robots, p)
                 x = here_x + p.range * VIEW_COS[middle_of_run]
-                _open(i, x, here_y + p.range * VIEW_SIN[middle_of_run], is_free, number, first, robots, p)
+                _open(
+                    i, x, here_y + p.range * VIEW_SIN[middle_of_run], is_free, number, first, target_x, target_y, robots, p
+                )
             run = 0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim.kernels.dwell import see_dwell
 from sim.kernels.known import see_known
 from sim.kernels.openings import see_openings
 from sim.kernels.options import kernel
@@ -14,6 +15,7 @@ from sim.kernels.records import (
     DEVIATION_PART,
     DIRECTION_PART,
     DISTANCE_PART,
+    DWELL_PART,
     HEADING_PART,
     KNOWN_PART,
     OMNIDIRECTIONAL,
@@ -145,6 +147,8 @@ def observe_ways(i, robots, geometry, p):
         see_reach(i, dx, dy, heading, robots, geometry, p)
     if p.part_places[TRAIL_PART] >= 0:
         see_trail(i, x, y, heading, robots, geometry, p)
+    if p.part_places[DWELL_PART] >= 0:
+        see_dwell(i, x, y, robots, p)
     sees_openings = p.part_places[OPENINGS_PART] >= 0
     is_kept = False
     if p.part_places[KNOWN_PART] >= 0 or sees_openings:

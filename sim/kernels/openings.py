@@ -3,8 +3,10 @@
 An opening is where one reading of a view ends much farther away than the one beside it, or at the LiDAR's range: what lies
 behind it was not seen from there. One that no other view shows is open (`sim.kernels.find_openings`). Views that the body
 can go to from one another are linked (`sim.kernels.view_links`), so that a robot knows how far it is to each opening by ways
-that it knows, and is told those that A* would choose (Hart, Nilsson and Raphael 1968). The openings are the gaps of Tovar,
-Murrieta-Cid and LaValle (2007), "Distance-Optimal Navigation in an Unknown Environment Without Sensing Distances".
+that it knows, and is told those that A* would choose (Hart, Nilsson and Raphael 1968): which does not go through a wall that
+was seen (`sim.kernels.walls`). One that it was led to for long and came no nearer to counts farther
+(`sim.kernels.patience`). The openings are the gaps of Tovar, Murrieta-Cid and LaValle (2007), "Distance-Optimal Navigation
+in an Unknown Environment Without Sensing Distances".
 """
 
 import math
@@ -13,11 +15,13 @@ import numpy as np
 
 from sim.kernels.find_openings import SLACK, look_for_openings
 from sim.kernels.options import kernel
+from sim.kernels.patience import PATIENCE, TARGET_SLOT, forgive, lose_patience
 from sim.kernels.records import OPENINGS_PART
-from sim.kernels.room import OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
+from sim.kernels.room import DETOUR, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.view_links import FAR, link_view, measure_ways
 from sim.kernels.views import FREE_SIGHT, sight_of
+from sim.kernels.walls import count_walls
 
 APART = 1.0
 """Metres that the openings that are told lie apart, at least."""
@@ -25,12 +29,9 @@ APART = 1.0
 AT_HAND = 0.35
 """Metres from a view at which a robot is there, and goes on to what comes next."""
 
-DETOUR = 4.0
-"""Metres that a way is taken to be longer where the body can't go straight on from the view to the opening."""
-
 LEAD_NUMBERS = 6
-"""What is kept of an opening that is told: x, y, metres on known ways to it, metres straight on from it, its view, and
-whether the way from there is free."""
+"""What is kept of an opening that is told: x, y, metres on known ways to it, metres that it is taken to be from there, its
+view, and whether the way from that is free."""
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -73,6 +74,7 @@ def _is_apart(i, x, y, lead, robots):
 @kernel(fastmath=FAST)
 def choose_leads(i, target_x, target_y, number, first, count, robots):
     """Write those openings by which the target would be nearest; the target itself where a view shows it."""
+    robots.followed[i, 0] = -1
     for lead in range(count):
         robots.leads[i, lead, 4] = -ONE
         least = FAR
@@ -80,9 +82,13 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
             seen = robots.view_sights[i, other % VIEW_ROOM]
             if seen > 0 and _is_apart(i, target_x, target_y, lead, robots):
                 way = _way_to(i, target_x, target_y, other, robots)
-                whole = way if seen == FREE_SIGHT else way + _DETOUR
+                whole = way + robots.opening_dues[i, TARGET_SLOT]
+                if seen != FREE_SIGHT:
+                    whole += _DETOUR
                 if whole < least:
                     least = whole
+                    if lead == 0:
+                        robots.followed[i, 0] = TARGET_SLOT
                     _write_lead(i, lead, target_x, target_y, way, ZERO, other, seen == FREE_SIGHT, robots)
         for k in range(OPENING_ROOM):
             view = robots.opening_views[i, k]
@@ -92,10 +98,15 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
             y = robots.opening_places[i, k, 1]
             way = _way_to(i, x, y, view, robots)
             rest = np.float32(math.sqrt((target_x - x) * (target_x - x) + (target_y - y) * (target_y - y)))
+            rest += _DETOUR * np.float32(count_walls(robots.opening_walls[i, k]))
             is_free = robots.opening_frees[i, k]
-            whole = way + rest if is_free else way + rest + _DETOUR
+            whole = way + rest + robots.opening_dues[i, k]
+            if not is_free:
+                whole += _DETOUR
             if whole < least and _is_apart(i, x, y, lead, robots):
                 least = whole
+                if lead == 0:
+                    robots.followed[i, 0] = k
                 _write_lead(i, lead, x, y, way, rest, view, is_free, robots)
 
 
@@ -165,11 +176,20 @@ def see_openings(i, x, y, to_x, to_y, heading, is_kept, robots, geometry, p):
     number = robots.views_kept[i] - 1
     first = max(0, number + 1 - VIEW_ROOM)
     count = p.part_options[OPENINGS_PART]
+    if is_kept and number == 0:
+        robots.followed[i, 0] = -1
+        forgive(i, TARGET_SLOT, robots)
+    else:
+        robots.followed[i, 1] += 1
+    is_chosen_anew = is_kept or robots.followed[i, 1] >= PATIENCE
+    if is_chosen_anew:
+        lose_patience(i, robots)
     if is_kept:
         link_view(i, number, first, robots, p)
-        look_for_openings(i, number, first, robots, p)
+        look_for_openings(i, number, first, x + to_x, y + to_y, robots, p)
         measure_ways(i, number, first, robots)
         robots.view_sights[i, number % VIEW_ROOM] = sight_of(i, number % VIEW_ROOM, x + to_x, y + to_y, robots, p)
+    if is_chosen_anew:
         choose_leads(i, x + to_x, y + to_y, number, first, count, robots)
     out = robots.observations
     at = p.part_places[OPENINGS_PART]

@@ -24,6 +24,7 @@ PART_KINDS = (
     "reach",
     "known",
     "openings",
+    "dwell",
 )
 """Kinds of an observation's parts, see `sim.config.ObservationPart`; a kind's place here is its number."""
 
@@ -41,6 +42,7 @@ PART_KINDS = (
     REACH_PART,
     KNOWN_PART,
     OPENINGS_PART,
+    DWELL_PART,
 ) = range(len(PART_KINDS))
 
 DIFFERENTIAL, OMNIDIRECTIONAL, ACKERMANN = 0, 1, 2

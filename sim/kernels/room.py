@@ -27,6 +27,16 @@ OPENING_KINDS = 6
 MAX_LEADS = 3
 """Openings that a robot is told, at most."""
 
+DETOUR = 4.0
+"""Metres that a way is taken to be longer where the body can't go straight on from the view to the opening, and for each
+wall that a view shows between the opening and the target."""
+
+AWAY = 0.48
+"""Metres from where a robot began to stay at which it stays no longer."""
+
+LONG_STAY = 4.0
+"""Seconds on one spot that a robot is told as one half."""
+
 LINK_ROOM = 8
 """Earlier views that a view is linked to, at most."""
 

@@ -17,6 +17,7 @@ from sim.config import (
     DeviationPart,
     DirectionPart,
     DistancePart,
+    DwellPart,
     HeadingPart,
     KnownPart,
     LidarConfig,
@@ -200,6 +201,7 @@ parts = st.tuples(
     st.builds(TrailPart, sectors=st.sampled_from([4, 30]), frames=frames),
     st.builds(KnownPart, sectors=st.sampled_from([4, 30]), frames=frames),
     st.builds(OpeningsPart, count=st.integers(1, 3), frames=frames),
+    st.builds(DwellPart, frames=frames),
     st.builds(WayPart, frames=frames),
     st.builds(ReachPart, sectors=st.sampled_from([4, 30]), frames=frames),
 )

@@ -13,6 +13,7 @@ from sim.engine.plain_views import PlainViews
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
 from sim.kernels.room import VIEW_ROOM
+from sim.kernels.walls import count_walls
 from sim.observations import near_distance, observation_layout
 from tests.sim.scenes import LIDARS, goes_on_bit_for_bit
 
@@ -37,6 +38,11 @@ def drive(made: World, steps: int, linear: float = 1.0, angular: float = 0.0) ->
 def leads(made: World) -> Floats:
     told: Floats = made.robots.observations[0].reshape(-1, 6)
     return told
+
+
+def bearing_of_the_first(made: World) -> float:
+    """Degrees."""
+    return math.degrees(math.atan2(*leads(made)[0, :2].tolist()))
 
 
 def wall_with_gap(x: float, gap: float) -> list[tuple[float, ...]]:
@@ -79,6 +85,50 @@ def test_a_target_in_sight_is_told_with_whether_the_body_can_go_there_straight_o
     made = world(looking(1), *wall_with_gap(0.5, gap), half=1.5)
     made.reset(poses=(-0.5, 0.0, 0.0), targets=(1.2, 0.0))
     assert leads(made)[0] == pytest.approx([0.0, 1.0, 1.0 - 1.7 / 3.5, 1.7 / 2.7, 0.0, is_free], abs=1e-5)
+
+
+def test_a_wall_that_was_seen_between_an_opening_and_the_target_is_a_detour_of_4_metres() -> None:
+    # The way out of a room 1.8 m wide is a gap to its left; the target lies 0.3 m behind the wall to its right.
+    made = world(looking(1), *wall_with_gap(-0.8, 0.6), (1.0, 0.0, 0.02, 1.5, 0.0), half=1.5)
+    made.reset(poses=(0.0, 0.3, 0.0), targets=(1.3, -0.2))
+    (sine, cosine, nearness, _, rest, is_free) = leads(made)[0].tolist()
+    away = (1.0 - nearness) * 3.5
+    straight = math.dist((away * cosine, 0.3 + away * sine), (1.3, -0.2))
+    assert cosine < 0.0
+    assert is_free == 1.0
+    assert rest / (1.0 - rest) == pytest.approx(straight + 4.0, abs=0.01)
+    drive(made, 20, 0.3, 0.2)
+    # It is one wall however often it is seen.
+    assert 4.0 < leads(made)[0, 4] / (1.0 - leads(made)[0, 4]) < straight + 4.5
+
+
+def test_a_pillar_is_no_wall() -> None:
+    made = world(looking(1), (1.0, 0.0, 0.1, 0.1, 0.0), half=1.5)
+    made.reset(poses=(0.0, 0.0, 0.0), targets=(1.3, 0.0))
+    (*_, rest, _) = leads(made)[0].tolist()
+    assert 0.0 < rest / (1.0 - rest) < 0.5
+
+
+def test_one_that_it_comes_no_nearer_to_falls_behind() -> None:
+    made = world(looking())
+    made.reset(poses=(0.0, 0.0, 0.0), targets=(4.0, 3.0))
+    # As in the open above: by the second one the target is 0.69 m farther away. After 16 steps the first one's way was never
+    # longer; from then on it counts 0.64 m farther for every 16.
+    bearings = []
+    for _ in range(3):
+        drive(made, 15, 0.0)
+        bearings.append(bearing_of_the_first(made))
+        drive(made, 1, 0.0)
+        bearings.append(bearing_of_the_first(made))
+    assert bearings == pytest.approx([43.5] * 5 + [13.5], abs=1e-3)
+    # Elsewhere it is as patient as before.
+    made.reset(poses=(0.0, 0.0, 0.0), targets=(4.0, 3.0))
+    drive(made, 40, 0.0)
+    assert bearing_of_the_first(made) == pytest.approx(43.5, abs=1e-3)
+
+
+def test_pieces_of_a_line_side_by_side_are_crossed_by_one_wall() -> None:
+    assert [count_walls(crossed) for crossed in (0b0, 0b1, 0b110, 0b1011001, 1 << 59)] == [0, 1, 1, 3, 1]
 
 
 def test_what_another_view_showed_is_no_opening_any_more() -> None:
@@ -142,14 +192,13 @@ def test_the_oldest_views_are_forgotten_with_their_openings() -> None:
     made, views = world(task, (0.0, 3.0, 0.5, 0.5, 0.3)), PlainViews(FULL)
     plain, part = PlainOpenings(FULL, near_distance(task), views), task.observation.parts[0]
     assert isinstance(part, OpeningsPart)
-    made.reset(poses=(0.0, 0.0, 0.0), targets=(4.5, 4.5))
+    made.reset(poses=(0.0, 0.0, 0.3), targets=(4.5, 4.5))
     robots, agreed = made.robots, 0
     for step in range(3000):  # round and round: 150 m
         believed = robots.poses[0].astype(float)
-        if views.keep(robots.ranges[0].astype(float), believed):
-            plain.look()
+        plain.follow(step, (4.5, 4.5), is_kept=views.keep(robots.ranges[0].astype(float), believed))
         if step > 2900:
-            expected = plain.seen(robots.ranges[0].astype(float), believed, (4.5, 4.5), part)
+            expected = plain.seen(robots.ranges[0].astype(float), believed, part)
             agreed += bool((np.abs(robots.observations[0] - expected) < 1e-3).all())
         drive(made, 1, 1.0, 0.5)
     assert robots.views_kept[0] > VIEW_ROOM
@@ -193,9 +242,9 @@ def test_it_is_what_the_plain_reference_sees(lidar: LidarConfig, arena: str) -> 
     views, plain = begin()
     for _ in range(400):
         believed = (robots.poses[0] + robots.drift[0]).astype(float)
-        if views.keep(robots.ranges[0].astype(float), believed):
-            plain.look()
-        expected = plain.seen(robots.ranges[0].astype(float), believed, robots.targets[0].astype(float), part)
+        scan, (x, y) = robots.ranges[0].astype(float), robots.targets[0].tolist()
+        plain.follow(int(robots.records["steps"][0]), (x, y), is_kept=views.keep(scan, believed))
+        expected = plain.seen(scan, believed, part)
         agreed += bool((np.abs(robots.observations[0] - expected) < 1e-3).all())
         told += int(np.count_nonzero(expected[::6]))
         made.step(np.array([[random.uniform(0.3, 1.0), random.uniform(-1.0, 1.0)]], np.float32))

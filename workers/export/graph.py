@@ -5,10 +5,10 @@
 | observation | `observation` (n, size) as the manifest describes it         | `action`, `velocity`                |
 | scan        | what the observation is made of, of `ranges` (n, scan),     | `observation`, `action`, `velocity` |
 |             | `pose` (n, 3), `target` (n, 2), `speeds` (n, A) and         |                                     |
-|             | `last_action` (n, A); `trail`, `known` and `openings`       |                                     |
-|             | (n, numbers), which a robot's program keeps (`trail.py`,    |                                     |
-|             | `views.py` and `openings.py` in `ros2/mapless_navigator`),  |                                     |
-|             | and an extension's part                                     |                                     |
+|             | `last_action` (n, A); `trail`, `known`, `openings` and      |                                     |
+|             | `dwell` (n, numbers), which a robot's program keeps         |                                     |
+|             | (`trail.py`, `views.py`, `openings.py` and `dwell.py` in    |                                     |
+|             | `ros2/mapless_navigator`), and an extension's part          |                                     |
 |             | (n, numbers) by its name; where earlier                     |                                     |
 |             | moments are seen `previous`, see `Specification.carried`    |                                     |
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from workers.export.check import CheckReport
 from workers.export.graph import LAST_ACTION, POSE, PREVIOUS, RANGES, SPEEDS, TARGET, scan_inputs
 from workers.export.names import MEMORY, NEXT_MEMORY
+from workers.export.ros2.mapless_navigator.dwell import Dwell
 from workers.export.ros2.mapless_navigator.openings import Openings
 from workers.export.ros2.mapless_navigator.policy import Part, Specification
 from workers.export.ros2.mapless_navigator.trail import Trail
@@ -28,7 +29,12 @@ WAYSobservation = frames.push(observe(policy.specification, ranges, [pose], [tar
 STEPprint(f"FORMAT")
 """
 
-_WAYS: Mapping[str, type[Trail | Views | Openings]] = {"trail": Trail, "views": Views, "openings": Openings}
+_WAYS: Mapping[str, type[Trail | Dwell | Views | Openings]] = {
+    "trail": Trail,
+    "dwell": Dwell,
+    "views": Views,
+    "openings": Openings,
+}
 """Modules of what a robot remembers of its way, and their classes."""
 
 _NUMPY_STEP = """\
@@ -201,7 +207,7 @@ def _brought_parts(specification: Specification) -> tuple[Part, ...]:
 def _seen(part: Part) -> str:
     """What the memory of its way tells, as code."""
     name = part.remembered_by
-    return f"{name}.see(ranges[0], pose)" if name == "trail" else f"{name}.see(ranges[0], pose, target)"
+    return f"{name}.see(ranges[0], pose)" if name in ("trail", "dwell") else f"{name}.see(ranges[0], pose, target)"
 
 
 def _at_first(part: Part, specification: Specification) -> str:
@@ -209,6 +215,8 @@ def _at_first(part: Part, specification: Specification) -> str:
     if part.added:
         return f"np.zeros((1, {part.size}), np.float32)"
     memory = _WAYS[part.remembered_by](specification)
+    if isinstance(memory, Dwell):
+        return "np.zeros((1, 1), np.float32)"
     if not isinstance(memory, Trail):
         seen = memory.see([specification.range] * specification.scan_size, (0.0, 0.0, 0.0), (2.0, 1.0))
         return f"np.array([{[round(number, 6) for number in seen.tolist()]}], np.float32)"

@@ -21,6 +21,7 @@ from sim.config import (
     BurgerConfig,
     DifferentialDrive,
     DoubleMount,
+    DwellPart,
     JackalConfig,
     KnownPart,
     LidarConfig,
@@ -95,7 +96,7 @@ TASKS = [
     ),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), TrailPart(sectors=8), KnownPart(sectors=8, frames=2)))),
     TaskConfig(observation=ObservationConfig(parts=(RangesPart(), KnownPart(sectors=8, progress=True)))),
-    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), OpeningsPart(count=3, frames=2)))),
+    TaskConfig(observation=ObservationConfig(parts=(RangesPart(), OpeningsPart(count=3, frames=2), DwellPart(frames=2)))),
 ]
 
 
@@ -216,7 +217,7 @@ def test_the_same_checkpoint_gives_the_same_bundle(make_checkpoint: Callable[...
         ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(memory="long"))),
         ObservationConfig(parts=(RangesPart(), TrailPart(), KnownPart(sectors=8))),
         ObservationConfig(parts=(RangesPart(), ReachPart(progress=True), KnownPart(sectors=8, progress=True))),
-        ObservationConfig(parts=(RangesPart(), TrailPart(), OpeningsPart())),
+        ObservationConfig(parts=(RangesPart(), TrailPart(), OpeningsPart(), DwellPart())),
     ],
     ids=["one moment", "four moments", "trail", "long trail", "known", "progress", "openings"],
 )

@@ -16,6 +16,7 @@ from sim.config import (
     BurgerConfig,
     DifferentialDrive,
     DoubleMount,
+    DwellPart,
     JackalConfig,
     KnownPart,
     LidarConfig,
@@ -33,7 +34,7 @@ from workers.export.ros2.mapless_navigator.navigator import Navigator, Safety, S
 from workers.export.ros2.mapless_navigator.observation import Scan, ray_angles
 from workers.export.ros2.mapless_navigator.policy import Policy, read_safetensors
 
-TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(), KnownPart(), OpeningsPart()))
+TRAIL = ObservationConfig(parts=(RangesPart(), BearingPart(), TrailPart(), KnownPart(), OpeningsPart(), DwellPart()))
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from sim.config import (
     ArenaConfig,
     BearingPart,
     DoubleMount,
+    DwellPart,
     KnownPart,
     LidarConfig,
     ObservationConfig,
@@ -27,6 +28,7 @@ from sim.envs.vector import NavigationVectorEnv
 from sim.lidar import ray_angles as simulated_ray_angles
 from workers.export.bundle import export_checkpoint
 from workers.export.check import run_graph
+from workers.export.ros2.mapless_navigator.dwell import Dwell
 from workers.export.ros2.mapless_navigator.observation import Frames, Scan, observe, ray_angles, resample, wrap
 from workers.export.ros2.mapless_navigator.openings import Openings
 from workers.export.ros2.mapless_navigator.policy import PolicyFileError, Specification
@@ -107,13 +109,14 @@ def test_stacked_frames_are_the_simulators(make_checkpoint: Callable[..., Path])
         (KnownPart(), Views, "Views.see of views.py"),
         (KnownPart(progress=True), Views, "Views.see of views.py"),
         (OpeningsPart(count=3), Openings, "Openings.see of openings.py"),
+        (DwellPart(), Dwell, "Dwell.see of dwell.py"),
     ],
-    ids=["short trail", "long trail", "known", "known with progress", "openings"],
+    ids=["short trail", "long trail", "known", "known with progress", "openings", "dwell"],
 )
 def test_what_it_remembers_of_its_way_is_the_simulators(
     make_checkpoint: Callable[..., Path],
-    part: TrailPart | KnownPart | OpeningsPart,
-    remembers: type[Trail | Views | Openings],
+    part: TrailPart | KnownPart | OpeningsPart | DwellPart,
+    remembers: type[Trail | Dwell | Views | Openings],
     refusal: str,
 ) -> None:
     listed = (RangesPart(batches=30), BearingPart(), part)
@@ -126,7 +129,7 @@ def test_what_it_remembers_of_its_way_is_the_simulators(
     for _ in range(300):
         known = env.ranges, env.poses, env.targets, np.zeros((1, 2))
         sight = env.ranges[0], env.poses[0]
-        seen = {way.kind: (way.see(*sight) if isinstance(way, Trail) else way.see(*sight, env.targets[0]))[None]}
+        seen = {way.kind: (way.see(*sight) if isinstance(way, Trail | Dwell) else way.see(*sight, env.targets[0]))[None]}
         made = observe(exported.specification, *known, added=seen)
         # A crumb on the edge of a sector, what lies on the edge of what a ray meets, falls on either side.
         unequal += int(np.abs(made - observations).max() > 1e-4)

@@ -5908,6 +5908,40 @@ export interface components {
             yaw: number;
         };
         /**
+         * DwellPart
+         * @description How long it has stayed about where it is: what tells a robot that turns about on one spot that it does.
+         */
+        "DwellPart-Input": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "dwell";
+        };
+        /**
+         * DwellPart
+         * @description How long it has stayed about where it is: what tells a robot that turns about on one spot that it does.
+         */
+        "DwellPart-Output": {
+            /**
+             * Frames
+             * @description Moments: now and the steps before.
+             * @default 1
+             */
+            frames: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            name: "dwell";
+        };
+        /**
          * Entry
          * @description Something that was measured on the suite.
          */
@@ -8581,7 +8615,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"] | components["schemas"]["KnownPart-Input"] | components["schemas"]["OpeningsPart-Input"])[];
+            parts?: (components["schemas"]["RangesPart-Input"] | components["schemas"]["SpeedsPart-Input"] | components["schemas"]["ActionsPart-Input"] | components["schemas"]["DistancePart-Input"] | components["schemas"]["DirectionPart-Input"] | components["schemas"]["BearingPart-Input"] | components["schemas"]["HeadingPart-Input"] | components["schemas"]["DeviationPart-Input"] | components["schemas"]["TrailPart-Input"] | components["schemas"]["WayPart-Input"] | components["schemas"]["ReachPart-Input"] | components["schemas"]["KnownPart-Input"] | components["schemas"]["OpeningsPart-Input"] | components["schemas"]["DwellPart-Input"])[];
         };
         /**
          * ObservationConfig
@@ -8592,7 +8626,7 @@ export interface components {
              * Parts
              * @description What the policy sees. Leave one out to learn what it is worth.
              */
-            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"] | components["schemas"]["KnownPart-Output"] | components["schemas"]["OpeningsPart-Output"])[];
+            parts: (components["schemas"]["RangesPart-Output"] | components["schemas"]["SpeedsPart-Output"] | components["schemas"]["ActionsPart-Output"] | components["schemas"]["DistancePart-Output"] | components["schemas"]["DirectionPart-Output"] | components["schemas"]["BearingPart-Output"] | components["schemas"]["HeadingPart-Output"] | components["schemas"]["DeviationPart-Output"] | components["schemas"]["TrailPart-Output"] | components["schemas"]["WayPart-Output"] | components["schemas"]["ReachPart-Output"] | components["schemas"]["KnownPart-Output"] | components["schemas"]["OpeningsPart-Output"] | components["schemas"]["DwellPart-Output"])[];
         };
         /**
          * ObservedPart
@@ -8697,12 +8731,12 @@ export interface components {
         };
         /**
          * OpeningsPart
-         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free.
+         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if what was not seen is free.
          */
         "OpeningsPart-Input": {
             /**
              * Openings
-             * @description The best ones, five numbers each: where to go first on the way there, how far it is, how far on from there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
+             * @description The best ones, six numbers each: where to go first on the way there, how far it is, how far on from there, and whether it saw the way to be free. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
              * @default 2
              */
             count: number;
@@ -8720,12 +8754,12 @@ export interface components {
         };
         /**
          * OpeningsPart
-         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if all beyond is free.
+         * @description Where it has not looked yet: edges of what it has seen by which its target is nearest if what was not seen is free.
          */
         "OpeningsPart-Output": {
             /**
              * Openings
-             * @description The best ones, five numbers each: where to go first on the way there, how far it is, how far on from there. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
+             * @description The best ones, six numbers each: where to go first on the way there, how far it is, how far on from there, and whether it saw the way to be free. They come from views that it keeps every 0.48 m, and from which of them are in sight of one another.
              * @default 2
              */
             count: number;

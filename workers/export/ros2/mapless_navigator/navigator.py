@@ -10,13 +10,19 @@ from enum import Enum
 
 import numpy as np
 
+from .dwell import Dwell
 from .observation import Frames, Reals, Scan, observe, refuse_unknown, resample, wrap
 from .openings import Openings
 from .policy import Floats, Policy, Specification
 from .trail import Trail
 from .views import Views
 
-_MEMORIES: Mapping[str, type[Trail | Views | Openings]] = {"trail": Trail, "views": Views, "openings": Openings}
+_MEMORIES: Mapping[str, type[Trail | Dwell | Views | Openings]] = {
+    "trail": Trail,
+    "dwell": Dwell,
+    "views": Views,
+    "openings": Openings,
+}
 
 
 class State(Enum):
@@ -239,7 +245,7 @@ class Navigator:
         )
         added = dict(self._make_added(*known)) if self._make_added else {}
         for way in self._ways:
-            seen = way.see(ranges, pose) if isinstance(way, Trail) else way.see(ranges, pose, goal)
+            seen = way.see(ranges, pose) if isinstance(way, Trail | Dwell) else way.see(ranges, pose, goal)
             added[way.kind] = seen[None]
         moment = observe(specification, *known, added=added)
         return State.DRIVING, self._frames.push(moment)

@@ -17,6 +17,7 @@
 | `trail`, `long_trail`  | where it has been, see `trail.py`: whoever calls brings them along         |
 | `known`, `known_progress` | since when it knows what it sees, see `views.py`: likewise              |
 | `openings`             | which openings it had better look into, see `openings.py`: likewise        |
+| `dwell`                | how long it has stayed about where it is, see `dwell.py`: likewise         |
 | `way`                  | how much of the straight way is free, and whether all of it is, see `free_way` |
 | `reach`                | near / (near + how far it could go straight on), all around, see `reach`   |
 | `reach_progress`       | the same, and how much nearer to the target / range that would bring it    |
@@ -82,7 +83,7 @@ def observe(
         last_actions: (n, A) what was last commanded, as fractions of the limits.
         speeds: (n, A) velocities (or the steering angle) in the last step, likewise; those last commanded where not given.
         added: the numbers (n, size) of each part that an extension makes, by its kind, of its trail (`Trail.see`),
-            of its views (`Views.see`) and of its openings (`Openings.see`);
+            of its views (`Views.see`), of its openings (`Openings.see`) and of its stay (`Dwell.see`);
             `manifest.json` explains them.
 
     Returns:

@@ -7,8 +7,14 @@ The newest 64 are remembered, two within 0.4 m are one. Each view is linked to t
 nearest of each run of earlier ones that the body can go to straight on (eight at most); by these links it is so and so far
 to every view, and on to its openings.
 
-Told are those by which the goal would be nearest if all beyond them were free, at least 1 m apart, the goal itself where a
-view shows it among them; where the body can't go straight on from the view the way is taken to be 4 m longer. For each:
+Told are those by which the goal would be nearest if what was not seen were free, at least 1 m apart, the goal itself where a
+view shows it among them. Where the body can't go straight on from the view, and for each wall that a view shows between the
+opening and the goal, the way is taken to be 4 m longer. A wall is where 16 directions side by side read less than the
+LiDAR's range without a jump: from the end of the sixth straight to that of the eleventh, the first one being every fifth
+direction of a view. For each half metre of the line from an opening to the goal it is remembered whether a wall crosses it,
+at least 0.2 m from the line's ends; halves side by side are of one wall. What is told is chosen anew where a view is kept,
+else every 16 steps. What was told first since then, an opening or the goal, counts 0.04 m farther for each of these steps,
+unless the way to it was more than 0.2 m shorter than it had ever been when it was told first. For each opening that is told:
 
 | number   | what it is                                                                                     |
 |----------|------------------------------------------------------------------------------------------------|
@@ -16,7 +22,7 @@ view shows it among them; where the body can't go straight on from the view the 
 | cosine   | likewise                                                                                        |
 | nearness | 1 - its distance / range of the LiDAR, at least 0                                               |
 | way      | w / (w + 1 m), w the metres from the newest view to the opening                                 |
-| rest     | r / (r + 1 m), r the metres straight on from there to the goal                                  |
+| rest     | r / (r + 1 m), r the metres that it is taken to be from there to the goal                       |
 | free     | 1 where the body can go there straight on from the view that saw it                             |
 
 0 where there is none.
@@ -24,7 +30,7 @@ view shows it among them; where the body can't go straight on from the view the 
 
 import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,30 +49,66 @@ AT_HAND = 0.35
 FLAT_RUN = 10
 OPENING_ROOM = 64
 LINK_ROOM = 8
+CHORD = 5
+MARGIN = 0.2
+HALF_METRE = 0.5
+MOST_HALVES = 60
+DUE = 0.04
+NEARER = 0.2
+PATIENCE = 16
 NUMBERS = 6
 
 
 @dataclass(frozen=True)
 class _Opening:
-    """A place beyond which nothing was seen yet, the number of the view that saw it, and whether the way is free."""
+    """A place beyond which nothing was seen yet.
+
+    Attributes:
+        place: (2,) metres.
+        view: number of the view that saw it.
+        is_free: whether the way from that is free.
+        crossed: which half metres of the line from there to the goal walls cross.
+    """
 
     place: Reals
     view: int
     is_free: bool
+    crossed: frozenset[int] = frozenset()
+
+    @property
+    def walls(self) -> int:
+        """How many walls those are."""
+        return sum(half - 1 not in self.crossed for half in self.crossed)
+
+
+@dataclass
+class _Patience:
+    """Metres that an opening, or the goal, counts farther, and the least way to it when it was told first."""
+
+    due: float = 0.0
+    nearest: float = float("inf")
+
+    def wait(self, way: float, steps: int) -> None:
+        """It was told first for so many steps, with so long a way."""
+        if way < self.nearest - NEARER:
+            self.nearest = way
+        else:
+            self.due += DUE * steps
 
 
 @dataclass(frozen=True)
 class _Lead:
-    """An opening, the metres to it by known ways, and those straight on from it to the goal."""
+    """An opening, the metres to it by known ways, those that it is taken to be from there to the goal, and its patience."""
 
     opening: _Opening
     way: float
     rest: float
+    patience: _Patience
 
     @property
     def whole(self) -> float:
         """Metres that the way to the goal is taken to have."""
-        return self.way + self.rest + (0.0 if self.opening.is_free else DETOUR)
+        return self.way + self.rest + self.patience.due + (0.0 if self.opening.is_free else DETOUR)
 
 
 class Openings(KeptViews):
@@ -94,7 +136,12 @@ class Openings(KeptViews):
         """Forget all: a new way begins."""
         super().clear()
         self._links: dict[int, set[int]] = {}
+        self._walls: list[Reals] = []
         self._slots: list[_Opening | None] = [None] * OPENING_ROOM
+        self._patience = [_Patience() for _ in range(OPENING_ROOM)]
+        self._patience_with_goal = _Patience()
+        self._leads: list[_Lead] = []
+        self._steps = 0
         self._ways: dict[int, float] = {}
         self._next: dict[int, int] = {}
 
@@ -111,10 +158,16 @@ class Openings(KeptViews):
         """
         scan, goal = np.asarray(ranges, np.float64)[: len(self._angles)], np.asarray(target, np.float64)
         here = np.asarray(pose, np.float64)
-        if self.keep(scan, here):
-            self._look()
+        is_kept = self.keep(scan, here)
+        self._steps += 1
+        if is_kept or self._steps >= PATIENCE:
+            if self._leads:
+                self._leads[0].patience.wait(self._leads[0].way, self._steps)
+            if is_kept:
+                self._look(goal)
+            self._leads, self._steps = self._choose(goal), 0
         numbers = np.zeros((self._count, NUMBERS))
-        for row, lead in zip(numbers, self._leads(goal), strict=False):
+        for row, lead in zip(numbers, self._leads, strict=False):
             dx, dy = self._first_place(lead.opening, scan, here)
             bearing = np.arctan2(dy, dx) - here[2]
             nearness = 1.0 - min(np.hypot(dx, dy) / self._range, 1.0)
@@ -127,17 +180,31 @@ class Openings(KeptViews):
         """Number of the oldest view that is remembered."""
         return self.kept - len(self.places)
 
-    def _look(self) -> None:
+    def _look(self, goal: Reals) -> None:
         """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
         newest = self.kept - 1
         self._link(newest)
+        self._walls = [*self._walls, self._find_walls()][-len(self.places) :]
         for slot, one in enumerate(self._slots):
             if one and (one.view < self._oldest or self._which_show(one.place, SLACK)[-1]):
                 self._slots[slot] = None
+            elif one:
+                self._slots[slot] = replace(one, crossed=one.crossed | _crossed(self._walls[-1], one.place, goal))
         for place, is_free in self._edges():
             if not self._which_show(place, SLACK)[:-1].any():
-                self._open(_Opening(place, newest, is_free))
+                self._open(_Opening(place, newest, is_free, _crossed(np.concatenate(self._walls), place, goal)))
         self._measure_ways(newest)
+
+    def _find_walls(self) -> Reals:
+        """Walls of the newest view, (walls, 2, 2): where each begins and ends, metres."""
+        readings = self.readings[-1]
+        chords = np.arange(0, DIRECTIONS, CHORD)
+        along = readings[(chords[:, None] + np.arange(CHORD + 1)) % DIRECTIONS]
+        is_solid = ((along > 0.0) & (along < self._farthest)).all(axis=1) & (np.abs(np.diff(along)) <= JUMP).all(axis=1)
+        is_solid &= np.roll(is_solid, 1) & np.roll(is_solid, -1)
+        ends = self._ends(chords, readings[chords])
+        walls: Reals = np.stack((ends, np.roll(ends, -1, axis=0)), axis=1)[is_solid]
+        return walls
 
     def _which_show(self, place: Reals, slack: float) -> Reals:
         """In which views neither of the two readings beside a place ends more than the slack before it, (views,) bool."""
@@ -230,7 +297,10 @@ class Openings(KeptViews):
         same = next((k for k, one in slots if one and np.hypot(*(one.place - opening.place)) < SAME), None)
         known = None if same is None else self._slots[same]
         if known is None or opening.is_free or not known.is_free:
-            self._slots[taken.index(min(taken)) if same is None else same] = opening
+            slot = taken.index(min(taken)) if same is None else same
+            self._slots[slot] = opening
+            if same is None:
+                self._patience[slot] = _Patience()
 
     def _measure_ways(self, newest: int) -> None:
         """How far it is from the newest view to every other one by links, and by which view it goes there (Dijkstra)."""
@@ -251,13 +321,15 @@ class Openings(KeptViews):
                     self._ways[other], self._next[other] = farther, one
                     heapq.heappush(queue, (farther, other))
 
-    def _leads(self, goal: Reals) -> list[_Lead]:
+    def _choose(self, goal: Reals) -> list[_Lead]:
         """The openings by which the goal would be nearest, the best one first."""
         rows = np.flatnonzero(self._which_show(goal, 0.0))
         sights = [_Opening(goal, int(row) + self._oldest, self._is_passable(int(row), goal)) for row in rows]
+        seen = [(one, self._patience_with_goal) for one in sights]
+        seen += [(one, patience) for one, patience in zip(self._slots, self._patience, strict=True) if one]
         found = [
-            _Lead(one, self._way(one.view, one.place), float(np.hypot(*(goal - one.place))))
-            for one in (*sights, *filter(None, self._slots))
+            _Lead(one, self._way(one.view, one.place), float(np.hypot(*(goal - one.place))) + DETOUR * one.walls, patience)
+            for one, patience in seen
         ]
         chosen: list[_Lead] = []
         for lead in sorted(found, key=lambda lead: lead.whole):
@@ -293,6 +365,21 @@ class Openings(KeptViews):
             return False
         beside = scan[(ray + np.array((-1, 0, 1))) % len(scan)]
         return bool(distance <= (beside.max() if farthest else beside.min()) + slack)
+
+
+def _crossed(walls: Reals, place: Reals, goal: Reals) -> frozenset[int]:
+    """Which half metres of the line from a place to the goal walls (n, 2, 2) cross."""
+    length = float(np.hypot(*(goal - place)))
+    if length <= 2.0 * MARGIN:
+        return frozenset()
+    cos, sin = (goal - place) / length
+    x, y = np.moveaxis(walls - place, -1, 0)
+    along, across = x * cos + y * sin, y * cos - x * sin
+    meets = (across[:, 0] > 0.0) != (across[:, 1] > 0.0)
+    (one, other), (left, right) = along[meets].T, across[meets].T
+    where = (left * other - right * one) / (left - right)
+    halves = (where[(where > MARGIN) & (where < length - MARGIN)] / HALF_METRE).astype(int)
+    return frozenset(np.minimum(halves, MOST_HALVES - 1).tolist())
 
 
 def _angles(directions: ArrayLike) -> Reals:

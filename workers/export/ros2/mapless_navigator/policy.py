@@ -47,6 +47,7 @@ KINDS = (
     "known",
     "known_progress",
     "openings",
+    "dwell",
 )
 """What a part of an observation may be; `observation.py` has a table of them. A name with a dot is an extension's part."""
 
@@ -56,6 +57,7 @@ _MEMORIES = {
     "known": "views",
     "known_progress": "views",
     "openings": "openings",
+    "dwell": "dwell",
 }
 
 _LEAKY_SLOPE = np.float32(0.01)
@@ -84,7 +86,7 @@ class Part:
 
     @property
     def remembered_by(self) -> str:
-        """Which memory of the robot's way makes it, each in a file of that name: trail, views or openings; '' for none."""
+        """Which memory of the robot's way makes it, each in a file of that name, such as trail; '' for none."""
         return _MEMORIES.get(self.kind, "")
 
     @property
