@@ -7,6 +7,7 @@ from sim.config import (
     BearingPart,
     CollisionTerm,
     DistancePart,
+    DwellPart,
     Frozen,
     GeneratedArenaConfig,
     JackalConfig,
@@ -73,7 +74,14 @@ def _along_the_path(collision: float) -> RewardConfig:
     return RewardConfig(terms=(ArrivalTerm(), CollisionTerm(weight=collision), TimeoutTerm(), PathProgressTerm()))
 
 
-def _told_the_way(hidden_sizes: tuple[int, ...], *, entropy_coefficient: float, gamma: float, epochs: int = 4) -> PpoConfig:
+def _told_the_way(
+    hidden_sizes: tuple[int, ...],
+    *,
+    entropy_coefficient: float,
+    gamma: float,
+    epochs: int = 4,
+    final_std: float | None = None,
+) -> PpoConfig:
     """PPO with many robots and large minibatches, whose critic knows the shortest path."""
     return PpoConfig(
         network=MlpNetwork(hidden_sizes=hidden_sizes),
@@ -84,6 +92,7 @@ def _told_the_way(hidden_sizes: tuple[int, ...], *, entropy_coefficient: float, 
         learning_rate=4e-4,
         entropy_coefficient=entropy_coefficient,
         gamma=gamma,
+        final_std=final_std,
         critic_sees="path",
     )
 
@@ -152,7 +161,9 @@ RECIPES: tuple[Recipe, ...] = (
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="intricate", difficulty=1.0, maps=4096, seed=0),
                 lidar=LidarConfig(rays=120, field_of_view=360.0),
-                observation=_with_trail(batches=120, memory="long", ahead=(WayPart(), ReachPart(), OpeningsPart())),
+                observation=_with_trail(
+                    batches=120, memory="long", ahead=(WayPart(), ReachPart(), OpeningsPart(), DwellPart())
+                ),
                 reward=RewardConfig(
                     terms=(
                         # Worth a risk beside an obstacle, which a collision's price alone would not let it take.
@@ -166,7 +177,7 @@ RECIPES: tuple[Recipe, ...] = (
                 step_limit=1500,
                 arrival_ends=True,
             ),
-            algorithm=_told_the_way((256, 128), entropy_coefficient=0.005, gamma=0.995, epochs=2),
+            algorithm=_told_the_way((256, 128), entropy_coefficient=0.005, gamma=0.995, epochs=2, final_std=0.05),
             steps=50_000_000,
             # At the end only: 200 scenarios are too few to tell its checkpoints apart, and the last are the best.
             evaluation=EvaluationConfig(every_steps=50_000_000),
