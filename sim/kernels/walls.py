@@ -35,6 +35,7 @@ _FULL = np.float32(FULL_RANGE)
 _JUMP = np.float32(JUMP)
 _SPACING = np.float32(WALL_SPACING)
 _MARGIN = np.float32(MARGIN)
+_LAST = np.float32(WALL_BITS - 1)
 _ALL = (1 << CHORDS) - 1
 
 
@@ -48,7 +49,8 @@ def find_walls(i, row, robots, p):
         for k in range(chord * CHORD_DIRECTIONS, (chord + 1) * CHORD_DIRECTIONS):
             one = np.float32(robots.views[i, row, k])
             other = np.float32(robots.views[i, row, (k + 1) % VIEW_DIRECTIONS])
-            is_solid &= min(one, other) > 0 and max(one, other) < _FULL and abs(one - other) <= most
+            if min(one, other) == 0 or max(one, other) == _FULL or abs(one - other) > most:
+                is_solid = False
         solid |= is_solid << chord
     before = (solid << 1 | solid >> (CHORDS - 1)) & _ALL
     behind = (solid >> 1 | solid << (CHORDS - 1)) & _ALL
@@ -87,7 +89,7 @@ def walls_across(i, row, x, y, to_x, to_y, robots, p):
         other_along = other_x * cos + other_y * sin
         along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
         if along > _MARGIN and along < length - _MARGIN:
-            crossed |= 1 << min(np.int64(along / _SPACING), WALL_BITS - 1)
+            crossed |= 1 << int(min(along / _SPACING, _LAST))
     return crossed
 
 
