@@ -66,6 +66,15 @@ class PathProgressTerm(Frozen):
 
     name: Literal["path_progress"] = Field("path_progress", title="Progress along the shortest path")
     weight: float = _weight(500.0, "per metre gained")
+    clearance: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        title="Clearance of paths",
+        description="Metres that these paths keep from obstacles; as a rule what the body needs. They go through cells of "
+        "0.1 m that are free as a whole, and may miss gaps up to 0.25 m wider than the body needs: less where those count.",
+        json_schema_extra=ADVANCED,
+    )
 
 
 class TimeTerm(Frozen):

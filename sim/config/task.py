@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from sim.config.arena import AnyArenaConfig, ArenaConfig
 from sim.config.base import ADVANCED, Frozen
 from sim.config.observation import MAX_ACTIONS, MAX_NUMBERS, ObservationConfig, read_first_observations
-from sim.config.reward import RewardConfig
+from sim.config.reward import PathProgressTerm, RewardConfig
 from sim.config.robot import AnyRobotConfig, BurgerConfig
 from sim.config.sensing import MAX_DELAY, LidarConfig, OdometryConfig, RandomisationConfig
 
@@ -150,3 +150,9 @@ class TaskConfig(Frozen):
         if self.way_clearance is not None:
             return self.way_clearance
         return max(self.robot.circumscribed_radius, self.collision_distance)
+
+    @property
+    def path_clearance(self) -> float:
+        """Metres that shortest paths keep from obstacles, which a critic may be told and a reward be paid for."""
+        paid = (term.clearance for term in self.reward.terms if isinstance(term, PathProgressTerm))
+        return min((clearance for clearance in paid if clearance is not None), default=self.passable_clearance)

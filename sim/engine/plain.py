@@ -124,7 +124,7 @@ class PlainWorld:
         self.velocities: tuple[float, ...] = (0.0,) * action_layout(task.robot).size
         self.last_velocities = self.velocities
         self.distance = math.dist(pose[:2], target)
-        self._paths = Paths([arena], task.passable_clearance) if task.reward.weight("path_progress") else None
+        self._paths = Paths([arena], task.path_clearance) if task.reward.weight("path_progress") else None
         self.path = self.last_path = self._path()
         self._angles = drawn_ray_angles(task.lidar, field_of_view or task.lidar.field_of_view).tolist()
         self._trail = PlainTrail(task.lidar)

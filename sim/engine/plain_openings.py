@@ -6,19 +6,32 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim.config import LidarConfig, OpeningsPart
-from sim.engine.plain_views import PlainView, PlainViews, wrapped
+from sim.engine.plain_narrow_gaps import PlainGaps, crosses
+from sim.engine.plain_views import Place, PlainView, PlainViews, angle_of, end_of, wrapped
 from sim.kernels.find_openings import FLAT_RUN, SAME_OPENING, SLACK
 from sim.kernels.openings import APART, AT_HAND
 from sim.kernels.patience import DUE, NEARER, PATIENCE
-from sim.kernels.room import DETOUR, LINK_ROOM, MAX_LEADS, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
-from sim.kernels.views import FULL_RANGE, SLIM, VIEW_DIRECTIONS
+from sim.kernels.room import (
+    DETOUR,
+    FARTHER,
+    LINK_ROOM,
+    MAX_LEADS,
+    OPENING_KINDS,
+    OPENING_ROOM,
+    ROUND_A_BEND,
+    STRAIGHT_ON,
+    THROUGH_GAP,
+    VIEW_ROOM,
+)
+from sim.kernels.views import FREE_SIGHT, FULL_RANGE, NO_SIGHT, SIGHT, SIGHT_THROUGH_GAP, SLIM, VIEW_DIRECTIONS
 from sim.kernels.walls import CHORD_DIRECTIONS, CHORDS, JUMP, MARGIN, WALL_BITS, WALL_SPACING
 from sim.lidar import ray_angles
 
-Place = tuple[float, float]
+_SIGHTS = {SIGHT: DETOUR, FREE_SIGHT: 0.0, SIGHT_THROUGH_GAP: FARTHER[THROUGH_GAP]}
+"""Metres that the target is taken to be farther, by how a view shows it."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +41,13 @@ class _Opening:
     Attributes:
         place: metres.
         view: number of the view that it was seen from.
-        is_free: whether the body can go there straight on from that.
+        access: how the body gets there from that, see `sim.kernels.room`.
         crossed: pieces of the line from there to the target that walls cross, numbered from the opening on.
     """
 
     place: Place
     view: int
-    is_free: bool
+    access: int
     crossed: frozenset[int] = frozenset()
 
     @property
@@ -65,17 +78,26 @@ class _Patience:
 
 @dataclass(frozen=True)
 class _Lead:
-    """An opening, or the target if a view shows it, the metres to it by known ways and those that are taken to be left."""
+    """An opening, or the target if a view shows it.
+
+    Attributes:
+        opening: it, or where the target is.
+        way: metres to it by known ways.
+        rest: metres that are taken to be left from there.
+        farther: metres that it counts farther since the body does not get there straight on.
+        patience: with it.
+    """
 
     opening: _Opening
     way: float
     rest: float
+    farther: float
     patience: _Patience
 
     @property
     def whole(self) -> float:
         """Metres that the way to the target is taken to have."""
-        return self.way + self.rest + self.patience.due + (0.0 if self.opening.is_free else DETOUR)
+        return self.way + self.rest + self.farther + self.patience.due
 
 
 @dataclass
@@ -91,7 +113,9 @@ class PlainOpenings:
     lidar: LidarConfig
     near: float
     views: PlainViews
+    _gaps: PlainGaps = field(init=False)
     _links: list[list[int]] = field(default_factory=list)
+    _sights: list[int] = field(default_factory=list)
     _slots: list[_Opening | None] = field(default_factory=lambda: [None] * OPENING_ROOM)
     _patience: list[_Patience] = field(default_factory=lambda: [_Patience() for _ in range(OPENING_ROOM)])
     _patience_with_target: _Patience = field(default_factory=_Patience)
@@ -99,6 +123,9 @@ class PlainOpenings:
     _chosen_at: int = 0
     _ways: dict[int, float] = field(default_factory=dict)
     _next: dict[int, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._gaps = PlainGaps(self.near)
 
     @property
     def _remembered(self) -> range:
@@ -123,6 +150,7 @@ class PlainOpenings:
     def _look(self, target: Place) -> None:
         """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
         newest = self.views.kept[-1]
+        self._close_gaps(newest, target)
         self._links.append(self._links_of(newest))
         for slot, opening in enumerate(self._slots):
             if opening and (opening.view not in self._remembered or self._shows(newest, opening.place, SLACK)):
@@ -132,10 +160,34 @@ class PlainOpenings:
                 self._slots[slot] = replace(opening, crossed=crossed)
         for place, is_free in self._edges(newest):
             if not any(self._shows(self.views.kept[number], place, SLACK) for number in self._remembered[:-1]):
+                access = STRAIGHT_ON if is_free else ROUND_A_BEND
+                access = THROUGH_GAP if self._gaps.lead_through(newest.place, place) else access
                 views = (self.views.kept[number] for number in self._remembered)
                 crossed = frozenset(chain.from_iterable(self._walls_across(view, place, target) for view in views))
-                self._open(_Opening(place, self._remembered[-1], is_free, crossed))
+                self._open(_Opening(place, self._remembered[-1], access, crossed))
         self._measure_ways()
+        self._sights.append(self._sight_of(newest, target))
+
+    def _close_gaps(self, newest: PlainView, target: Place) -> None:
+        """Let no opening, no sight of the target and no link lead through a gap that the newest view found to be narrow."""
+        for gap in self._gaps.measure(newest):
+            for slot, opening in enumerate(self._slots):
+                if opening and crosses(self.views.kept[opening.view].place, opening.place, gap):
+                    self._slots[slot] = replace(opening, access=THROUGH_GAP)
+            for number in self._remembered[:-1]:
+                place = self.views.kept[number].place
+                if self._sights[number] != NO_SIGHT and crosses(place, target, gap):
+                    self._sights[number] = SIGHT_THROUGH_GAP
+                the_way_it_came, others = self._links[number][:1], self._links[number][1:]
+                open_ones = (other for other in others if not crosses(place, self.views.kept[other].place, gap))
+                self._links[number] = [*the_way_it_came, *open_ones]
+
+    def _sight_of(self, view: PlainView, target: Place) -> int:
+        if not self._shows(view, target, 0.0):
+            return NO_SIGHT
+        if self._gaps.lead_through(view.place, target):
+            return SIGHT_THROUGH_GAP
+        return FREE_SIGHT if self._is_passable(view, target) else SIGHT
 
     def _walls_across(self, view: PlainView, place: Place, target: Place) -> Iterator[int]:
         """Pieces of the line from a place to the target that walls of a view cross."""
@@ -146,7 +198,7 @@ class PlainOpenings:
                 continue
             ends = [(chord + k) * CHORD_DIRECTIONS % VIEW_DIRECTIONS for k in (0, 1)]
             (one_along, one_across), (other_along, other_across) = (
-                _along_and_across(_place(view, k, view.readings[k]), place, target) for k in ends
+                _along_and_across(end_of(view, k, view.readings[k]), place, target) for k in ends
             )
             if (one_across > 0.0) != (other_across > 0.0):
                 along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
@@ -172,7 +224,8 @@ class PlainOpenings:
         return links[:LINK_ROOM]
 
     def _links_to(self, view: PlainView, place: Place) -> bool:
-        return self._shows(view, place, 0.0) and self._is_passable(view, place)
+        shown = self._shows(view, place, 0.0) and self._is_passable(view, place)
+        return shown and not self._gaps.lead_through(view.place, place)
 
     def _edges(self, view: PlainView) -> Iterator[tuple[Place, bool]]:
         """Places where a view's readings jump, or end at the LiDAR's range, and whether the way to them is free."""
@@ -183,13 +236,13 @@ class PlainOpenings:
                 continue
             if abs(right - left) > JUMP and not self._is_narrow(view, k):
                 nearer, direction = min(right, left), (k + 1) % VIEW_DIRECTIONS - 0.5
-                is_free = self._is_free(view, float(_angle(direction)), nearer - self.near)
-                yield _place(view, direction, (right + left) / 2.0), is_free
+                is_free = self._is_free(view, float(angle_of(direction)), nearer - self.near)
+                yield end_of(view, direction, (right + left) / 2.0), is_free
             run = run + 1 if right >= self._farthest else 0
             if run and (run == FLAT_RUN or left < self._farthest):
                 if run > 1:
-                    is_free = self._is_free(view, float(_angle(k - run // 2)), self.lidar.range)
-                    yield _place(view, k - run // 2, self.lidar.range), is_free
+                    is_free = self._is_free(view, float(angle_of(k - run // 2)), self.lidar.range)
+                    yield end_of(view, k - run // 2, self.lidar.range), is_free
                 run = 0
 
     def _is_narrow(self, view: PlainView, k: int) -> bool:
@@ -197,20 +250,20 @@ class PlainOpenings:
         following = (k + 1) % VIEW_DIRECTIONS
         is_right = view.readings[k] < view.readings[following]
         near, beyond, step = (k, following, 1) if is_right else (following, k, -1)
-        edge = _place(view, near, view.readings[near])
+        edge = end_of(view, near, view.readings[near])
         across = ((beyond + step * n) % VIEW_DIRECTIONS for n in range(VIEW_DIRECTIONS // 4))
-        return any(math.dist(edge, _place(view, j, view.readings[j])) < 2.0 * SLIM * self.near for j in across)
+        return any(math.dist(edge, end_of(view, j, view.readings[j])) < 2.0 * SLIM * self.near for j in across)
 
     def _open(self, opening: _Opening) -> None:
         """Remember an opening: in place of the same one, in an empty slot, or in that of the one seen the longest ago.
 
-        One with a free way stays before the same one without.
+        One that the body gets to more easily stays before the same one elsewhere.
         """
         taken = [-1 if one is None else one.view for one in self._slots]
         slots = enumerate(self._slots)
         same = next((k for k, one in slots if one and math.dist(one.place, opening.place) < SAME_OPENING), None)
         known = None if same is None else self._slots[same]
-        if known is None or opening.is_free or not known.is_free:
+        if known is None or opening.access >= known.access:
             slot = taken.index(min(taken)) if same is None else same
             self._slots[slot] = opening
             if same is None:
@@ -225,7 +278,7 @@ class PlainOpenings:
 
     def _is_free(self, view: PlainView, angle: float, until: float) -> bool:
         """Whether the body can go straight on from a view in a direction, for so many metres, as its readings show."""
-        off = _angle(np.arange(VIEW_DIRECTIONS)) - angle
+        off = angle_of(np.arange(VIEW_DIRECTIONS)) - angle
         along, across = view.readings * np.cos(off), np.abs(view.readings * np.sin(off))
         meets = (view.readings < self._farthest) & (along > 0.0) & (along < until) & (across < SLIM * self.near)
         return not meets.any()
@@ -257,22 +310,25 @@ class PlainOpenings:
 
     def _choose(self, target: Place) -> list[_Lead]:
         """The openings by which the target would be nearest, the best one first."""
-        views = ((number, self.views.kept[number]) for number in self._remembered)
-        sights = [
-            (_Opening(target, number, self._is_passable(view, target)), self._patience_with_target)
-            for number, view in views
-            if self._shows(view, target, 0.0)
-        ]
         found = []
-        for one, patience in (*sights, *zip(self._slots, self._patience, strict=True)):
+        for number in self._remembered:
+            sight = self._sights[number]
+            if sight != NO_SIGHT:
+                shown = _Opening(target, number, STRAIGHT_ON if sight == FREE_SIGHT else ROUND_A_BEND)
+                found.append(_Lead(shown, self._way_to(shown), 0.0, _SIGHTS[sight], self._patience_with_target))
+        for one, patience in zip(self._slots, self._patience, strict=True):
             if one is not None:
-                way = self._ways[one.view] + math.dist(self.views.kept[one.view].place, one.place)
-                found.append(_Lead(one, way, math.dist(one.place, target) + DETOUR * one.walls, patience))
+                rest = math.dist(one.place, target) + DETOUR * one.walls
+                found.append(_Lead(one, self._way_to(one), rest, FARTHER[one.access], patience))
         chosen: list[_Lead] = []
         for lead in sorted(found, key=lambda lead: lead.whole):
             if all(math.dist(lead.opening.place, other.opening.place) >= APART for other in chosen):
                 chosen.append(lead)
         return chosen[:MAX_LEADS]
+
+    def _way_to(self, opening: _Opening) -> float:
+        """Metres from the newest view to a place that another one shows."""
+        return self._ways[opening.view] + math.dist(self.views.kept[opening.view].place, opening.place)
 
     def seen(self, ranges: NDArray[np.float64], pose: Sequence[float], part: OpeningsPart) -> NDArray[np.float64]:
         """Which openings a robot at a pose had better look into, given its scan, metres: a part's numbers.
@@ -290,7 +346,7 @@ class PlainOpenings:
                 1.0 - min(math.hypot(dx, dy) / self.lidar.range, 1.0),
                 lead.way / (lead.way + 1.0),
                 lead.rest / (lead.rest + 1.0),
-                float(lead.opening.is_free),
+                float(lead.opening.access == STRAIGHT_ON),
             )
         return numbers.reshape(-1)
 
@@ -328,14 +384,3 @@ def _along_and_across(place: Place, begin: Place, end: Place) -> tuple[float, fl
     cos, sin = (end[0] - begin[0]) / length, (end[1] - begin[1]) / length
     x, y = place[0] - begin[0], place[1] - begin[1]
     return x * cos + y * sin, y * cos - x * sin
-
-
-def _angle(direction: ArrayLike) -> NDArray[np.float64]:
-    """Where a direction of a view points, radians."""
-    return np.asarray(((np.asarray(direction) + 0.5) / VIEW_DIRECTIONS * 2.0 - 1.0) * math.pi)
-
-
-def _place(view: PlainView, direction: float, distance: float) -> Place:
-    """Where a reading of a view ends."""
-    angle = float(_angle(direction))
-    return view.place[0] + distance * math.cos(angle), view.place[1] + distance * math.sin(angle)

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.config import LidarConfig
 from sim.kernels.views import FULL_RANGE, VIEW_DIRECTIONS, VIEW_SPACING
 from sim.lidar import ray_angles
+
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +23,7 @@ class PlainView:
         readings: (VIEW_DIRECTIONS,) metres, 0 where no ray pointed.
     """
 
-    place: tuple[float, float]
+    place: Place
     readings: NDArray[np.float64]
 
 
@@ -47,13 +49,23 @@ class PlainViews:
         place = (pose[0], pose[1])
         if self.kept and math.dist(self.kept[-1].place, place) < VIEW_SPACING:
             return False
-        directions = ((np.arange(VIEW_DIRECTIONS) + 0.5) / VIEW_DIRECTIONS * 2.0 - 1.0) * math.pi
-        off = np.abs(wrapped(directions[:, None] - pose[2] - self._angles))
+        off = np.abs(wrapped(angle_of(np.arange(VIEW_DIRECTIONS))[:, None] - pose[2] - self._angles))
         rays = off.argmin(axis=1)
         told = off[np.arange(len(off)), rays] <= self._reach + 1e-9
         readings = np.where(told, ranges[: len(self._angles)][rays], 0.0)
         self.kept.append(PlainView(place, np.floor(readings / self._range * FULL_RANGE + 0.5) * self._range / FULL_RANGE))
         return True
+
+
+def angle_of(direction: ArrayLike) -> NDArray[np.float64]:
+    """Where a direction of a view points, radians."""
+    return np.asarray(((np.asarray(direction) + 0.5) / VIEW_DIRECTIONS * 2.0 - 1.0) * math.pi)
+
+
+def end_of(view: PlainView, direction: float, distance: float) -> Place:
+    """The place in a direction of a view, so many metres away."""
+    angle = float(angle_of(direction))
+    return view.place[0] + distance * math.cos(angle), view.place[1] + distance * math.sin(angle)
 
 
 def wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -44,7 +44,7 @@ from sim.kernels.records import (
     RATE,
     ROBOT,
 )
-from sim.kernels.room import LINK_ROOM, LONG_TRAIL_ROOM, MAX_LEADS, OPENING_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
+from sim.kernels.room import GAP_ROOM, LINK_ROOM, LONG_TRAIL_ROOM, MAX_LEADS, OPENING_ROOM, SHORT_TRAIL_ROOM, VIEW_ROOM
 from sim.kernels.step import reset_robots, step_any_robots, step_usual_robots
 from sim.kernels.together import see_one_another
 from sim.kernels.views import VIEW_DIRECTIONS
@@ -179,7 +179,7 @@ class World:
         numbers, action_size = observation_size(task), action_layout(task.robot).size
         self._formulas = formulas = Formulas(task, robots)
         pays_for_paths = bool(task.reward.weight("path_progress"))
-        paths = Paths(self.arenas, task.passable_clearance) if guides or pays_for_paths else None
+        paths = Paths(self.arenas, task.path_clearance) if guides or pays_for_paths else None
         self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, paths, robots)
         self.guidance = Guidance(task, paths, robots) if guides and paths else None
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
@@ -228,11 +228,13 @@ class World:
             view_sights=np.zeros((looks, VIEW_ROOM), dtype=np.uint8),
             opening_places=np.zeros((looks, OPENING_ROOM, 2), dtype=np.float32),
             opening_views=np.zeros((looks, OPENING_ROOM), dtype=np.int32),
-            opening_frees=np.zeros((looks, OPENING_ROOM), dtype=np.bool_),
+            opening_access=np.zeros((looks, OPENING_ROOM), dtype=np.uint8),
             view_walls=np.zeros((looks, VIEW_ROOM), dtype=np.int32),
             opening_walls=np.zeros((looks, OPENING_ROOM), dtype=np.int64),
             opening_dues=np.zeros((looks, OPENING_ROOM + 1), dtype=np.float32),
             opening_nearest=np.zeros((looks, OPENING_ROOM + 1), dtype=np.float32),
+            gaps=np.zeros((looks, GAP_ROOM, 4), dtype=np.float32),
+            gaps_found=np.zeros(looks, dtype=np.int32),
             followed=np.zeros((looks, 2), dtype=np.int32),
             leads=np.zeros((looks, MAX_LEADS, LEAD_NUMBERS), dtype=np.float32),
             held_ranges=np.zeros((robots if holds else 0, task.lidar.scan_size), dtype=np.float32),

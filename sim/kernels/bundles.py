@@ -134,17 +134,19 @@ class Robots(NamedTuple):
             where nobody sees openings.
         view_ways: (N, VIEW_ROOM) metres from the newest view to each other one by links; (0, ...) likewise.
         view_next: (N, VIEW_ROOM) number of the view by which it goes there, -1 for the newest; (0, ...) likewise.
-        view_sights: (N, VIEW_ROOM) uint8, 0 where it did not show the target, 2 where the way there is free; (0, ...)
-            likewise.
+        view_sights: (N, VIEW_ROOM) uint8, how it shows the target, see `sim.kernels.views`; (0, ...) likewise.
         view_walls: (N, VIEW_ROOM) bits, which chords of it are walls, see `sim.kernels.walls`; (0, ...) likewise.
         opening_places: (N, OPENING_ROOM, 2) x, y of openings, as `trail`; (0, ...) likewise.
         opening_views: (N, OPENING_ROOM) number of the view that saw it, -1 where there is no opening; (0, ...) likewise.
-        opening_frees: (N, OPENING_ROOM) whether the body can go straight on from that view; (0, ...) likewise.
+        opening_access: (N, OPENING_ROOM) uint8, how the body gets there from that view, see `sim.kernels.room`; (0, ...)
+            likewise.
         opening_walls: (N, OPENING_ROOM) bits, where walls cross the line from there to the target; (0, ...) likewise.
         opening_dues: (N, OPENING_ROOM + 1) metres that it counts farther, see `sim.kernels.patience`, behind them the
             target; (0, ...) likewise.
         opening_nearest: (N, OPENING_ROOM + 1) metres on known ways to it, the least when it was told first; (0, ...)
             likewise.
+        gaps: (N, GAP_ROOM, 4) x, y of both ends of lines across gaps, see `sim.kernels.narrow_gaps`; (0, ...) likewise.
+        gaps_found: (N,) how many were found; (0,) likewise.
         followed: (N, 2) row of what is told first, -1 for none, and steps since it was chosen; (0, 2) likewise.
         leads: (N, MAX_LEADS, LEAD_NUMBERS) those that are told, view -1 where there is none; (0, ...) likewise.
         held_ranges: (N, scan) the last scan; (0, scan) where every step has a new one.
@@ -184,10 +186,12 @@ class Robots(NamedTuple):
     view_walls: Integers
     opening_places: Floats
     opening_views: Integers
-    opening_frees: NDArray[np.bool_]
+    opening_access: NDArray[np.uint8]
     opening_walls: NDArray[np.int64]
     opening_dues: Floats
     opening_nearest: Floats
+    gaps: Floats
+    gaps_found: Integers
     followed: Integers
     leads: Floats
     held_ranges: Floats

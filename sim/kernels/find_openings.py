@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from sim.kernels.narrow_gaps import leads_through_gap
 from sim.kernels.options import kernel
 from sim.kernels.patience import forgive
-from sim.kernels.room import OPENING_ROOM, VIEW_ROOM
+from sim.kernels.room import OPENING_ROOM, ROUND_A_BEND, STRAIGHT_ON, THROUGH_GAP, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.views import FULL_RANGE, SLIM, VIEW_COS, VIEW_DIRECTIONS, VIEW_SIN, is_free_way, shows
 from sim.kernels.walls import JUMP, find_walls, walls_across, walls_seen_across
@@ -66,6 +67,10 @@ def _open(i, x, y, is_free, number, first, target_x, target_y, robots, p):
     for other in range(first, number):
         if shows(i, other % VIEW_ROOM, x, y, _SLACK, robots, p):
             return
+    here = robots.view_places[i, number % VIEW_ROOM]
+    way = STRAIGHT_ON if is_free else ROUND_A_BEND
+    if leads_through_gap(i, here[0], here[1], x, y, robots):
+        way = THROUGH_GAP
     places = robots.opening_places
     seen_from = robots.opening_views
     # In place of the same one, or of the one that was seen the longest ago.
@@ -76,7 +81,7 @@ def _open(i, x, y, is_free, number, first, target_x, target_y, robots, p):
             dx = places[i, k, 0] - x
             dy = places[i, k, 1] - y
             if dx * dx + dy * dy < _SAME_SQUARED:
-                if robots.opening_frees[i, k] and not is_free:
+                if robots.opening_access[i, k] > way:
                     return
                 place = k
                 is_new = False
@@ -89,7 +94,7 @@ def _open(i, x, y, is_free, number, first, target_x, target_y, robots, p):
         forgive(i, place, robots)
     robots.opening_walls[i, place] = walls_seen_across(i, x, y, target_x, target_y, number, first, robots, p)
     seen_from[i, place] = number
-    robots.opening_frees[i, place] = is_free
+    robots.opening_access[i, place] = way
 
 
 @kernel(fastmath=FAST)

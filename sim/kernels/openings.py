@@ -14,13 +14,14 @@ import math
 import numpy as np
 
 from sim.kernels.find_openings import SLACK, look_for_openings
+from sim.kernels.narrow_gaps import close_gaps, leads_through_gap
 from sim.kernels.options import kernel
 from sim.kernels.patience import PATIENCE, TARGET_SLOT, forgive, lose_patience
 from sim.kernels.records import OPENINGS_PART
-from sim.kernels.room import DETOUR, OPENING_KINDS, OPENING_ROOM, VIEW_ROOM
+from sim.kernels.room import DETOUR, FARTHER, OPENING_KINDS, OPENING_ROOM, STRAIGHT_ON, THROUGH_GAP, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.view_links import FAR, link_view, measure_ways
-from sim.kernels.views import FREE_SIGHT, sight_of
+from sim.kernels.views import FREE_SIGHT, NO_SIGHT, SIGHT, SIGHT_THROUGH_GAP, sight_of
 from sim.kernels.walls import count_walls
 
 APART = 1.0
@@ -39,6 +40,7 @@ _SLACK = np.float32(SLACK)
 _APART_SQUARED = np.float32(APART * APART)
 _AT_HAND_SQUARED = np.float32(AT_HAND * AT_HAND)
 _DETOUR = np.float32(DETOUR)
+_FARTHER = np.array(FARTHER, np.float32)
 
 
 @kernel(fastmath=FAST)
@@ -83,8 +85,10 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
             if seen > 0 and _is_apart(i, target_x, target_y, lead, robots):
                 way = _way_to(i, target_x, target_y, other, robots)
                 whole = way + robots.opening_dues[i, TARGET_SLOT]
-                if seen != FREE_SIGHT:
+                if seen == SIGHT:
                     whole += _DETOUR
+                elif seen == SIGHT_THROUGH_GAP:
+                    whole += _FARTHER[THROUGH_GAP]
                 if whole < least:
                     least = whole
                     if lead == 0:
@@ -99,15 +103,13 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
             way = _way_to(i, x, y, view, robots)
             rest = np.float32(math.sqrt((target_x - x) * (target_x - x) + (target_y - y) * (target_y - y)))
             rest += _DETOUR * np.float32(count_walls(robots.opening_walls[i, k]))
-            is_free = robots.opening_frees[i, k]
-            whole = way + rest + robots.opening_dues[i, k]
-            if not is_free:
-                whole += _DETOUR
+            manner = robots.opening_access[i, k]
+            whole = way + rest + robots.opening_dues[i, k] + _FARTHER[manner]
             if whole < least and _is_apart(i, x, y, lead, robots):
                 least = whole
                 if lead == 0:
                     robots.followed[i, 0] = k
-                _write_lead(i, lead, x, y, way, rest, view, is_free, robots)
+                _write_lead(i, lead, x, y, way, rest, view, manner == STRAIGHT_ON, robots)
 
 
 @kernel(fastmath=FAST)
@@ -185,10 +187,14 @@ def see_openings(i, x, y, to_x, to_y, heading, is_kept, robots, geometry, p):
     if is_chosen_anew:
         lose_patience(i, robots)
     if is_kept:
+        close_gaps(i, number, first, x + to_x, y + to_y, robots, p)
         link_view(i, number, first, robots, p)
         look_for_openings(i, number, first, x + to_x, y + to_y, robots, p)
         measure_ways(i, number, first, robots)
-        robots.view_sights[i, number % VIEW_ROOM] = sight_of(i, number % VIEW_ROOM, x + to_x, y + to_y, robots, p)
+        sight = sight_of(i, number % VIEW_ROOM, x + to_x, y + to_y, robots, p)
+        if sight != NO_SIGHT and leads_through_gap(i, x, y, x + to_x, y + to_y, robots):
+            sight = SIGHT_THROUGH_GAP
+        robots.view_sights[i, number % VIEW_ROOM] = sight
     if is_chosen_anew:
         choose_leads(i, x + to_x, y + to_y, number, first, count, robots)
     out = robots.observations

@@ -28,8 +28,17 @@ MAX_LEADS = 3
 """Openings that a robot is told, at most."""
 
 DETOUR = 4.0
-"""Metres that a way is taken to be longer where the body can't go straight on from the view to the opening, and for each
-wall that a view shows between the opening and the target."""
+"""Metres that a way is taken to be longer for each wall that a view shows between an opening and the target, and where a
+view shows the target and the body can't go straight on to it."""
+
+THROUGH_GAP, ROUND_A_BEND, STRAIGHT_ON = 0, 1, 2
+"""How the body gets from a view to its opening: through a gap that it does not fit through, or not straight on."""
+
+FARTHER = (8.0, 1.0, 0.0)
+"""Metres that an opening is taken to be farther, by how the body gets there."""
+
+GAP_ROOM = 64
+"""Gaps that a robot does not fit through that it remembers, the newest ones."""
 
 AWAY = 0.48
 """Metres from where a robot began to stay at which it stays no longer."""

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim.kernels.narrow_gaps import leads_through_gap
 from sim.kernels.options import kernel
 from sim.kernels.room import LINK_ROOM, VIEW_ROOM
 from sim.kernels.sensing import FAST
@@ -40,6 +41,7 @@ def link_view(i, number, first, robots, p):
             there_x = robots.view_places[i, there, 0]
             there_y = robots.view_places[i, there, 1]
             is_seen = sight_of(i, row, there_x, there_y, robots, p) == FREE_SIGHT
+            is_seen = is_seen and not leads_through_gap(i, x, y, there_x, there_y, robots)
             squared = (there_x - x) * (there_x - x) + (there_y - y) * (there_y - y)
         if is_seen:
             if squared < least:

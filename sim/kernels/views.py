@@ -20,8 +20,8 @@ FULL_RANGE = 255
 SLIM = 0.95
 """Of the distance that a robot keeps from obstacles, what a view has to show to be free on both sides of a way."""
 
-FREE_SIGHT = 2
-"""Of a place that a view shows: that the body can go there straight on, too."""
+NO_SIGHT, SIGHT, FREE_SIGHT, SIGHT_THROUGH_GAP = 0, 1, 2, 3
+"""Of a place: whether a view shows it, and whether the body can go there straight on; see `sim.kernels.narrow_gaps`."""
 
 ZERO = np.float32(0.0)
 PI = np.float32(math.pi)
@@ -100,12 +100,12 @@ def is_free_way(i, row, cos, sin, until, robots, p):
 
 @kernel(fastmath=FAST)
 def sight_of(i, row, x, y, robots, p):
-    """0 where a view does not show a place, FREE_SIGHT where the body can go there straight on, 1 else."""
+    """NO_SIGHT, SIGHT or FREE_SIGHT of a place."""
     if not shows(i, row, x, y, ZERO, robots, p):
-        return 0
+        return NO_SIGHT
     dx = x - robots.view_places[i, row, 0]
     dy = y - robots.view_places[i, row, 1]
     distance = np.float32(math.sqrt(dx * dx + dy * dy))
     if distance < _SLIM * p.near or is_free_way(i, row, dx / distance, dy / distance, distance, robots, p):
         return FREE_SIGHT
-    return 1
+    return SIGHT

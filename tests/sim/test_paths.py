@@ -72,6 +72,23 @@ def test_on_the_complex_arena_it_is_the_planners_within_a_fiftieth_on_average() 
     assert max(ratios) < 1.2
 
 
+def test_less_clearance_sees_ways_that_whole_cells_miss() -> None:
+    # A wall across the room with a gap from y = -0.21 to 0.31. The cell around (0, 0.05) keeps 0.26 m from both posts at its
+    # middle, and is free as a whole where that is 0.1 m / sqrt(2) more than paths keep: for 0.17 m and not for 0.2.
+    boxes = np.array([[0.0, -2.605, 0.02, 2.395, 0.0], [0.0, 2.155, 0.02, 1.845, 0.0]])
+    gap = Arena("gap", circles=np.empty((0, 3)), boxes=boxes)
+    ends = (-2.0, 0.05), (2.0, 0.05)
+    assert Paths([gap], 0.2).length(0, *ends) > 8.0
+    assert Paths([gap], 0.17).length(0, *ends) == pytest.approx(4.0, abs=0.1)
+
+
+def test_a_reward_says_what_its_paths_keep_from_obstacles() -> None:
+    assert TaskConfig(reward=REWARD).path_clearance == pytest.approx(CLEARANCE)
+    nearer = RewardConfig(terms=(PathProgressTerm(clearance=0.17),))
+    assert TaskConfig(reward=nearer).path_clearance == pytest.approx(0.17)
+    assert TaskConfig(reward=nearer).passable_clearance == pytest.approx(CLEARANCE)
+
+
 def test_where_no_path_leads_it_is_the_straight_line() -> None:
     closed = Arena("closed", circles=np.empty((0, 3)), boxes=np.array([[0.0, 0.0, 0.1, 5.0, 0.0]]))
     assert Paths([closed], CLEARANCE).length(0, (-2.0, 0.0), (2.0, 1.0)) == pytest.approx(math.hypot(4.0, 1.0))

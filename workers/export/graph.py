@@ -7,9 +7,9 @@
 |             | `pose` (n, 3), `target` (n, 2), `speeds` (n, A) and         |                                     |
 |             | `last_action` (n, A); `trail`, `known`, `openings` and      |                                     |
 |             | `dwell` (n, numbers), which a robot's program keeps         |                                     |
-|             | (`trail.py`, `views.py`, `openings.py` and `dwell.py` in    |                                     |
-|             | `ros2/mapless_navigator`), and an extension's part          |                                     |
-|             | (n, numbers) by its name; where earlier                     |                                     |
+|             | (`trail.py`, `views.py`, `openings.py` with `gaps.py`, and  |                                     |
+|             | `dwell.py` in `ros2/mapless_navigator`), and an             |                                     |
+|             | extension's part (n, numbers) by its name; where earlier    |                                     |
 |             | moments are seen `previous`, see `Specification.carried`    |                                     |
 
 A policy that remembers has one more input, `memory` (n, m), zeros where a robot begins, and one more output, `next_memory`,

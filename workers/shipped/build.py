@@ -1,6 +1,7 @@
 """Trains shipped policies from their recipes, measures them, and writes the files that ship.
 
     python -m workers.shipped.build NAME ...     # these policies
+    python -m workers.shipped.build NAME ... --measure  # these again, as they are: what they are told has changed
     python -m workers.shipped.build --baselines  # what they are compared with
     python -m workers.shipped.build NAME --seed 1 --folder elsewhere  # what another seed would have made
 
@@ -144,6 +145,17 @@ def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> 
         copy_policy(best.archive, target / ARCHIVE)
         # Checkpoints are their owner's alone; these are everybody's.
         (target / ARCHIVE).chmod(0o644)
+    return _measure(made_from, target, command, seed, best.step)
+
+
+def measure(made_from: Recipe, folder: Path = FOLDER) -> Card:
+    """Drives a recipe's suites again with the policy that is in `folder`/NAME, and writes how it did."""
+    target = folder / made_from.name
+    card = Card.model_validate_json((target / CARD).read_bytes())
+    return _measure(made_from, target, card.command, card.seed, card.step)
+
+
+def _measure(made_from: Recipe, target: Path, command: str, seed: int, step: int) -> Card:
     manifest, policy = read_policy(target / ARCHIVE)
     task = manifest.training.task
     act = torch_policy(policy)
@@ -159,7 +171,7 @@ def build(made_from: Recipe, folder: Path = FOLDER, seed: int | None = None) -> 
         command=command,
         training=made_from.training,
         seed=seed,
-        step=best.step,
+        step=step,
         results=tuple(results),
     )
     _write(target / CARD, card, indent=2)
@@ -241,6 +253,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog=_COMMAND, description="Train, measure and write shipped policies.")
     # No `choices`: Python 3.11 would look for the empty list among them.
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"Which policies: {known}.")
+    parser.add_argument("--measure", action="store_true", help="Train nothing: drive the suites again with what is there.")
     parser.add_argument("--baselines", action="store_true", help="Measure what they are compared with, where it is not yet.")
     parser.add_argument("--again", action="store_true", help="Measure all of that anew.")
     parser.add_argument("--seed", type=int, help="Train with another seed than the recipe's; needs --folder.")
@@ -250,6 +263,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     if options.seed is not None and options.folder == FOLDER:
         parser.error("what ships has its recipe's seed: name a --folder for another one")
+    if options.seed is not None and options.measure:
+        parser.error("--measure drives what is there: it has its seed")
     try:
         recipes = [recipe(name) for name in options.names]
     except KeyError as error:
@@ -259,7 +274,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.baselines:
         measure_baselines(again=options.again)
     for made_from in recipes:
-        card = build(made_from, options.folder, options.seed)
+        card = measure(made_from, options.folder) if options.measure else build(made_from, options.folder, options.seed)
         for result in card.results:
             found, interval = result.figures, result.figures.success_interval
             sys.stdout.write(

@@ -8968,6 +8968,11 @@ export interface components {
          */
         "PathProgressTerm-Input": {
             /**
+             * Clearance of paths
+             * @description Metres that these paths keep from obstacles; as a rule what the body needs. They go through cells of 0.1 m that are free as a whole, and may miss gaps up to 0.25 m wider than the body needs: less where those count.
+             */
+            clearance?: number | null;
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -8984,6 +8989,11 @@ export interface components {
          * @description Metres by which the shortest path became shorter: l before - l now, around walls and obstacles, not movers.
          */
         "PathProgressTerm-Output": {
+            /**
+             * Clearance of paths
+             * @description Metres that these paths keep from obstacles; as a rule what the body needs. They go through cells of 0.1 m that are free as a whole, and may miss gaps up to 0.25 m wider than the body needs: less where those count.
+             */
+            clearance: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}

@@ -8,13 +8,15 @@ nearest of each run of earlier ones that the body can go to straight on (eight a
 to every view, and on to its openings.
 
 Told are those by which the goal would be nearest if what was not seen were free, at least 1 m apart, the goal itself where a
-view shows it among them. Where the body can't go straight on from the view, and for each wall that a view shows between the
-opening and the goal, the way is taken to be 4 m longer. A wall is where 16 directions side by side read less than the
-LiDAR's range without a jump: from the end of the sixth straight to that of the eleventh, the first one being every fifth
-direction of a view. For each half metre of the line from an opening to the goal it is remembered whether a wall crosses it,
-at least 0.2 m from the line's ends; halves side by side are of one wall. What is told is chosen anew where a view is kept,
-else every 16 steps. What was told first since then, an opening or the goal, counts 0.04 m farther for each of these steps,
-unless the way to it was more than 0.2 m shorter than it had ever been when it was told first. For each opening that is told:
+view shows it among them. Where the body can't go straight on from the view the way is taken to be 1 m longer, and 8 m where
+it leads through a gap that was found to be too narrow (`gaps.py`), through which no links lead; where a view shows the goal
+and the body can't go straight on to it, and for each wall that a view shows between an opening and the goal, 4 m. A wall is
+where 16 directions side by side read less than the LiDAR's range without a jump: from the end of the sixth straight to that
+of the eleventh, the first one being every fifth direction of a view. For each half metre of the line from an opening to the
+goal it is remembered whether a wall crosses it, at least 0.2 m from the line's ends; halves side by side are of one wall.
+What is told is chosen anew where a view is kept, else every 16 steps. What was told first since then, an opening or the
+goal, counts 0.04 m farther for each of these steps, unless the way to it was more than 0.2 m shorter than it had ever been
+when it was told first. For each opening that is told:
 
 | number   | what it is                                                                                     |
 |----------|------------------------------------------------------------------------------------------------|
@@ -35,6 +37,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .gaps import Gaps, crossed
 from .observation import Reals, ray_angles, wrap
 from .policy import Specification
 from .views import DIRECTIONS, FULL_RANGE, KeptViews
@@ -45,6 +48,8 @@ SAME = 0.4
 APART = 1.0
 SLIM = 0.95
 DETOUR = 4.0
+THROUGH_GAP, ROUND_A_BEND, STRAIGHT_ON = 0, 1, 2
+FARTHER = (8.0, 1.0, 0.0)
 AT_HAND = 0.35
 FLAT_RUN = 10
 OPENING_ROOM = 64
@@ -66,13 +71,13 @@ class _Opening:
     Attributes:
         place: (2,) metres.
         view: number of the view that saw it.
-        is_free: whether the way from that is free.
+        access: how the body gets there from that: STRAIGHT_ON, ROUND_A_BEND, or THROUGH_GAP if at all.
         crossed: which half metres of the line from there to the goal walls cross.
     """
 
     place: Reals
     view: int
-    is_free: bool
+    access: int
     crossed: frozenset[int] = frozenset()
 
     @property
@@ -98,17 +103,26 @@ class _Patience:
 
 @dataclass(frozen=True)
 class _Lead:
-    """An opening, the metres to it by known ways, those that it is taken to be from there to the goal, and its patience."""
+    """An opening, or the goal if a view shows it.
+
+    Attributes:
+        opening: it, or where the goal is.
+        way: metres to it by known ways.
+        rest: metres that it is taken to be from there to the goal.
+        farther: metres that it counts farther since the body does not get there straight on.
+        patience: with it.
+    """
 
     opening: _Opening
     way: float
     rest: float
+    farther: float
     patience: _Patience
 
     @property
     def whole(self) -> float:
         """Metres that the way to the goal is taken to have."""
-        return self.way + self.rest + self.patience.due + (0.0 if self.opening.is_free else DETOUR)
+        return self.way + self.rest + self.farther + self.patience.due
 
 
 class Openings(KeptViews):
@@ -136,6 +150,8 @@ class Openings(KeptViews):
         """Forget all: a new way begins."""
         super().clear()
         self._links: dict[int, set[int]] = {}
+        self._gaps = Gaps(self._near, JUMP)
+        self._through_gaps: set[int] = set()
         self._walls: list[Reals] = []
         self._slots: list[_Opening | None] = [None] * OPENING_ROOM
         self._patience = [_Patience() for _ in range(OPENING_ROOM)]
@@ -172,7 +188,7 @@ class Openings(KeptViews):
             bearing = np.arctan2(dy, dx) - here[2]
             nearness = 1.0 - min(np.hypot(dx, dy) / self._range, 1.0)
             row[:3] = np.sin(bearing), np.cos(bearing), nearness
-            row[3:] = lead.way / (lead.way + 1.0), lead.rest / (lead.rest + 1.0), lead.opening.is_free
+            row[3:] = lead.way / (lead.way + 1.0), lead.rest / (lead.rest + 1.0), lead.opening.access == STRAIGHT_ON
         return numbers.reshape(-1)
 
     @property
@@ -183,6 +199,7 @@ class Openings(KeptViews):
     def _look(self, goal: Reals) -> None:
         """Link the newest view, close the openings that it shows, open those that it has, and measure the ways."""
         newest = self.kept - 1
+        self._close_gaps(newest, goal)
         self._link(newest)
         self._walls = [*self._walls, self._find_walls()][-len(self.places) :]
         for slot, one in enumerate(self._slots):
@@ -190,10 +207,29 @@ class Openings(KeptViews):
                 self._slots[slot] = None
             elif one:
                 self._slots[slot] = replace(one, crossed=one.crossed | _crossed(self._walls[-1], one.place, goal))
+        here = np.array(self.places[-1])
         for place, is_free in self._edges():
             if not self._which_show(place, SLACK)[:-1].any():
-                self._open(_Opening(place, newest, is_free, _crossed(np.concatenate(self._walls), place, goal)))
+                access = STRAIGHT_ON if is_free else ROUND_A_BEND
+                access = THROUGH_GAP if self._gaps.lead_through(here, place) else access
+                self._open(_Opening(place, newest, access, _crossed(np.concatenate(self._walls), place, goal)))
         self._measure_ways(newest)
+        if self._gaps.lead_through(here, goal):
+            self._through_gaps.add(newest)
+
+    def _close_gaps(self, newest: int, goal: Reals) -> None:
+        """Let no opening, no sight of the goal and no link lead through a gap that the newest view found to be narrow."""
+        for gap in self._gaps.measure(self.readings[-1], self._ends(np.arange(DIRECTIONS), self.readings[-1])):
+            for slot, one in enumerate(self._slots):
+                if one and one.view >= self._oldest and crossed(self._place_of(one.view), one.place, gap[None])[0]:
+                    self._slots[slot] = replace(one, access=THROUGH_GAP)
+            for number in range(self._oldest, newest):
+                if crossed(self._place_of(number), goal, gap[None])[0]:
+                    self._through_gaps.add(number)
+                for other in [one for one in self._links[number] if self._oldest <= one < number - 1]:
+                    if crossed(self._place_of(number), self._place_of(other), gap[None])[0]:
+                        self._links[number].remove(other)
+                        self._links[other].discard(number)
 
     def _find_walls(self) -> Reals:
         """Walls of the newest view, (walls, 2, 2): where each begins and ends, metres."""
@@ -225,7 +261,7 @@ class Openings(KeptViews):
         here, links = np.array(self.places[-1]), [newest - 1]
         run: list[int] = []
         for number in range(newest - 2, self._oldest - 2, -1):
-            if number >= self._oldest and self._is_passable(-1, self._place_of(number)):
+            if number >= self._oldest and self._links_to(self._place_of(number)):
                 run.append(number)
             elif run:
                 nearest = min(run, key=lambda one: np.hypot(*(self._place_of(one) - here)))
@@ -234,6 +270,10 @@ class Openings(KeptViews):
         for number in links[:LINK_ROOM]:
             self._links[newest].add(number)
             self._links[number].add(newest)
+
+    def _links_to(self, place: Reals) -> bool:
+        """Whether the body can go from the newest view to a place straight on, and through no narrow gap."""
+        return self._is_passable(-1, place) and not self._gaps.lead_through(np.array(self.places[-1]), place)
 
     def _is_passable(self, row: int, place: Reals) -> bool:
         """Whether a view shows a place, and that the body can go there straight on."""
@@ -290,13 +330,13 @@ class Openings(KeptViews):
     def _open(self, opening: _Opening) -> None:
         """Remember an opening: in place of the same one, in an empty slot, or in that of the one seen the longest ago.
 
-        One with a free way stays before the same one without.
+        One that the body gets to more easily stays before the same one elsewhere.
         """
         taken = [one.view if one else -1 for one in self._slots]
         slots = enumerate(self._slots)
         same = next((k for k, one in slots if one and np.hypot(*(one.place - opening.place)) < SAME), None)
         known = None if same is None else self._slots[same]
-        if known is None or opening.is_free or not known.is_free:
+        if known is None or opening.access >= known.access:
             slot = taken.index(min(taken)) if same is None else same
             self._slots[slot] = opening
             if same is None:
@@ -323,14 +363,18 @@ class Openings(KeptViews):
 
     def _choose(self, goal: Reals) -> list[_Lead]:
         """The openings by which the goal would be nearest, the best one first."""
-        rows = np.flatnonzero(self._which_show(goal, 0.0))
-        sights = [_Opening(goal, int(row) + self._oldest, self._is_passable(int(row), goal)) for row in rows]
-        seen = [(one, self._patience_with_goal) for one in sights]
-        seen += [(one, patience) for one, patience in zip(self._slots, self._patience, strict=True) if one]
-        found = [
-            _Lead(one, self._way(one.view, one.place), float(np.hypot(*(goal - one.place))) + DETOUR * one.walls, patience)
-            for one, patience in seen
-        ]
+        found = []
+        for row in np.flatnonzero(self._which_show(goal, 0.0)).tolist():
+            number, is_free = row + self._oldest, self._is_passable(row, goal)
+            farther = 0.0 if is_free else DETOUR
+            if number in self._through_gaps:
+                farther, is_free = FARTHER[THROUGH_GAP], False
+            shown = _Opening(goal, number, STRAIGHT_ON if is_free else ROUND_A_BEND)
+            found.append(_Lead(shown, self._way(number, goal), 0.0, farther, self._patience_with_goal))
+        for one, patience in zip(self._slots, self._patience, strict=True):
+            if one:
+                rest = float(np.hypot(*(goal - one.place))) + DETOUR * one.walls
+                found.append(_Lead(one, self._way(one.view, one.place), rest, FARTHER[one.access], patience))
         chosen: list[_Lead] = []
         for lead in sorted(found, key=lambda lead: lead.whole):
             if all(np.hypot(*(lead.opening.place - other.opening.place)) >= APART for other in chosen):
