@@ -15,7 +15,7 @@ from workers.errors import ArchiveIntegrityError
 from workers.export.bundle import export_checkpoint
 from workers.policy import torch_policy
 from workers.reporting import EpisodeResult, EvaluationResult, Outcome
-from workers.shipped.build import BestCheckpoint, Progress, build, main
+from workers.shipped.build import BestCheckpoint, Progress, build, main, measure
 from workers.shipped.figures import figures
 from workers.shipped.library import FOLDER, ShippedPolicy, baselines, shipped_policies, shipped_policy
 from workers.shipped.recipes import RECIPES, Recipe, recipe
@@ -169,11 +169,20 @@ def test_the_same_recipe_gives_the_same_files(tmp_path: Path) -> None:
     one, two = ({path.name: path.read_bytes() for path in (tmp_path / name / "tiny").iterdir()} for name in ("one", "two"))
     assert one.keys() == {"policy.zip", "card.json", "rooms-0.5-200.json", "simple-200.json"}
     assert one == two
+    # What is measured again, without a training, is what was measured after it.
+    (tmp_path / "two" / "tiny" / "simple-200.json").unlink()
+    measure(tiny, tmp_path / "two")
+    assert one == {path.name: path.read_bytes() for path in (tmp_path / "two" / "tiny").iterdir()}
 
 
 @pytest.mark.parametrize(
     ("arguments", "answer"),
-    [([], "name at least one policy"), (["nobody"], "choose one of"), (["simple", "--seed", "1"], "name a --folder")],
+    [
+        ([], "name at least one policy"),
+        (["nobody"], "choose one of"),
+        (["simple", "--seed", "1"], "name a --folder"),
+        (["simple", "--seed", "1", "--folder", "elsewhere", "--measure"], "it has its seed"),
+    ],
 )
 def test_what_to_build_has_to_be_named(arguments: list[str], answer: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
