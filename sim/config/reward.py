@@ -71,8 +71,7 @@ class PathProgressTerm(Frozen):
         gt=0.0,
         le=1.0,
         title="Clearance of paths",
-        description="Metres that these paths keep from obstacles; as a rule what the body needs. They go through cells of "
-        "0.1 m that are free as a whole, and may miss gaps up to 0.25 m wider than the body needs: less where those count.",
+        description="Metres from obstacles; empty: what the body needs. Gaps up to 0.25 m wider may be missed.",
         json_schema_extra=ADVANCED,
     )
 
