@@ -55,7 +55,8 @@ class PlainGaps:
         widths = np.hypot(*(ends - edge).T) - math.pi / VIEW_DIRECTIONS * (view.readings[near] + other)
         widths[(other <= 0.0) | (other > NEAR_BY) | (view.readings[near] > NEAR_BY)] = math.inf
         least = int(widths.argmin())
-        if widths[least] >= self._width:
+        # Between two readings side by side no ray went through: a wall seen at a flat angle looks like this.
+        if widths[least] >= self._width or least == 0:
             return None
         into = (ends[least] - edge) * POST / math.dist(edge, ends[least])
         (x, y), (other_x, other_y) = (edge - into).tolist(), (ends[least] + into).tolist()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sim.config import LidarConfig, OpeningsPart
 from sim.engine.plain_narrow_gaps import PlainGaps, crosses
 from sim.engine.plain_views import Place, PlainView, PlainViews, angle_of, end_of, wrapped
-from sim.kernels.find_openings import FLAT_RUN, SAME_OPENING, SLACK
-from sim.kernels.openings import APART, AT_HAND
+from sim.kernels.find_openings import FLAT_RUN, GATE_WIDTH, SAME_OPENING, SLACK
+from sim.kernels.openings import APART, AT_GATE, AT_HAND
 from sim.kernels.patience import DUE, NEARER, PATIENCE
 from sim.kernels.room import (
     DETOUR,
@@ -40,12 +40,14 @@ class _Opening:
 
     Attributes:
         place: metres.
+        gate: where the body goes through on its way there from the view, metres.
         view: number of the view that it was seen from.
         access: how the body gets there from that, see `sim.kernels.room`.
         crossed: pieces of the line from there to the target that walls cross, numbered from the opening on.
     """
 
     place: Place
+    gate: Place
     view: int
     access: int
     crossed: frozenset[int] = frozenset()
@@ -153,18 +155,18 @@ class PlainOpenings:
         self._close_gaps(newest, target)
         self._links.append(self._links_of(newest))
         for slot, opening in enumerate(self._slots):
-            if opening and (opening.view not in self._remembered or self._shows(newest, opening.place, SLACK)):
+            if opening and (opening.view not in self._remembered or self._has_seen(newest, opening.place)):
                 self._slots[slot] = None
             elif opening:
                 crossed = opening.crossed.union(self._walls_across(newest, opening.place, target))
                 self._slots[slot] = replace(opening, crossed=crossed)
-        for place, is_free in self._edges(newest):
-            if not any(self._shows(self.views.kept[number], place, SLACK) for number in self._remembered[:-1]):
+        for place, gate, is_free in self._edges(newest):
+            if not any(self._has_seen(self.views.kept[number], place) for number in self._remembered[:-1]):
                 access = STRAIGHT_ON if is_free else ROUND_A_BEND
                 access = THROUGH_GAP if self._gaps.lead_through(newest.place, place) else access
                 views = (self.views.kept[number] for number in self._remembered)
                 crossed = frozenset(chain.from_iterable(self._walls_across(view, place, target) for view in views))
-                self._open(_Opening(place, self._remembered[-1], access, crossed))
+                self._open(_Opening(place, gate, self._remembered[-1], access, crossed))
         self._measure_ways()
         self._sights.append(self._sight_of(newest, target))
 
@@ -227,32 +229,42 @@ class PlainOpenings:
         shown = self._shows(view, place, 0.0) and self._is_passable(view, place)
         return shown and not self._gaps.lead_through(view.place, place)
 
-    def _edges(self, view: PlainView) -> Iterator[tuple[Place, bool]]:
-        """Places where a view's readings jump, or end at the LiDAR's range, and whether the way to them is free."""
+    def _edges(self, view: PlainView) -> Iterator[tuple[Place, Place, bool]]:
+        """Places where a view's readings jump, or end at the LiDAR's range, their gates, and whether the way is free."""
         run = 0
         for k, (right, left) in enumerate(zip(view.readings, np.roll(view.readings, -1), strict=True)):
             if right == 0.0 or left == 0.0:
                 run = 0
                 continue
-            if abs(right - left) > JUMP and not self._is_narrow(view, k):
+            if abs(right - left) > JUMP:
+                gate, fits = self._gate(view, k)
                 nearer, direction = min(right, left), (k + 1) % VIEW_DIRECTIONS - 0.5
-                is_free = self._is_free(view, float(angle_of(direction)), nearer - self.near)
-                yield end_of(view, direction, (right + left) / 2.0), is_free
+                if fits:
+                    is_free = self._is_free(view, float(angle_of(direction)), nearer - self.near)
+                    yield end_of(view, direction, (right + left) / 2.0), gate, is_free
             run = run + 1 if right >= self._farthest else 0
             if run and (run == FLAT_RUN or left < self._farthest):
                 if run > 1:
+                    place = end_of(view, k - run // 2, self.lidar.range)
                     is_free = self._is_free(view, float(angle_of(k - run // 2)), self.lidar.range)
-                    yield end_of(view, k - run // 2, self.lidar.range), is_free
+                    yield place, place, is_free
                 run = 0
 
-    def _is_narrow(self, view: PlainView, k: int) -> bool:
-        """Whether the body does not fit through the opening between directions k and k + 1."""
+    def _gate(self, view: PlainView, k: int) -> tuple[Place, bool]:
+        """Where the body goes through between directions k and k + 1, and whether it fits."""
         following = (k + 1) % VIEW_DIRECTIONS
         is_right = view.readings[k] < view.readings[following]
         near, beyond, step = (k, following, 1) if is_right else (following, k, -1)
         edge = end_of(view, near, view.readings[near])
         across = ((beyond + step * n) % VIEW_DIRECTIONS for n in range(VIEW_DIRECTIONS // 4))
-        return any(math.dist(edge, end_of(view, j, view.readings[j])) < 2.0 * SLIM * self.near for j in across)
+        posts = [end_of(view, j, view.readings[j]) for j in across if 0.0 < view.readings[j] < self._farthest]
+        post = min(posts, key=lambda place: math.dist(edge, place), default=None)
+        widest = GATE_WIDTH * self.near
+        if post is None or math.dist(edge, post) >= widest:
+            angle = float(angle_of((k + 1) % VIEW_DIRECTIONS - 0.5))
+            post = edge[0] - step * widest * math.sin(angle), edge[1] + step * widest * math.cos(angle)
+        gate = (edge[0] + post[0]) / 2.0, (edge[1] + post[1]) / 2.0
+        return gate, math.dist(edge, post) >= 2.0 * SLIM * self.near
 
     def _open(self, opening: _Opening) -> None:
         """Remember an opening: in place of the same one, in an empty slot, or in that of the one seen the longest ago.
@@ -268,6 +280,10 @@ class PlainOpenings:
             self._slots[slot] = opening
             if same is None:
                 self._patience[slot] = _Patience()
+
+    def _has_seen(self, view: PlainView, place: Place) -> bool:
+        """Whether a view shows a place, and not only through a gap that the body does not fit through."""
+        return self._shows(view, place, SLACK) and not self._gaps.lead_through(view.place, place)
 
     def _shows(self, view: PlainView, place: Place, slack: float) -> bool:
         """Whether neither of the two readings beside a place ends more than the slack before it."""
@@ -314,7 +330,7 @@ class PlainOpenings:
         for number in self._remembered:
             sight = self._sights[number]
             if sight != NO_SIGHT:
-                shown = _Opening(target, number, STRAIGHT_ON if sight == FREE_SIGHT else ROUND_A_BEND)
+                shown = _Opening(target, target, number, STRAIGHT_ON if sight == FREE_SIGHT else ROUND_A_BEND)
                 found.append(_Lead(shown, self._way_to(shown), 0.0, _SIGHTS[sight], self._patience_with_target))
         for one, patience in zip(self._slots, self._patience, strict=True):
             if one is not None:
@@ -351,8 +367,12 @@ class PlainOpenings:
         return numbers.reshape(-1)
 
     def _first_place(self, opening: _Opening, ranges: NDArray[np.float64], pose: Sequence[float]) -> Place:
-        """Metres to the last place on the way to an opening that is in sight."""
+        """Metres to an opening's gate, or to the last place on the way there that is in sight."""
         to = opening.place[0] - pose[0], opening.place[1] - pose[1]
+        gate = opening.gate[0] - pose[0], opening.gate[1] - pose[1]
+        is_ahead = math.dist(opening.gate, opening.place) < math.hypot(*to) and math.hypot(*gate) > AT_GATE
+        if is_ahead and self._is_in_sight(gate, ranges, pose[2], 0.0, farthest=False):
+            return gate
         if self._is_in_sight(to, ranges, pose[2], SLACK, farthest=True):
             return to
         view: int | None = opening.view

@@ -227,6 +227,7 @@ class World:
             view_next=np.zeros((looks, VIEW_ROOM), dtype=np.int32),
             view_sights=np.zeros((looks, VIEW_ROOM), dtype=np.uint8),
             opening_places=np.zeros((looks, OPENING_ROOM, 2), dtype=np.float32),
+            opening_gates=np.zeros((looks, OPENING_ROOM, 2), dtype=np.float32),
             opening_views=np.zeros((looks, OPENING_ROOM), dtype=np.int32),
             opening_access=np.zeros((looks, OPENING_ROOM), dtype=np.uint8),
             view_walls=np.zeros((looks, VIEW_ROOM), dtype=np.int32),

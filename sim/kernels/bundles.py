@@ -137,6 +137,7 @@ class Robots(NamedTuple):
         view_sights: (N, VIEW_ROOM) uint8, how it shows the target, see `sim.kernels.views`; (0, ...) likewise.
         view_walls: (N, VIEW_ROOM) bits, which chords of it are walls, see `sim.kernels.walls`; (0, ...) likewise.
         opening_places: (N, OPENING_ROOM, 2) x, y of openings, as `trail`; (0, ...) likewise.
+        opening_gates: (N, OPENING_ROOM, 2) x, y of where the body goes through on its way from that view; (0, ...) likewise.
         opening_views: (N, OPENING_ROOM) number of the view that saw it, -1 where there is no opening; (0, ...) likewise.
         opening_access: (N, OPENING_ROOM) uint8, how the body gets there from that view, see `sim.kernels.room`; (0, ...)
             likewise.
@@ -185,6 +186,7 @@ class Robots(NamedTuple):
     view_sights: NDArray[np.uint8]
     view_walls: Integers
     opening_places: Floats
+    opening_gates: Floats
     opening_views: Integers
     opening_access: NDArray[np.uint8]
     opening_walls: NDArray[np.int64]

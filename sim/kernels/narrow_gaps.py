@@ -148,7 +148,8 @@ def _measure_gap(i, near, beyond, step, number, first, target_x, target_y, robot
             least = width
             across_x = dx
             across_y = dy
-            length = apart
+            # Between two readings side by side no ray went through: a wall seen at a flat angle looks like this.
+            length = apart if k > 0 else np.float32(0.0)
     if length <= _TINY:
         return
     into = _POST / length

@@ -30,27 +30,33 @@ APART = 1.0
 AT_HAND = 0.35
 """Metres from a view at which a robot is there, and goes on to what comes next."""
 
-LEAD_NUMBERS = 6
+AT_GATE = 0.15
+"""Metres from an opening's gate at which a robot is there, and goes on to the opening."""
+
+LEAD_NUMBERS = 8
 """What is kept of an opening that is told: x, y, metres on known ways to it, metres that it is taken to be from there, its
-view, and whether the way from that is free."""
+view, whether the way from that is free, and x, y of its gate."""
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 _SLACK = np.float32(SLACK)
 _APART_SQUARED = np.float32(APART * APART)
+_AT_GATE_SQUARED = np.float32(AT_GATE * AT_GATE)
 _AT_HAND_SQUARED = np.float32(AT_HAND * AT_HAND)
 _DETOUR = np.float32(DETOUR)
 _FARTHER = np.array(FARTHER, np.float32)
 
 
 @kernel(fastmath=FAST)
-def _write_lead(i, lead, x, y, way, rest, view, is_free, robots):
+def _write_lead(i, lead, x, y, gate_x, gate_y, way, rest, view, is_free, robots):
     robots.leads[i, lead, 0] = x
     robots.leads[i, lead, 1] = y
     robots.leads[i, lead, 2] = way
     robots.leads[i, lead, 3] = rest
     robots.leads[i, lead, 4] = np.float32(view)
     robots.leads[i, lead, 5] = ONE if is_free else ZERO
+    robots.leads[i, lead, 6] = gate_x
+    robots.leads[i, lead, 7] = gate_y
 
 
 @kernel(fastmath=FAST)
@@ -93,7 +99,8 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
                     least = whole
                     if lead == 0:
                         robots.followed[i, 0] = TARGET_SLOT
-                    _write_lead(i, lead, target_x, target_y, way, ZERO, other, seen == FREE_SIGHT, robots)
+                    is_free = seen == FREE_SIGHT
+                    _write_lead(i, lead, target_x, target_y, target_x, target_y, way, ZERO, other, is_free, robots)
         for k in range(OPENING_ROOM):
             view = robots.opening_views[i, k]
             if view < 0:
@@ -109,7 +116,8 @@ def choose_leads(i, target_x, target_y, number, first, count, robots):
                 least = whole
                 if lead == 0:
                     robots.followed[i, 0] = k
-                _write_lead(i, lead, x, y, way, rest, view, manner == STRAIGHT_ON, robots)
+                gate = robots.opening_gates[i, k]
+                _write_lead(i, lead, x, y, gate[0], gate[1], way, rest, view, manner == STRAIGHT_ON, robots)
 
 
 @kernel(fastmath=FAST)
@@ -136,10 +144,18 @@ def _is_in_sight(i, dx, dy, heading, beside, slack, robots, geometry, p):
 
 @kernel(fastmath=FAST)
 def _next_place(i, lead, x, y, heading, number, robots, geometry, p):
-    """Where to go first on the way to an opening: the last place on it that is in sight; (x, y) in metres from the robot."""
+    """Where to go first on the way to an opening, (x, y) in metres from the robot: its gate, or the last place in sight."""
     to_x = robots.leads[i, lead, 0] - x
     to_y = robots.leads[i, lead, 1] - y
     view = np.int64(robots.leads[i, lead, 4])
+    gate_x = robots.leads[i, lead, 6] - x
+    gate_y = robots.leads[i, lead, 7] - y
+    beyond_x = to_x - gate_x
+    beyond_y = to_y - gate_y
+    is_ahead = beyond_x * beyond_x + beyond_y * beyond_y < to_x * to_x + to_y * to_y
+    is_ahead &= gate_x * gate_x + gate_y * gate_y > _AT_GATE_SQUARED
+    if is_ahead and _is_in_sight(i, gate_x, gate_y, heading, -1, ZERO, robots, geometry, p):
+        return gate_x, gate_y
     if _is_in_sight(i, to_x, to_y, heading, 1, _SLACK, robots, geometry, p):
         return to_x, to_y
     dx = to_x

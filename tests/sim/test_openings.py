@@ -12,7 +12,7 @@ from sim.engine.plain_openings import PlainOpenings
 from sim.engine.plain_views import PlainViews
 from sim.engine.world import World
 from sim.envs.vector import NavigationVectorEnv
-from sim.kernels.room import VIEW_ROOM
+from sim.kernels.room import STRAIGHT_ON, VIEW_ROOM
 from sim.kernels.walls import count_walls
 from sim.observations import near_distance, observation_layout
 from tests.sim.scenes import LIDARS, goes_on_bit_for_bit
@@ -62,6 +62,13 @@ def test_in_the_open_it_is_told_where_its_sight_ends_nearest_to_the_target() -> 
         assert told == pytest.approx(expected, abs=1e-5)
 
 
+def place_of_the_first(made: World) -> tuple[float, float]:
+    """Metres ahead and to the left."""
+    sine, cosine, nearness = leads(made)[0, :3].tolist()
+    away = (1.0 - nearness) * made.task.lidar.range
+    return away * cosine, away * sine
+
+
 def test_a_gap_that_the_body_fits_through_is_an_opening_half_way_behind_its_edge() -> None:
     made = world(looking(1), *wall_with_gap(0.5, 0.6), half=1.5)
     made.reset(poses=(-0.5, 0.0, 0.0), targets=(1.2, 1.2))
@@ -70,8 +77,41 @@ def test_a_gap_that_the_body_fits_through_is_an_opening_half_way_behind_its_edge
     away = (0.98 / math.cos(math.radians(18.0)) + 2.0 / math.cos(math.radians(15.0))) / 2.0
     sine, cosine = math.sin(math.radians(15.0)), math.cos(math.radians(15.0))
     rest = math.dist((-0.5 + away * cosine, away * sine), (1.2, 1.2))
-    expected = [sine, cosine, 1.0 - away / 3.5, away / (away + 1.0), rest / (rest + 1.0), 1.0]
-    assert leads(made)[0] == pytest.approx(expected, abs=3e-3)
+    assert leads(made)[0, 3:] == pytest.approx([away / (away + 1.0), rest / (rest + 1.0), 1.0], abs=3e-3)
+    # It goes to its gate first. The post on the other side is seen 0.64 m away, which is more than 3 times 0.2 m: the gate
+    # is half of these 0.6 m beside the edge, which a view keeps in the direction of 16.5.
+    edge = 0.98 / math.cos(math.radians(18.0))
+    gate = edge * math.cos(math.radians(16.5)) + 0.3 * sine, edge * math.sin(math.radians(16.5)) - 0.3 * cosine
+    assert place_of_the_first(made) == pytest.approx(gate, abs=8e-3)
+
+
+def test_the_gate_of_a_narrow_gap_is_half_way_between_its_posts() -> None:
+    made = world(looking(1), *wall_with_gap(0.5, 0.5), half=1.5)
+    made.reset(poses=(-0.5, 0.0, 0.0), targets=(1.2, 1.2))
+    # Rays at 15 and -15 degrees meet the posts after 0.98 m / cos 15; a view keeps them at 13.5 and -16.5, 0.53 m apart.
+    away = 0.98 / math.cos(math.radians(15.0))
+    left, right = math.radians(13.5), math.radians(-16.5)
+    gate = away * (math.cos(left) + math.cos(right)) / 2.0, away * (math.sin(left) + math.sin(right)) / 2.0
+    assert place_of_the_first(made) == pytest.approx(gate, abs=8e-3)
+    # Where it is 0.15 m away from there it goes on to what lies behind the edge.
+    drive(made, 17)
+    beyond = place_of_the_first(made)
+    assert beyond[0] > 0.5
+    assert beyond[1] > 0.1
+
+
+def test_what_was_seen_through_a_gap_that_is_too_narrow_is_an_opening_elsewhere() -> None:
+    # Behind a wall with a gap of 0.4 m in its middle, and a way round its end.
+    pieces = [(0.5, 0.6, 0.02, 0.4, 0.0), (0.5, -1.6, 0.02, 1.4, 0.0)]
+    made = world(looking(3), *pieces, half=3.0)
+    made.reset(poses=(-0.4, 0.0, 0.0), targets=(2.8, 0.0))
+    assert int(made.robots.gaps_found[0]) == 1
+    drive(made, 16, 0.0, 0.5)
+    drive(made, 40)
+    robots = made.robots
+    seen_from = robots.view_places[0, np.maximum(robots.opening_views[0], 0)]
+    beyond = (robots.opening_views[0] > 0) & (robots.opening_places[0, :, 0] > 0.6) & (seen_from[:, 1] > 0.5)
+    assert STRAIGHT_ON in robots.opening_access[0, beyond]
 
 
 def test_a_gap_that_the_body_does_not_fit_through_is_none() -> None:
@@ -91,10 +131,10 @@ def test_a_wall_that_was_seen_between_an_opening_and_the_target_is_a_detour_of_4
     # The way out of a room 1.8 m wide is a gap to its left; the target lies 0.3 m behind the wall to its right.
     made = world(looking(1), *wall_with_gap(-0.8, 0.6), (1.0, 0.0, 0.02, 1.5, 0.0), half=1.5)
     made.reset(poses=(0.0, 0.3, 0.0), targets=(1.3, -0.2))
-    (sine, cosine, nearness, _, rest, is_free) = leads(made)[0].tolist()
-    away = (1.0 - nearness) * 3.5
-    straight = math.dist((away * cosine, 0.3 + away * sine), (1.3, -0.2))
-    assert cosine < 0.0
+    (*_, rest, is_free) = leads(made)[0].tolist()
+    (x, y) = made.robots.leads[0, 0, :2].tolist()
+    straight = math.dist((x, y), (1.3, -0.2))
+    assert x < 0.0
     assert is_free == 1.0
     assert rest / (1.0 - rest) == pytest.approx(straight + 4.0, abs=0.01)
     drive(made, 20, 0.3, 0.2)

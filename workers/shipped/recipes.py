@@ -155,8 +155,7 @@ RECIPES: tuple[Recipe, ...] = (
         name="rooms",
         title="Through rooms and mazes",
         description="Trained on 4,096 maps of seven families, for buildings that it has never seen: it drops crumbs on its "
-        "way and sees its trail, sees how far it could go, and knows where it has not looked yet; three quarters of an hour "
-        "on one core.",
+        "way and sees its trail, sees how far it could go, and knows where it has not looked yet; an hour on one core.",
         training=TrainingConfig(
             task=TaskConfig(
                 arena=GeneratedArenaConfig(name="intricate", difficulty=1.0, maps=4096, seed=0),

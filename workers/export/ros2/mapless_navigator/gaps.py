@@ -1,9 +1,10 @@
 """Gaps that the robot measured from near by and does not fit through: no way and no sight leads through them.
 
 Measured is the gap beside each jump of a view, from where the nearer of the two readings ends to where one of the 30 on the
-other side does, both at most 1.6 m away: to the one to which it is the narrowest. A ray meets a post up to 3 degrees behind
-its edge, so half of that is taken from the width on each side. Below 1.125 times what the body needs it is closed by the
-line between these ends, 0.1 m longer on either side. The newest 64 are remembered, two whose ends lie within 0.2 m are one.
+other side does, both at most 1.6 m away: to the one to which it is the narrowest. Where that is the jump's other reading no
+ray went through, as where a wall is seen at a flat angle: that is no gap. A ray meets a post up to 3 degrees behind its
+edge, so half of that is taken from the width on each side. Below 1.125 times what the body needs it is closed by the line
+between these ends, 0.1 m longer on either side. The newest 64 are remembered, two whose ends lie within 0.2 m are one.
 """
 
 import numpy as np
@@ -61,7 +62,7 @@ class Gaps:
         widths = apart - np.pi / count * (readings[near] + other)
         widths[(other <= 0.0) | (other > NEAR_BY) | (readings[near] > NEAR_BY)] = np.inf
         least = int(widths.argmin())
-        if widths[least] >= self._width:
+        if widths[least] >= self._width or least == 0:
             return None
         one, two = ends[near], ends[across[least]]
         into = (two - one) * POST / apart[least]

@@ -2,10 +2,13 @@
 
 As in training it keeps views (`views.py`). An opening is where two readings side by side of a view differ by more than
 0.4 m, half way between their ends, if the body fits through; or the middle of up to ten that all read the LiDAR's range. It
-is open while no other view shows it: while in each of them one of the two readings beside it ends more than 0.2 m before it.
-The newest 64 are remembered, two within 0.4 m are one. Each view is linked to the one before it, and to the oldest and the
-nearest of each run of earlier ones that the body can go to straight on (eight at most); by these links it is so and so far
-to every view, and on to its openings.
+is open while no other view has seen it: while in each of them one of the two readings beside it ends more than 0.2 m before
+it, or the line to it leads through a gap that was found to be too narrow (`gaps.py`). Its gate is half way between where the
+nearer of the two readings ends and the nearest end of the 30 on the other side, if that is less than three times the
+distance that the robot keeps from obstacles away, else one and a half times that beside it. The newest 64 are remembered,
+two within 0.4 m are one. Each view is linked to the one before it, and to the oldest and the nearest of each run of earlier
+ones that the body can go to straight on (eight at most); by these links it is so and so far to every view, and on to its
+openings.
 
 Told are those by which the goal would be nearest if what was not seen were free, at least 1 m apart, the goal itself where a
 view shows it among them. Where the body can't go straight on from the view the way is taken to be 1 m longer, and 8 m where
@@ -20,14 +23,15 @@ when it was told first. For each opening that is told:
 
 | number   | what it is                                                                                     |
 |----------|------------------------------------------------------------------------------------------------|
-| sine     | of the bearing of the place to go to first, the last one on the way to it that is in sight      |
+| sine     | of the bearing of the place to go to first                                                      |
 | cosine   | likewise                                                                                        |
 | nearness | 1 - its distance / range of the LiDAR, at least 0                                               |
 | way      | w / (w + 1 m), w the metres from the newest view to the opening                                 |
 | rest     | r / (r + 1 m), r the metres that it is taken to be from there to the goal                       |
 | free     | 1 where the body can go there straight on from the view that saw it                             |
 
-0 where there is none.
+0 where there is none. The place to go to first is the gate, while that is in sight, more than 0.15 m away and nearer to the
+opening than the robot is; else the last place on the way to the opening that is in sight.
 """
 
 import heapq
@@ -51,6 +55,8 @@ DETOUR = 4.0
 THROUGH_GAP, ROUND_A_BEND, STRAIGHT_ON = 0, 1, 2
 FARTHER = (8.0, 1.0, 0.0)
 AT_HAND = 0.35
+AT_GATE = 0.15
+GATE_WIDTH = 3.0
 FLAT_RUN = 10
 OPENING_ROOM = 64
 LINK_ROOM = 8
@@ -70,12 +76,14 @@ class _Opening:
 
     Attributes:
         place: (2,) metres.
+        gate: (2,) metres, where the body goes through on its way there from the view.
         view: number of the view that saw it.
         access: how the body gets there from that: STRAIGHT_ON, ROUND_A_BEND, or THROUGH_GAP if at all.
         crossed: which half metres of the line from there to the goal walls cross.
     """
 
     place: Reals
+    gate: Reals
     view: int
     access: int
     crossed: frozenset[int] = frozenset()
@@ -203,16 +211,16 @@ class Openings(KeptViews):
         self._link(newest)
         self._walls = [*self._walls, self._find_walls()][-len(self.places) :]
         for slot, one in enumerate(self._slots):
-            if one and (one.view < self._oldest or self._which_show(one.place, SLACK)[-1]):
+            if one and (one.view < self._oldest or self._which_have_seen(one.place)[-1]):
                 self._slots[slot] = None
             elif one:
                 self._slots[slot] = replace(one, crossed=one.crossed | _crossed(self._walls[-1], one.place, goal))
         here = np.array(self.places[-1])
-        for place, is_free in self._edges():
-            if not self._which_show(place, SLACK)[:-1].any():
+        for place, gate, is_free in self._edges():
+            if not self._which_have_seen(place)[:-1].any():
                 access = STRAIGHT_ON if is_free else ROUND_A_BEND
                 access = THROUGH_GAP if self._gaps.lead_through(here, place) else access
-                self._open(_Opening(place, newest, access, _crossed(np.concatenate(self._walls), place, goal)))
+                self._open(_Opening(place, gate, newest, access, _crossed(np.concatenate(self._walls), place, goal)))
         self._measure_ways(newest)
         if self._gaps.lead_through(here, goal):
             self._through_gaps.add(newest)
@@ -250,6 +258,13 @@ class Openings(KeptViews):
         readings = np.array(self.readings)
         sights = np.minimum(readings[rows, right % DIRECTIONS], readings[rows, (right + 1) % DIRECTIONS])
         shown: Reals = np.hypot(*offsets.T) <= sights + slack
+        return shown
+
+    def _which_have_seen(self, place: Reals) -> Reals:
+        """In which views a place is shown, and not only through a gap that the body does not fit through, (views,) bool."""
+        shown = self._which_show(place, SLACK)
+        for row in np.flatnonzero(shown):
+            shown[row] = not self._gaps.lead_through(np.array(self.places[row]), place)
         return shown
 
     def _link(self, newest: int) -> None:
@@ -295,8 +310,8 @@ class Openings(KeptViews):
         """Where a view was kept, (2,) metres."""
         return np.array(self.places[number - self._oldest])
 
-    def _edges(self) -> Iterator[tuple[Reals, bool]]:
-        """Places where the newest view's readings jump, or end at the LiDAR's range, and whether the way to them is free."""
+    def _edges(self) -> Iterator[tuple[Reals, Reals, bool]]:
+        """Where the newest view's readings jump, or end at the LiDAR's range, their gates, and whether the way is free."""
         readings, run = self.readings[-1], 0
         ends = self._ends(np.arange(DIRECTIONS), readings)
         for k in range(DIRECTIONS):
@@ -304,21 +319,31 @@ class Openings(KeptViews):
             if right == 0.0 or left == 0.0:
                 run = 0
                 continue
-            if abs(right - left) > JUMP and not self._is_narrow(ends, k, right < left):
+            if abs(right - left) > JUMP:
+                gate, fits = self._gate(ends, k, right < left)
                 nearer, direction = min(right, left), (k + 1) % DIRECTIONS - 0.5
-                is_free = self._is_free(-1, float(_angles(direction)), nearer - self._near)
-                yield self._ends(direction, (right + left) / 2.0), is_free
+                if fits:
+                    is_free = self._is_free(-1, float(_angles(direction)), nearer - self._near)
+                    yield self._ends(direction, (right + left) / 2.0), gate, is_free
             run = run + 1 if right >= self._farthest else 0
             if run and (run == FLAT_RUN or left < self._farthest):
                 if run > 1:
-                    yield self._ends(k - run // 2, self._range), self._is_free(-1, float(_angles(k - run // 2)), self._range)
+                    place = self._ends(k - run // 2, self._range)
+                    yield place, place, self._is_free(-1, float(_angles(k - run // 2)), self._range)
                 run = 0
 
-    def _is_narrow(self, ends: Reals, k: int, is_right: bool) -> bool:
-        """Whether the body does not fit through the opening between directions k and k + 1."""
+    def _gate(self, ends: Reals, k: int, is_right: bool) -> tuple[Reals, bool]:
+        """Where the body goes through between directions k and k + 1 of the newest view, and whether it fits."""
         near, beyond, step = (k, k + 1, 1) if is_right else (k + 1, k, -1)
-        across = ends[(beyond + step * np.arange(DIRECTIONS // 4)) % DIRECTIONS]
-        return bool((np.hypot(*(across - ends[near % DIRECTIONS]).T) < 2.0 * self._slim).any())
+        across = (beyond + step * np.arange(DIRECTIONS // 4)) % DIRECTIONS
+        readings, edge = self.readings[-1][across], ends[near % DIRECTIONS]
+        apart = np.hypot(*(ends[across] - edge).T)
+        apart[(readings <= 0.0) | (readings >= self._farthest)] = np.inf
+        least, widest = int(apart.argmin()), GATE_WIDTH * self._near
+        if apart[least] >= widest:
+            angle = float(_angles((k + 1) % DIRECTIONS - 0.5))
+            return edge + step * widest / 2.0 * np.array((-np.sin(angle), np.cos(angle))), True
+        return (edge + ends[across[least]]) / 2.0, bool(apart[least] >= 2.0 * self._slim)
 
     def _ends(self, directions: ArrayLike, readings: ArrayLike) -> Reals:
         """Where readings in directions of the newest view end, (..., 2) metres."""
@@ -369,7 +394,7 @@ class Openings(KeptViews):
             farther = 0.0 if is_free else DETOUR
             if number in self._through_gaps:
                 farther, is_free = FARTHER[THROUGH_GAP], False
-            shown = _Opening(goal, number, STRAIGHT_ON if is_free else ROUND_A_BEND)
+            shown = _Opening(goal, goal, number, STRAIGHT_ON if is_free else ROUND_A_BEND)
             found.append(_Lead(shown, self._way(number, goal), 0.0, farther, self._patience_with_goal))
         for one, patience in zip(self._slots, self._patience, strict=True):
             if one:
@@ -386,8 +411,12 @@ class Openings(KeptViews):
         return self._ways.get(view, np.inf) + float(np.hypot(*(place - self._place_of(view))))
 
     def _first_place(self, opening: _Opening, scan: Reals, pose: Reals) -> Reals:
-        """Metres to the last place on the way to an opening that is in sight, (2,)."""
+        """Metres to an opening's gate, or to the last place on the way there that is in sight, (2,)."""
         to: Reals = opening.place - pose[:2]
+        gate: Reals = opening.gate - pose[:2]
+        is_ahead = np.hypot(*(opening.place - opening.gate)) < np.hypot(*to) and np.hypot(*gate) > AT_GATE
+        if is_ahead and self._is_in_sight(gate, scan, pose[2], 0.0, farthest=False):
+            return gate
         if self._is_in_sight(to, scan, pose[2], SLACK, farthest=True):
             return to
         view: int | None = opening.view
