@@ -15,7 +15,7 @@ _ROOM = 0.05  # m between what a robot keeps from obstacles and the way that is 
 
 
 def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tuple[Arena, ...]:
-    """The arenas that a configuration names: one, or the pool of a family; 1 to 4 ms for each of a pool.
+    """The arenas that a configuration names: one, or the pool of a family; 1 to 8 ms for each of a pool at 10 x 10 m.
 
     Args:
         config: built in, generated, or imported with its geometry.

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.arenas.geometry import Arena, box_distance, circle_distance
+from sim.arenas.geometry import Arena
+from sim.kernels.cells import lower_to_boxes, lower_to_circles
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int32]
@@ -67,19 +68,15 @@ def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:
 def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float64]:
     """(rows, columns) signed distances from the cells' centres to the nearest obstacle, but at most `cap` metres.
 
-    Each obstacle costs only the cells within `cap` of it, where `free_distance` costs all cells for all obstacles: seconds
-    become minutes in a hall of 100 x 100 m with 2,000 obstacles.
+    Each obstacle costs only the cells within `cap` of it, where `free_distance`, the same bit for bit, costs all cells for
+    all obstacles: seconds become minutes in a hall of 100 x 100 m with 2,000 obstacles.
     """
-    xs, ys = grid.xs()[None, :], grid.ys()[:, None]
-    distance = np.full((grid.rows, grid.columns), cap)
-    for circle in arena.circles:
-        rows, columns = grid.window(circle[0], circle[1], circle[2] + cap)
-        near = circle_distance(circle, xs[:, columns], ys[rows])
-        distance[rows, columns] = np.minimum(distance[rows, columns], near)
-    for box in arena.boxes:
-        rows, columns = grid.window(box[0], box[1], float(np.hypot(box[2], box[3])) + cap)
-        near = box_distance(box, xs[:, columns], ys[rows])
-        distance[rows, columns] = np.minimum(distance[rows, columns], near)
+    xs, ys = grid.xs(), grid.ys()
+    distance = np.full((grid.rows, grid.columns), cap, dtype=np.float64)
+    lower_to_circles(distance, xs, ys, grid.cell, arena.circles, cap)
+    boxes = arena.boxes
+    turns = np.stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])], axis=1)
+    lower_to_boxes(distance, xs, ys, grid.cell, boxes, turns, np.hypot(boxes[:, 2], boxes[:, 3]) + cap)
     return distance
 
 

@@ -8,9 +8,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from sim.arenas import Arena, free_distance
-from sim.arenas.cells import Grid, components, free_mask
+from sim.arenas.cells import Grid, components, free_mask, obstacle_distance
+from sim.arenas.geometry import box_distance, circle_distance
 from sim.arenas.rectangles import cover, to_boxes
 
+coordinates = st.floats(-4.0, 4.0)
+sizes = st.floats(0.01, 1.5)
+circles = st.lists(st.tuples(coordinates, coordinates, sizes), max_size=8)
+boxes = st.lists(st.tuples(coordinates, coordinates, sizes, sizes, st.floats(-4.0, 4.0)), max_size=8)
 masks = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12))
 
 
@@ -107,3 +112,20 @@ def test_no_cell_with_room_to_spare_is_lost() -> None:
     grid, free = Grid.over(arena), free_mask(arena, 0.2)
     centres = np.stack(np.meshgrid(grid.xs(), grid.ys()), axis=-1)
     assert free[free_distance(arena, centres) >= 0.2 + grid.cell].all()
+
+
+@settings(max_examples=200)
+@given(circles, boxes, st.floats(0.05, 1.0))
+def test_distances_of_cells_are_those_of_their_centres_bit_for_bit(
+    circles: list[tuple[float, ...]], boxes: list[tuple[float, ...]], cap: float
+) -> None:
+    """What `free_distance` would say of each, as far as obstacles go: maps are drawn by it, and must stay what they are."""
+    arena = Arena("drawn", 2.5, 2.0, np.array(circles).reshape(-1, 3), np.array(boxes).reshape(-1, 5))
+    grid = Grid.over(arena)
+    xs, ys = grid.xs()[None, :], grid.ys()[:, None]
+    nearest = np.full((grid.rows, grid.columns), cap)
+    for circle in arena.circles:
+        nearest = np.minimum(nearest, circle_distance(circle, xs, ys))
+    for box in arena.boxes:
+        nearest = np.minimum(nearest, box_distance(box, xs, ys))
+    assert (obstacle_distance(arena, grid, cap) == nearest).all()

@@ -70,7 +70,8 @@ def _missing_way(plan: Plan, pillars: NDArray[np.float64]) -> tuple[NDArray[np.f
         np.stack([grid.xs()[columns], grid.ys()[rows]], axis=1)
         for rows, columns in (np.nonzero(edge & (labels == label)) for label in (1, 0))
     )
-    squares = ((pocket[:, None] - open_part[None]) ** 2).sum(axis=2)
+    squares = np.square(np.subtract.outer(pocket[:, 0], open_part[:, 0]))
+    squares += np.square(np.subtract.outer(pocket[:, 1], open_part[:, 1]))
     here, there = np.unravel_index(int(squares.argmin()), squares.shape)
     return pocket[here], open_part[there]
 
