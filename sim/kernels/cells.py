@@ -16,7 +16,7 @@ _WORTH_A_LOOK = 1e-3
 
 @kernel()
 def _span(centre, reach, cell, count):
-    """The first of as many rows whose centre may lie within reach of a coordinate, and the one after the last: `Grid.window`."""
+    """The first of as many rows whose centre may lie within reach of a coordinate, and the one after the last."""
     low = math.floor((centre - reach) / cell + 0.5 * count - 0.5)
     high = math.ceil((centre + reach) / cell + 0.5 * count + 0.5)
     return min(max(low, 0), count), min(max(high, 0), count)
