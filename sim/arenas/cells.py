@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.arenas.geometry import Arena
-from sim.kernels.cells import lower_to_boxes, lower_to_circles
+from sim.kernels.cells import lower_to_boxes, lower_to_circles, span
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int32]
@@ -41,14 +41,8 @@ class Grid:
 
     def window(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
         """The rows and columns whose centres may lie within `reach` of a point."""
-        low_row, high_row = self._span(y, reach, self.rows)
-        low_column, high_column = self._span(x, reach, self.columns)
-        return slice(low_row, high_row), slice(low_column, high_column)
-
-    def _span(self, centre: float, reach: float, count: int) -> tuple[int, int]:
-        low = int(np.floor((centre - reach) / self.cell + 0.5 * count - 0.5))
-        high = int(np.ceil((centre + reach) / self.cell + 0.5 * count + 0.5))
-        return min(max(low, 0), count), min(max(high, 0), count)
+        rows, columns = span(y, reach, self.cell, self.rows), span(x, reach, self.cell, self.columns)
+        return slice(*rows), slice(*columns)
 
 
 def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:

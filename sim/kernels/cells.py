@@ -15,11 +15,12 @@ _WORTH_A_LOOK = 1e-3
 
 
 @kernel()
-def _span(centre, reach, cell, count):
-    """The first of as many rows whose centre may lie within reach of a coordinate, and the one after the last."""
-    low = math.floor((centre - reach) / cell + 0.5 * count - 0.5)
-    high = math.ceil((centre + reach) / cell + 0.5 * count + 0.5)
-    return min(max(low, 0), count), min(max(high, 0), count)
+def span(centre, reach, cell, count):
+    """The first of `count` rows or columns whose middle may lie within reach of a coordinate, and the one after the last."""
+    # As far as there are any, before they are whole numbers: an obstacle may be larger than those can be.
+    low = min(max((centre - reach) / cell + 0.5 * count - 0.5, 0.0), float(count))
+    high = min(max((centre + reach) / cell + 0.5 * count + 0.5, 0.0), float(count))
+    return math.floor(low), math.ceil(high)
 
 
 @kernel()
@@ -36,8 +37,8 @@ def lower_to_circles(distance, xs, ys, cell, circles, cap):
     """
     for n in range(len(circles)):
         x, y, radius = circles[n, 0], circles[n, 1], circles[n, 2]
-        first_row, last_row = _span(y, radius + cap, cell, len(ys))
-        first_column, last_column = _span(x, radius + cap, cell, len(xs))
+        first_row, last_row = span(y, radius + cap, cell, len(ys))
+        first_column, last_column = span(x, radius + cap, cell, len(xs))
         for row in range(first_row, last_row):
             dy = ys[row] - y
             for column in range(first_column, last_column):
@@ -66,8 +67,8 @@ def lower_to_boxes(distance, xs, ys, cell, boxes, turns, reaches):
     for n in range(len(boxes)):
         x, y, half_length, half_width = boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3]
         cos, sin = turns[n, 0], turns[n, 1]
-        first_row, last_row = _span(y, reaches[n], cell, len(ys))
-        first_column, last_column = _span(x, reaches[n], cell, len(xs))
+        first_row, last_row = span(y, reaches[n], cell, len(ys))
+        first_column, last_column = span(x, reaches[n], cell, len(xs))
         for row in range(first_row, last_row):
             dy = ys[row] - y
             for column in range(first_column, last_column):

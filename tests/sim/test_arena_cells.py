@@ -129,3 +129,8 @@ def test_distances_of_cells_are_those_of_their_centres_bit_for_bit(
     for box in arena.boxes:
         nearest = np.minimum(nearest, box_distance(box, xs, ys))
     assert (obstacle_distance(arena, grid, cap) == nearest).all()
+
+
+def test_an_obstacle_larger_than_any_whole_number_of_cells_fills_all() -> None:
+    arena = Arena("full", 1.0, 1.0, np.array([[0.0, 0.0, 1e300]]), np.array([[0.0, 0.0, 1e300, 1e300, 0.5]]))
+    assert not free_mask(arena, 0.1).any()
