@@ -75,7 +75,7 @@ class Planner:
 
     def _join(self, point: Float) -> tuple[int, int]:
         """The nearest free cell that a point reaches without coming closer to anything than it is or the path may be."""
-        rows, columns = self._grid.window(point[0], point[1], _JOIN)
+        rows, columns = self._grid.window(point[0], point[1], _JOIN, _JOIN)
         near_rows, near_columns = np.nonzero(self._labels[rows, columns] >= 0)
         near_rows, near_columns = near_rows + rows.start, near_columns + columns.start
         centres = np.stack([self._grid.xs()[near_columns], self._grid.ys()[near_rows]], axis=1)

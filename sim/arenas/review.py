@@ -155,7 +155,7 @@ def _scenario(
 
 def _part_near(grid: Grid, labels: NDArray[np.int32], x: float, y: float) -> set[int]:
     """The parts of the floor that a point with room enough stands in: cells are free where all of them is."""
-    rows, columns = grid.window(x, y, 2.0 * grid.cell)
+    rows, columns = grid.window(x, y, 2.0 * grid.cell, 2.0 * grid.cell)
     return set(labels[rows, columns].ravel().tolist()) - {-1}
 
 
