@@ -96,7 +96,7 @@ def kernel_only(robots: int) -> Callable[[], None]:
         nonlocal count
         write_commands(actions[count % ACTIONS], world.robots, space.state, space.command, parameters)
         space.state[:robots] += TASK.control_period * space.command[:robots]
-        step_usual_robots(space.state, placed, world.robots, world.geometry, parameters)
+        step_usual_robots(0, robots, space.state, placed, world.robots, world.geometry, parameters)
         count += 1
 
     return step

@@ -401,7 +401,7 @@ class PlainOpenings:
 
 
 def _piece_across(one: Place, other: Place, place: Place, target: Place) -> Iterator[int]:
-    """The piece of the line from a place to the target that something straight crosses, if it does and is not at its ends."""
+    """The piece of the line from a place to the target that something straight crosses, if not at the ends of that line."""
     length = math.dist(place, target)
     if length <= 2.0 * MARGIN:
         return

@@ -23,6 +23,7 @@ from sim.engine.paths import PathProgress, Paths
 from sim.engine.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.engine.rewards import Formulas, reads_changes
 from sim.engine.shapes import pack_shapes
+from sim.engine.stretches import side_by_side, stretches
 from sim.errors import ArenaError, PlacementError
 from sim.extending.expression import QUANTITIES
 from sim.extending.observing import Sight
@@ -101,6 +102,7 @@ class World:
         arenas: the pool.
         robots: the arrays of all robots, overwritten by every step.
         movers: what moves beside them.
+        threads: at most so many follow the physics of each step, with the same result bit for bit whatever their number.
         guidance: what they would have to know of the shortest paths; None unless asked for.
     """
 
@@ -262,6 +264,8 @@ class World:
             self.robots.records["map"], self.robots.records["replica"] = maps, self._replicas_of_their_own(maps)
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self._placed = np.zeros(robots, dtype=np.int32)
+        self.threads = 1
+        self._geometries = [self.geometry]
         self._restart, self._stream = restart, stream
         self.seed(seed)
 
@@ -390,7 +394,7 @@ class World:
             ObservationError: a number that an extension makes of an observation is not.
         """
         space = self._space
-        write, step = self._kernels
+        write, _ = self._kernels
         actions = np.ascontiguousarray(actions, dtype=np.float32)
         if actions.shape != (shape := (len(self), self._action_size)):
             raise ValueError(f"actions have the shape {shape}, not {actions.shape}")
@@ -406,15 +410,34 @@ class World:
         space.step(self.task.control_period)
         if self.task.together > 1:
             see_one_another(space.state, self.robots, self.geometry, self._parameters)
-        count = step(space.state, self._placed, self.robots, self.geometry, self._parameters)
-        if count:
-            space.put(self._placed[:count])
+        self._follow()
         self._formulas.add(self.robots)
         self._path_progress.add(self.robots)
         if self._looks_back:
             self._look_back()
         if ended is not None and ended.any():
             self._begin(ended)
+
+    def _follow(self) -> None:
+        """What follows a step's physics, on several threads where robots see what takes long, and not one another."""
+        robots, space, (_, step) = len(self), self._space, self._kernels
+        if self.threads == 1 or self._is_usual or self.task.together > 1:
+            count = step(0, robots, space.state, self._placed, self.robots, self.geometry, self._parameters)
+            if count:
+                space.put(self._placed[:count])
+            return
+        parts = stretches(robots, self.threads)
+        while len(self._geometries) < len(parts):
+            self._geometries.append(self.geometry.with_scratch_of_its_own())
+
+        def follow(part: int) -> int:
+            geometry = self._geometries[part]
+            count: int = step(*parts[part], space.state, self._placed, self.robots, geometry, self._parameters)
+            return count
+
+        for (first, _), count in zip(parts, side_by_side(follow, len(parts)), strict=True):
+            if count:
+                space.put(self._placed[first : first + count])
 
     @cached_property
     def _kernels(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -423,7 +446,7 @@ class World:
         step = step_usual_robots if self._is_usual else step_any_robots
         return (
             bound(write_commands, actions, self.robots, space.state, space.command, self._parameters),
-            bound(step, space.state, self._placed, self.robots, self.geometry, self._parameters),
+            bound(step, 0, len(self), space.state, self._placed, self.robots, self.geometry, self._parameters),
         )
 
     def _begin(self, which: NDArray[np.bool_]) -> None:

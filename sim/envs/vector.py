@@ -156,6 +156,15 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """(tiles, K, 5) movers of every copy of an arena: x, y, radius, and how far each came in the last step in x and y,
         metres; a radius below zero is none. `tiles` says which row a robot meets."""
 
+    @property
+    def threads(self) -> int:
+        """How many threads follow the physics of a step, at most: the same bit for bit whatever their number."""
+        return self._world.threads
+
+    @threads.setter
+    def threads(self, threads: int) -> None:
+        self._world.threads = threads
+
     def places(self) -> NDArray[np.int32]:
         """(N,) row of `discs` of each robot, of robots that are together that of the first: the same for all that meet."""
         return self.tiles()[np.arange(self.num_envs) // self.task.together * self.task.together]

@@ -52,6 +52,15 @@ class Geometry(NamedTuple):
     near: Integers
     discs: Floats
 
+    def with_scratch_of_its_own(self) -> "Geometry":
+        """The same arenas for another thread."""
+        return self._replace(
+            ray_x=np.empty_like(self.ray_x),
+            ray_y=np.empty_like(self.ray_y),
+            scan=np.empty_like(self.scan),
+            near=np.empty_like(self.near),
+        )
+
 
 class Crowd(NamedTuple):
     """All movers, and what they walk among.

@@ -324,14 +324,16 @@ def _steps(*, usual: bool) -> Any:
     """
 
     @kernel(fastmath=FAST)
-    def step_robots(state, placed, robots, geometry, parameters):
-        """Everything that follows the physics of a step.
+    def step_robots(first, last, state, placed, robots, geometry, parameters):
+        """Everything that follows the physics of a step, for some robots; others may be another thread's at the same time.
 
         Args:
+            first: of these robots.
+            last: the one after them.
             state: (bodies, 3) x, y, angle in the Space; rows of robots that start anew, or have turned far, are overwritten.
-            placed: (N,) int32, written: which rows were.
+            placed: (N,) int32, written from `first` on: which rows were.
             robots: `sim.kernels.bundles.Robots`, whose arrays are updated.
-            geometry: `sim.kernels.bundles.Geometry`.
+            geometry: `sim.kernels.bundles.Geometry`, whose scratch no other thread writes.
             parameters: (1,) PARAMETERS.
 
         Returns:
@@ -340,7 +342,7 @@ def _steps(*, usual: bool) -> Any:
         p = parameters[0]
         records = robots.records
         count = 0
-        for i in range(records.shape[0]):
+        for i in range(first, last):
             if records[i].parked:
                 _nothing_happened(i, robots)
                 continue
@@ -442,7 +444,7 @@ def _steps(*, usual: bool) -> Any:
                     observe_ways(i, robots, geometry, p)
                 repeat_first(i, robots, p)
             if overwritten:
-                placed[count] = i
+                placed[first + count] = i
                 count += 1
         return count
 

@@ -159,7 +159,7 @@ def test_pillars_side_by_side_are_a_wall_if_the_body_does_not_fit_between_them()
             drive(made, 1, 0.3, 0.2)
             (lead,) = made.robots.leads[0, :1].tolist()
             if lead[0] < 0.0:
-                return lead[3] - math.dist(lead[:2], (1.3, -0.2))
+                return float(lead[3]) - math.dist(lead[:2], (1.3, -0.2))
         return math.nan
 
     assert rest(*np.arange(-1.35, 1.5, 0.3).tolist()) == pytest.approx(4.0, abs=0.01)

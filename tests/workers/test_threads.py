@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from sim.config import ObservationConfig, OpeningsPart, TaskConfig, TrailPart
 from tests.workers.test_trainer import Recorder
 from workers.algorithms.gradients.ppo import WrittenPpo
 from workers.algorithms.ppo import Ppo
@@ -17,26 +18,39 @@ from workers.training.threads import ThreadCount, runnable_threads
 from workers.training.trainer import Training
 
 
-def trained(threads: Threads, network: Network, directory: Path) -> dict[str, np.ndarray]:
+def trained(
+    threads: Threads, network: Network, directory: Path, task: TaskConfig | None = None, robots: int = 24
+) -> dict[str, np.ndarray]:
     """The state after three updates, whose minibatches are not all of one size."""
-    algorithm = PpoConfig(network=network, robots=24, rollout_steps=16, epochs=3, minibatch_size=150)
+    algorithm = PpoConfig(network=network, robots=robots, rollout_steps=16, epochs=3, minibatch_size=150)
     config = TrainingConfig(
-        algorithm=algorithm, steps=10_000, evaluation=EvaluationConfig(every_steps=10_000), threads=threads
+        task=task or TaskConfig(),
+        algorithm=algorithm,
+        steps=100_000,
+        evaluation=EvaluationConfig(every_steps=100_000),
+        threads=threads,
     )
     training = Training(config, 3, Recorder(), directory, Unwatched(), 0.0)
     for _ in range(3):
         training.collect()
         training.update()
     assert isinstance(training.algorithm, Ppo)
-    assert training.algorithm.threads == int(threads)
+    assert training.algorithm.threads == training.env.threads == int(threads)
     metrics = {name: np.array(value) for name, value in training.metrics.flush().items() if not name.startswith("time/")}
-    return {**training.algorithm.state(), **metrics}
+    return {**training.algorithm.state(), **training.env.get_state(), **metrics}
 
 
 @pytest.mark.parametrize("network", [MlpNetwork(hidden_sizes=(48, 32)), ResBlockNetwork()], ids=lambda one: str(one.name))
 def test_two_threads_end_at_the_same_bits(network: Network, tmp_path: Path) -> None:
     alone, beside = (trained(threads, network, tmp_path / threads) for threads in ("1", "2"))
     assert alone.keys() == beside.keys()
+    for name, array in alone.items():
+        assert np.array_equal(array, beside[name]), name
+
+
+def test_robots_that_see_what_takes_long_are_followed_by_two_threads_alike(tmp_path: Path) -> None:
+    task = TaskConfig(observation=ObservationConfig(parts=(TrailPart(), OpeningsPart())))
+    alone, beside = (trained(threads, MlpNetwork(), tmp_path / threads, task, robots=128) for threads in ("1", "2"))
     for name, array in alone.items():
         assert np.array_equal(array, beside[name]), name
 

@@ -185,7 +185,8 @@ class Training:
     def update(self) -> None:
         """One update of the algorithm."""
         if self.threaded is not None:
-            self.threaded.threads = self.threads.now()
+            # The simulator's too, until the next update: a look that is taken while two threads compute sees the other one.
+            self.threaded.threads = self.env.threads = self.threads.now()
         with self.metrics.phase("update"):
             diagnostics = self.algorithm.update(self.updates / self.total_updates)
             self.updates += 1
