@@ -35,17 +35,15 @@ class Guidance:
         self._paths, self._step_limit = paths, float(task.step_limit)
         self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
 
-    def look(self, robots: Robots, which: NDArray[np.bool_]) -> None:
-        """Write what some robots (N,) would have to know where they are."""
+    def look(self, robots: Robots, which: NDArray[np.bool_], threads: int = 1) -> None:
+        """Write what some robots (N,) would have to know where they are; so many threads do, at most."""
         paths = self._paths
         fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._step_limit, self.now, self._missing
-        alone = np.zeros(len(which), np.bool_)
-        for i in self._missing[: guide(which, *fixed)].tolist():
-            self._slots[i] = paths.slot_towards(int(robots.records["map"][i]), robots.targets[i].tolist())
-            # At once: the next one's field may take this one's place.
-            alone[i] = True
-            guide(alone, *fixed)
-            alone[i] = False
+
+        def see(first: int, last: int, those: NDArray[np.bool_]) -> int:
+            return int(guide(first, last, those, *fixed))
+
+        paths.look(robots, which, self._slots, self._missing, see, threads)
 
     def keep(self, robots: Robots, ended: NDArray[np.bool_]) -> None:
         """Keep as `final` what robots (N,) would have to know whose episodes have just ended, where they still are."""

@@ -5,7 +5,7 @@ Where the target is in sight nothing is searched. Else each target's field is co
 in a store of bounded size for the next robot whose target is in the same cell.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt
 from sim.arenas import Arena
 from sim.arenas.cells import free_mask
 from sim.config import PathProgressTerm, TaskConfig
+from sim.engine.stretches import side_by_side, stretches
 from sim.kernels import paths as kernels
 from sim.kernels.bundles import Robots
 from sim.kernels.records import ARRIVAL, CELL, COLLISION
@@ -81,21 +82,73 @@ class Paths:
             length, *_ = kernels.shortest_way(*given, self.slot(index, cell), self.grids, self.fields, self.owners)
         return float(length)
 
-    def slot_towards(self, index: int, target: Sequence[float]) -> int:
-        """The row of the field of a target (x, y)."""
-        *_, cell = kernels.shortest_way(*target, *target, index, -1, self.grids, self.fields, self.owners)
-        return self.slot(index, cell)
-
     def slot(self, index: int, cell: int) -> int:
         """The row of the field of a target's cell; a new one takes the place of the one made longest ago."""
-        owner = int(self.grids.places[index, 0]) + cell
-        slot = self._slots.get(owner)
-        if slot is None:
-            slot, self._oldest = self._oldest, (self._oldest + 1) % len(self.fields)
-            self._slots.pop(int(self.owners[slot]), None)
-            self._slots[owner], self.owners[slot] = slot, owner
-            kernels.lead(kernels.grid_of(index, self.grids)[0], cell, self.fields[slot])
-        return slot
+        return self._slots_of([(index, cell)], 1)[0]
+
+    def _slots_of(self, wanted: Sequence[tuple[int, int]], threads: int) -> list[int]:
+        """`slot` of arenas and cells: of the first ones, as many as there is room for side by side, at least one."""
+        found: list[int] = []
+        new: list[tuple[int, int, int]] = []
+        for index, cell in wanted:
+            owner = int(self.grids.places[index, 0]) + cell
+            slot = self._slots.get(owner)
+            if slot is None:
+                if self._oldest in found:
+                    break
+                slot, self._oldest = self._oldest, (self._oldest + 1) % len(self.fields)
+                self._slots.pop(int(self.owners[slot]), None)
+                self._slots[owner], self.owners[slot] = slot, owner
+                new.append((index, cell, slot))
+            found.append(slot)
+        parts = max(1, min(threads, len(new)))
+
+        def lead(part: int) -> None:
+            for index, cell, slot in new[part::parts]:
+                kernels.lead(kernels.grid_of(index, self.grids)[0], cell, self.fields[slot])
+
+        side_by_side(lead, parts)
+        return found
+
+    def look(
+        self,
+        robots: Robots,
+        which: NDArray[np.bool_],
+        slots: NDArray[np.int32],
+        missing: NDArray[np.int32],
+        kernel: Callable[[int, int, NDArray[np.bool_]], int],
+        threads: int,
+    ) -> None:
+        """Let a kernel look at some robots, and once more at those whose targets had no field, with that.
+
+        Args:
+            robots: all of them.
+            which: (N,) which of them.
+            slots: (N,) rows of `fields` that may hold their targets', written.
+            missing: (N,) those whose fields the kernel found missing, from the first robot that it was to look at on.
+            kernel: the first robot, the one after the last, and which of them it is to look at; how many it found missing.
+            threads: that share the work, at most.
+        """
+        parts = stretches(len(which), threads if 2 * np.count_nonzero(which) > len(which) else 1)
+        counts = side_by_side(lambda part: kernel(*parts[part], which), len(parts))
+        ends = ((first, first + count) for (first, _), count in zip(parts, counts, strict=True))
+        left = [i for first, end in ends for i in missing[first:end].tolist()]
+        again = np.zeros(len(which), np.bool_)
+        while left:
+            wanted = [(int(robots.records["map"][i]), self._cell(robots, i)) for i in left]
+            found = self._slots_of(wanted, threads)
+            now, left = left[: len(found)], left[len(found) :]
+            # At once: the next ones' fields may take the places of these.
+            slots[now], again[now] = found, True
+            kernel(min(now), max(now) + 1, again)
+            again[now] = False
+
+    def _cell(self, robots: Robots, robot: int) -> int:
+        """The cell of a robot's target."""
+        target = robots.targets[robot].tolist()
+        index = int(robots.records["map"][robot])
+        *_, cell = kernels.shortest_way(*target, *target, index, -1, self.grids, self.fields, self.owners)
+        return int(cell)
 
 
 class PathProgress:
@@ -117,18 +170,18 @@ class PathProgress:
     def __bool__(self) -> bool:
         return bool(self._terms)
 
-    def begin(self, robots: Robots, which: NDArray[np.bool_]) -> None:
-        """Measure how far some robots (N,) have to go."""
+    def begin(self, robots: Robots, which: NDArray[np.bool_], threads: int = 1) -> None:
+        """Measure how far some robots (N,) have to go; so many threads do, at most."""
         if self._paths is not None:
-            self._measure(robots, which, self._paths)
+            self._measure(robots, which, self._paths, threads)
             self._lengths[which] = self._now[which]
 
-    def add(self, robots: Robots) -> None:
-        """Add the term of the step that was just driven, before anybody begins anew."""
+    def add(self, robots: Robots, threads: int = 1) -> None:
+        """Add the term of the step that was just driven, before anybody begins anew; see `begin`."""
         if self._paths is None:
             return
         paid = (robots.outcomes != ARRIVAL) & (robots.outcomes != COLLISION) & (robots.records["parked"] == 0)
-        self._measure(robots, paid, self._paths)
+        self._measure(robots, paid, self._paths, threads)
         for column, weight in self._terms:
             terms = np.where(paid, weight * (self._lengths - self._now), 0.0).astype(np.float32)
             robots.terms[:, column] = terms
@@ -136,9 +189,10 @@ class PathProgress:
             robots.records["attempt_reward"] += terms
         self._lengths[paid] = self._now[paid]
 
-    def _measure(self, robots: Robots, which: NDArray[np.bool_], paths: Paths) -> None:
-        given = robots, self._slots, paths.grids, paths.fields, paths.owners, self._now, self._missing
-        for i in self._missing[: kernels.path_lengths(which, *given)].tolist():
-            index, target = int(robots.records["map"][i]), robots.targets[i].tolist()
-            self._now[i] = paths.length(index, robots.poses[i, :2].tolist(), target)
-            self._slots[i] = paths.slot_towards(index, target)
+    def _measure(self, robots: Robots, which: NDArray[np.bool_], paths: Paths, threads: int) -> None:
+        fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._now, self._missing
+
+        def measure(first: int, last: int, those: NDArray[np.bool_]) -> int:
+            return int(kernels.path_lengths(first, last, those, *fixed))
+
+        paths.look(robots, which, self._slots, self._missing, measure, threads)

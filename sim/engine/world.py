@@ -314,12 +314,12 @@ class World:
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
         self._see_added_parts(everybody, begins=True)
-        self._path_progress.begin(self.robots, everybody)
+        self._path_progress.begin(self.robots, everybody, self.threads)
         self._guide(everybody)
 
     def _guide(self, which: NDArray[np.bool_]) -> None:
         if self.guidance is not None:
-            self.guidance.look(self.robots, which)
+            self.guidance.look(self.robots, which, self.threads)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -412,7 +412,7 @@ class World:
             see_one_another(space.state, self.robots, self.geometry, self._parameters)
         self._follow()
         self._formulas.add(self.robots)
-        self._path_progress.add(self.robots)
+        self._path_progress.add(self.robots, self.threads)
         if self._looks_back:
             self._look_back()
         if ended is not None and ended.any():
@@ -456,14 +456,14 @@ class World:
         reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
         self._space.put(np.flatnonzero(which).astype(np.int32))
         self._see_added_parts(which, begins=True)
-        self._path_progress.begin(self.robots, which)
+        self._path_progress.begin(self.robots, which, self.threads)
         self._guide(which)
 
     def _look_back(self) -> None:
         """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
-        self._path_progress.begin(robots, robots.outcomes == ARRIVAL)
+        self._path_progress.begin(robots, robots.outcomes == ARRIVAL, self.threads)
         if self._sampling is not None and len(over := np.flatnonzero(robots.outcomes)):
             self._sampling.learn(robots.records["map"][over].tolist(), (robots.outcomes[over] == ARRIVAL).tolist())
         self._guide(robots.records["parked"] == 0)

@@ -167,31 +167,33 @@ def shortest_way(x, y, target_x, target_y, index, slot, grids, fields, owners):
 
 
 @kernel(allocates=True)
-def path_lengths(which, robots, slots, grids, fields, owners, lengths, missing):
-    """Write how far some robots are from their targets, metres.
+def path_lengths(first, last, which, robots, slots, grids, fields, owners, lengths, missing):
+    """Write how far some robots are from their targets, metres; others may be another thread's at the same time.
 
     Args:
-        which: (N,) bool, the robots.
+        first: of the robots that are looked at.
+        last: the one after them.
+        which: (N,) bool, which of these.
         robots: `sim.kernels.bundles.Robots`.
         slots: (N,) int32 rows of `fields` that may hold their targets'.
         grids: see `shortest_way`, like `fields` and `owners`.
         fields: likewise.
         owners: likewise.
         lengths: (N,) float64, written but where a field is missing.
-        missing: (N,) int32, written: the robots for which it is.
+        missing: (N,) int32, written from `first` on: the robots for which it is.
 
     Returns:
         How many these are.
     """
     count = 0
-    for i in range(which.shape[0]):
+    for i in range(first, last):
         if not which[i]:
             continue
         x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
         target_x, target_y = np.float64(robots.targets[i, 0]), np.float64(robots.targets[i, 1])
         length = shortest_way(x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners)[0]
         if length < 0.0:
-            missing[count] = i
+            missing[first + count] = i
             count += 1
         else:
             lengths[i] = length
@@ -199,11 +201,13 @@ def path_lengths(which, robots, slots, grids, fields, owners, lengths, missing):
 
 
 @kernel(allocates=True)
-def guide(which, robots, slots, grids, fields, owners, step_limit, numbers, missing):
+def guide(first, last, which, robots, slots, grids, fields, owners, step_limit, numbers, missing):
     """Write what the shortest paths tell of some robots, see `sim.engine.guidance`.
 
     Args:
-        which: see `path_lengths`.
+        first: see `path_lengths`.
+        last: likewise.
+        which: likewise.
         robots: likewise.
         slots: likewise.
         grids: likewise.
@@ -211,13 +215,13 @@ def guide(which, robots, slots, grids, fields, owners, step_limit, numbers, miss
         owners: likewise.
         step_limit: steps of an attempt.
         numbers: (N, 5) float32, written but where a field is missing.
-        missing: (N,) int32, written: the robots for which it is.
+        missing: (N,) int32, written from `first` on: the robots for which it is.
 
     Returns:
         How many these are.
     """
     count = 0
-    for i in range(which.shape[0]):
+    for i in range(first, last):
         if not which[i]:
             continue
         x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
@@ -226,7 +230,7 @@ def guide(which, robots, slots, grids, fields, owners, step_limit, numbers, miss
             x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners
         )
         if length < 0.0:
-            missing[count] = i
+            missing[first + count] = i
             count += 1
             continue
         bearing = math.atan2(first_y - y, first_x - x) - robots.poses[i, 2]

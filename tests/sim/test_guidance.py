@@ -96,13 +96,15 @@ def test_robots_do_not_notice(restart: str) -> None:
     assert again.guidance.now.shape == (32, GUIDANCE_SIZE)
 
 
-def test_few_fields_are_as_good_as_many() -> None:
+@pytest.mark.parametrize("threads", [1, 2])
+def test_few_fields_are_as_good_as_many(threads: int) -> None:
     arena = build_arenas(ArenaConfig(name="complex"))[0]
     told = []
-    for max_bytes in (2**26, 4 * 100 * 100):
-        world = World(TaskConfig(), [arena], 32, seed=1)
+    for kept in (1000, 3, 1):
+        world = World(TaskConfig(), [arena], 150, seed=1)
         world.reset()
-        guidance = Guidance(TaskConfig(), Paths([arena], CLEARANCE, max_bytes), 32)
-        guidance.look(world.robots, np.ones(32, np.bool_))
+        guidance = Guidance(TaskConfig(), Paths([arena], CLEARANCE, kept * 4 * 100 * 100), 150)
+        guidance.look(world.robots, np.ones(150, np.bool_), threads)
         told.append(guidance.now)
     np.testing.assert_array_equal(told[0], told[1])
+    np.testing.assert_array_equal(told[0], told[2])

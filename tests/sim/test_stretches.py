@@ -15,7 +15,9 @@ from sim.config import (
     ObservationConfig,
     OdometryConfig,
     OpeningsPart,
+    PathProgressTerm,
     ReachPart,
+    RewardConfig,
     TaskConfig,
     TrailPart,
 )
@@ -32,12 +34,13 @@ def task() -> TaskConfig:
         lidar=LidarConfig(rays=60, field_of_view=360.0),
         observation=ObservationConfig(parts=(TrailPart(), ReachPart(), OpeningsPart(), DwellPart())),
         odometry=OdometryConfig(distance_noise=0.05),
+        reward=RewardConfig(terms=(PathProgressTerm(),)),
         step_limit=60,
     )
 
 
 def driven(threads: int) -> World:
-    made = World(task(), build_task_arenas(task()), ROBOTS, seed=3)
+    made = World(task(), build_task_arenas(task()), ROBOTS, seed=3, guides=True)
     made.threads = threads
     made.reset()
     random = np.random.default_rng(0)
@@ -52,6 +55,10 @@ def test_two_threads_end_at_the_same_bits() -> None:
     for name in alone.robots._fields:
         one, other = getattr(alone.robots, name), getattr(beside.robots, name)
         assert one.tobytes() == other.tobytes(), name
+    assert alone.guidance is not None
+    assert beside.guidance is not None
+    assert alone.guidance.now.tobytes() == beside.guidance.now.tobytes()
+    assert alone.guidance.final.tobytes() == beside.guidance.final.tobytes()
 
 
 def test_each_robot_is_in_one_stretch_and_none_is_short() -> None:
