@@ -20,28 +20,25 @@ class PlainGaps:
 
     Args:
         near: metres, see `sim.observations.near_distance`.
-
-    Attributes:
-        known: those gaps.
     """
 
     def __init__(self, near: float) -> None:
         self._width = 2.0 * ROOM_TO_PASS * near
-        self.known: deque[Gap] = deque(maxlen=GAP_ROOM)
+        self._known: deque[Gap] = deque(maxlen=GAP_ROOM)
 
     def measure(self, view: PlainView) -> list[Gap]:
         """Those that a view measures and that were not known; from now on they are."""
         found = []
         for k in range(VIEW_DIRECTIONS):
             gap = self._beside(view, k)
-            if gap is not None and not any(_is_same(gap, known) for known in self.known):
-                self.known.append(gap)
+            if gap is not None and not any(_is_same(gap, known) for known in self._known):
+                self._known.append(gap)
                 found.append(gap)
         return found
 
     def lead_through(self, begin: Place, end: Place) -> bool:
         """Whether the line from one place to another goes through one of them."""
-        return any(crosses(begin, end, gap) for gap in self.known)
+        return any(crosses(begin, end, gap) for gap in self._known)
 
     def _beside(self, view: PlainView, k: int) -> Gap | None:
         """The gap between directions k and k + 1 of a view, if they show one and it is narrow and near by."""

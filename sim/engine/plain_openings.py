@@ -43,8 +43,7 @@ class _Opening:
         gate: where the body goes through on its way there from the view, metres.
         view: number of the view that it was seen from.
         access: how the body gets there from that, see `sim.kernels.room`.
-        crossed: pieces of the line from there to the target that walls cross, and gaps that the body does not fit through,
-            numbered from the opening on.
+        crossed: pieces of the line from there to the target that walls cross, numbered from the opening on.
     """
 
     place: Place
@@ -166,23 +165,15 @@ class PlainOpenings:
                 access = STRAIGHT_ON if is_free else ROUND_A_BEND
                 access = THROUGH_GAP if self._gaps.lead_through(newest.place, place) else access
                 views = (self.views.kept[number] for number in self._remembered)
-                walls = chain.from_iterable(self._walls_across(view, place, target) for view in views)
-                gaps = chain.from_iterable(_piece_across(*gap, place, target) for gap in self._gaps.known)
-                crossed = frozenset(chain(walls, gaps))
+                crossed = frozenset(chain.from_iterable(self._walls_across(view, place, target) for view in views))
                 self._open(_Opening(place, gate, self._remembered[-1], access, crossed))
         self._measure_ways()
         self._sights.append(self._sight_of(newest, target))
 
     def _close_gaps(self, newest: PlainView, target: Place) -> None:
-        """Let no opening, no sight of the target and no link lead through a gap that the newest view found to be narrow.
-
-        Beyond an opening it is a wall.
-        """
+        """Let no opening, no sight of the target and no link lead through a gap that the newest view found to be narrow."""
         for gap in self._gaps.measure(newest):
             for slot, opening in enumerate(self._slots):
-                if opening:
-                    pieces = _piece_across(*gap, opening.place, target)
-                    opening = self._slots[slot] = replace(opening, crossed=opening.crossed.union(pieces))
                 if opening and crosses(self.views.kept[opening.view].place, opening.place, gap):
                     self._slots[slot] = replace(opening, access=THROUGH_GAP)
             for number in self._remembered[:-1]:
@@ -203,11 +194,18 @@ class PlainOpenings:
     def _walls_across(self, view: PlainView, place: Place, target: Place) -> Iterator[int]:
         """Pieces of the line from a place to the target that walls of a view cross."""
         solid = [self._is_solid(view, chord) for chord in range(CHORDS)]
+        length = math.dist(place, target)
         for chord in range(CHORDS):
-            if solid[chord - 1] and solid[chord] and solid[(chord + 1) % CHORDS]:
-                ends = [(chord + k) * CHORD_DIRECTIONS % VIEW_DIRECTIONS for k in (0, 1)]
-                one, other = (end_of(view, k, view.readings[k]) for k in ends)
-                yield from _piece_across(one, other, place, target)
+            if not (solid[chord - 1] and solid[chord] and solid[(chord + 1) % CHORDS]) or length <= 2.0 * MARGIN:
+                continue
+            ends = [(chord + k) * CHORD_DIRECTIONS % VIEW_DIRECTIONS for k in (0, 1)]
+            (one_along, one_across), (other_along, other_across) = (
+                _along_and_across(end_of(view, k, view.readings[k]), place, target) for k in ends
+            )
+            if (one_across > 0.0) != (other_across > 0.0):
+                along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
+                if MARGIN < along < length - MARGIN:
+                    yield min(int(along / WALL_SPACING), WALL_BITS - 1)
 
     def _is_solid(self, view: PlainView, chord: int) -> bool:
         """Whether all readings of a chord met something, and one thing."""
@@ -398,18 +396,6 @@ class PlainOpenings:
             return False
         beside = [ranges[(ray + k) % len(angles)] for k in (-1, 0, 1)]
         return bool(distance <= (max(beside) if farthest else min(beside)) + slack)
-
-
-def _piece_across(one: Place, other: Place, place: Place, target: Place) -> Iterator[int]:
-    """The piece of the line from a place to the target that something straight crosses, if not at the ends of that line."""
-    length = math.dist(place, target)
-    if length <= 2.0 * MARGIN:
-        return
-    (one_along, one_across), (other_along, other_across) = (_along_and_across(end, place, target) for end in (one, other))
-    if (one_across > 0.0) != (other_across > 0.0):
-        along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
-        if MARGIN < along < length - MARGIN:
-            yield min(int(along / WALL_SPACING), WALL_BITS - 1)
 
 
 def _along_and_across(place: Place, begin: Place, end: Place) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from sim.kernels.patience import forgive
 from sim.kernels.room import OPENING_ROOM, ROUND_A_BEND, STRAIGHT_ON, THROUGH_GAP, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.views import FULL_RANGE, SLIM, VIEW_COS, VIEW_DIRECTIONS, VIEW_SIN, is_free_way, shows
-from sim.kernels.walls import JUMP, all_across, find_walls, walls_across
+from sim.kernels.walls import JUMP, find_walls, walls_across, walls_seen_across
 
 SLACK = 0.2
 """Metres by which a view may fall short of an opening that it shows: a wall that is seen at a flat angle has none."""
@@ -129,7 +129,7 @@ def _open(i, x, y, gate_x, gate_y, is_free, number, first, target_x, target_y, r
     robots.opening_gates[i, place, 1] = gate_y
     if is_new:
         forgive(i, place, robots)
-    robots.opening_walls[i, place] = all_across(i, x, y, target_x, target_y, number, first, robots, p)
+    robots.opening_walls[i, place] = walls_seen_across(i, x, y, target_x, target_y, number, first, robots, p)
     seen_from[i, place] = number
     robots.opening_access[i, place] = way
 

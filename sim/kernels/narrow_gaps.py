@@ -12,7 +12,7 @@ from sim.kernels.options import kernel
 from sim.kernels.room import GAP_ROOM, LINK_ROOM, OPENING_ROOM, THROUGH_GAP, VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.views import FULL_RANGE, NO_SIGHT, SIGHT_THROUGH_GAP, VIEW_COS, VIEW_DIRECTIONS, VIEW_SIN
-from sim.kernels.walls import JUMP, gap_across
+from sim.kernels.walls import JUMP
 
 NEAR_BY = 1.6
 """Metres from a view up to which both posts of a gap that it measures lie."""
@@ -80,16 +80,12 @@ def _is_known(i, x, y, other_x, other_y, robots):
 
 @kernel(fastmath=FAST)
 def _close(i, gap, number, first, target_x, target_y, robots):
-    """Let nothing that was free lead through a gap any more: no opening, no sight of the target, no link.
-
-    Beyond an opening a gap is a wall.
-    """
+    """Let nothing that was free lead through a gap any more: no opening, no sight of the target, no link."""
     for k in range(OPENING_ROOM):
         view = robots.opening_views[i, k]
         if view >= first:
             here = robots.view_places[i, view % VIEW_ROOM]
             place = robots.opening_places[i, k]
-            robots.opening_walls[i, k] |= gap_across(place[0], place[1], target_x, target_y, gap)
             if _crosses(here[0], here[1], place[0], place[1], gap):
                 robots.opening_access[i, k] = THROUGH_GAP
     for view in range(first, number):

@@ -1,8 +1,7 @@
 """Walls that a robot's views show, and how many of them lie between one place and another.
 
-Beyond an opening all counts as free, but a straight line from there to the target may cross a wall that was seen, or a gap
-that the body does not fit through (`sim.kernels.narrow_gaps`): pillars side by side are a wall, too. The planners that let
-A* go through what was never seen know such walls from their grid; here the views tell.
+Beyond an opening all counts as free, but a straight line from there to the target may cross a wall that was seen. The
+planners that let A* go through what was never seen know such walls from their grid; here the views tell.
 """
 
 import math
@@ -10,7 +9,7 @@ import math
 import numpy as np
 
 from sim.kernels.options import kernel
-from sim.kernels.room import GAP_ROOM, VIEW_ROOM
+from sim.kernels.room import VIEW_ROOM
 from sim.kernels.sensing import FAST
 from sim.kernels.views import FULL_RANGE, VIEW_COS, VIEW_DIRECTIONS, VIEW_SIN
 
@@ -59,21 +58,6 @@ def find_walls(i, row, robots, p):
 
 
 @kernel(fastmath=FAST)
-def _piece_across(one_x, one_y, other_x, other_y, cos, sin, length):
-    """Which piece of a line a straight wall crosses, as a bit; 0 for none. All that counts from where the line begins."""
-    one_across = one_y * cos - one_x * sin
-    other_across = other_y * cos - other_x * sin
-    if (one_across > 0) == (other_across > 0):
-        return 0
-    one_along = one_x * cos + one_y * sin
-    other_along = other_x * cos + other_y * sin
-    along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
-    if along > _MARGIN and along < length - _MARGIN:
-        return 1 << int(min(along / _SPACING, _LAST))
-    return 0
-
-
-@kernel(fastmath=FAST)
 def walls_across(i, row, x, y, to_x, to_y, robots, p):
     """Where walls of a view cross the line from one place to another: bit b for its piece b * WALL_SPACING metres on."""
     walls = robots.view_walls[i, row]
@@ -97,29 +81,24 @@ def walls_across(i, row, x, y, to_x, to_y, robots, p):
         reading = np.float32(robots.views[i, row, k]) * scale
         other_x = from_x + reading * VIEW_COS[k]
         other_y = from_y + reading * VIEW_SIN[k]
-        crossed |= _piece_across(one_x, one_y, other_x, other_y, cos, sin, length)
+        one_across = one_y * cos - one_x * sin
+        other_across = other_y * cos - other_x * sin
+        if (one_across > 0) == (other_across > 0):
+            continue
+        one_along = one_x * cos + one_y * sin
+        other_along = other_x * cos + other_y * sin
+        along = (one_across * other_along - other_across * one_along) / (one_across - other_across)
+        if along > _MARGIN and along < length - _MARGIN:
+            crossed |= 1 << int(min(along / _SPACING, _LAST))
     return crossed
 
 
 @kernel(fastmath=FAST)
-def gap_across(x, y, to_x, to_y, gap):
-    """Where the line that closes a gap crosses the line from one place to another, as `walls_across` tells."""
-    length = np.float32(math.sqrt((to_x - x) * (to_x - x) + (to_y - y) * (to_y - y)))
-    if length <= 2.0 * _MARGIN:
-        return 0
-    cos = (to_x - x) / length
-    sin = (to_y - y) / length
-    return _piece_across(gap[0] - x, gap[1] - y, gap[2] - x, gap[3] - y, cos, sin, length)
-
-
-@kernel(fastmath=FAST)
-def all_across(i, x, y, to_x, to_y, number, first, robots, p):
-    """`walls_across` of all views that are remembered, and `gap_across` of all gaps."""
+def walls_seen_across(i, x, y, to_x, to_y, number, first, robots, p):
+    """`walls_across` of all views that are remembered."""
     crossed = 0
     for view in range(first, number + 1):
         crossed |= walls_across(i, view % VIEW_ROOM, x, y, to_x, to_y, robots, p)
-    for k in range(min(robots.gaps_found[i], GAP_ROOM)):
-        crossed |= gap_across(x, y, to_x, to_y, robots.gaps[i, k])
     return crossed
 
 

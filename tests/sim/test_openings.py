@@ -149,23 +149,6 @@ def test_a_pillar_is_no_wall() -> None:
     assert 0.0 < rest / (1.0 - rest) < 0.5
 
 
-def test_pillars_side_by_side_are_a_wall_if_the_body_does_not_fit_between_them() -> None:
-    # The room of the wall above, with pillars 0.1 m thick in its place; 0.2 m are between them, and 0.4 m are needed.
-    def rest(*pillars: float) -> float:
-        boxes = ((1.0, y, 0.05, 0.05, 0.0) for y in pillars)
-        made = world(looking(1), *wall_with_gap(-0.8, 0.6), *boxes, half=1.5)
-        made.reset(poses=(0.0, 0.3, 0.0), targets=(1.3, -0.2))
-        for _ in range(40):
-            drive(made, 1, 0.3, 0.2)
-            (lead,) = made.robots.leads[0, :1].tolist()
-            if lead[0] < 0.0:
-                return float(lead[3]) - math.dist(lead[:2], (1.3, -0.2))
-        return math.nan
-
-    assert rest(*np.arange(-1.35, 1.5, 0.3).tolist()) == pytest.approx(4.0, abs=0.01)
-    assert math.isnan(rest(-1.35, 1.35))  # it is told the target itself
-
-
 def test_one_that_it_comes_no_nearer_to_falls_behind() -> None:
     made = world(looking())
     made.reset(poses=(0.0, 0.0, 0.0), targets=(4.0, 3.0))

@@ -25,14 +25,11 @@ class Gaps:
     Args:
         near: metres that the robot keeps from obstacles.
         jump: metres by which two readings side by side differ where what they met is not one thing.
-
-    Attributes:
-        known: (n, 2, 2) where the lines that close them begin and end, metres.
     """
 
     def __init__(self, near: float, jump: float) -> None:
         self._width, self._jump = 2.0 * ROOM_TO_PASS * near, jump
-        self.known: Reals = np.empty((0, 2, 2))
+        self._known: Reals = np.empty((0, 2, 2))
 
     def measure(self, readings: Reals, ends: Reals) -> list[Reals]:
         """The gaps that a view measures and that were not known, (2, 2) each: where their lines begin and end, metres.
@@ -46,13 +43,13 @@ class Gaps:
         for k in np.flatnonzero((np.minimum(readings, following) > 0.0) & (np.abs(readings - following) > self._jump)):
             gap = self._beside(readings, ends, int(k))
             if gap is not None and not self._is_known(gap):
-                self.known = np.concatenate((self.known, gap[None]))[-GAP_ROOM:]
+                self._known = np.concatenate((self._known, gap[None]))[-GAP_ROOM:]
                 found.append(gap)
         return found
 
     def lead_through(self, begin: Reals, end: Reals) -> bool:
         """Whether the line from one place to another goes through one of them."""
-        return bool(crossed(begin, end, self.known).any())
+        return bool(crossed(begin, end, self._known).any())
 
     def _beside(self, readings: Reals, ends: Reals, k: int) -> Reals | None:
         """The gap between directions k and k + 1, if it is narrow and near by."""
@@ -75,7 +72,7 @@ class Gaps:
         """Whether it is one of those that are remembered, whichever end is named first."""
         return any(
             bool((np.hypot(*np.moveaxis(known - gap, -1, 0)) < SAME).all(axis=-1).any())
-            for known in (self.known, self.known[:, ::-1])
+            for known in (self._known, self._known[:, ::-1])
         )
 
 

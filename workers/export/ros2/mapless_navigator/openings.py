@@ -15,9 +15,8 @@ view shows it among them. Where the body can't go straight on from the view the 
 it leads through a gap that was found to be too narrow (`gaps.py`), through which no links lead; where a view shows the goal
 and the body can't go straight on to it, and for each wall that a view shows between an opening and the goal, 4 m. A wall is
 where 16 directions side by side read less than the LiDAR's range without a jump: from the end of the sixth straight to that
-of the eleventh, the first one being every fifth direction of a view; a line that closes a gap is one, too. For each half
-metre of the line from an opening to the goal it is remembered whether a wall crosses it, at least 0.2 m from the line's
-ends; halves side by side are of one wall.
+of the eleventh, the first one being every fifth direction of a view. For each half metre of the line from an opening to the
+goal it is remembered whether a wall crosses it, at least 0.2 m from the line's ends; halves side by side are of one wall.
 What is told is chosen anew where a view is kept, else every 16 steps. What was told first since then, an opening or the
 goal, counts 0.04 m farther for each of these steps, unless the way to it was more than 0.2 m shorter than it had ever been
 when it was told first. For each opening that is told:
@@ -80,7 +79,7 @@ class _Opening:
         gate: (2,) metres, where the body goes through on its way there from the view.
         view: number of the view that saw it.
         access: how the body gets there from that: STRAIGHT_ON, ROUND_A_BEND, or THROUGH_GAP if at all.
-        crossed: which half metres of the line from there to the goal walls and closed gaps cross.
+        crossed: which half metres of the line from there to the goal walls cross.
     """
 
     place: Reals
@@ -221,24 +220,17 @@ class Openings(KeptViews):
             if not self._which_have_seen(place)[:-1].any():
                 access = STRAIGHT_ON if is_free else ROUND_A_BEND
                 access = THROUGH_GAP if self._gaps.lead_through(here, place) else access
-                walls = np.concatenate((*self._walls, self._gaps.known))
-                self._open(_Opening(place, gate, newest, access, _crossed(walls, place, goal)))
+                self._open(_Opening(place, gate, newest, access, _crossed(np.concatenate(self._walls), place, goal)))
         self._measure_ways(newest)
         if self._gaps.lead_through(here, goal):
             self._through_gaps.add(newest)
 
     def _close_gaps(self, newest: int, goal: Reals) -> None:
-        """Let no opening, no sight of the goal and no link lead through a gap that the newest view found to be narrow.
-
-        Beyond an opening it is a wall.
-        """
+        """Let no opening, no sight of the goal and no link lead through a gap that the newest view found to be narrow."""
         for gap in self._gaps.measure(self.readings[-1], self._ends(np.arange(DIRECTIONS), self.readings[-1])):
             for slot, one in enumerate(self._slots):
-                if one and one.view >= self._oldest:
-                    leads_through = crossed(self._place_of(one.view), one.place, gap[None])[0]
-                    access = THROUGH_GAP if leads_through else one.access
-                    walls = one.crossed | _crossed(gap[None], one.place, goal)
-                    self._slots[slot] = replace(one, access=access, crossed=walls)
+                if one and one.view >= self._oldest and crossed(self._place_of(one.view), one.place, gap[None])[0]:
+                    self._slots[slot] = replace(one, access=THROUGH_GAP)
             for number in range(self._oldest, newest):
                 if crossed(self._place_of(number), goal, gap[None])[0]:
                     self._through_gaps.add(number)
