@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.config import TaskConfig
-from sim.engine.paths import Paths
+from sim.engine.paths import ALONE, Paths
+from sim.engine.stretches import Crew
 from sim.kernels.bundles import Robots
 from sim.kernels.paths import guide
 
@@ -35,15 +36,15 @@ class Guidance:
         self._paths, self._step_limit = paths, float(task.step_limit)
         self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
 
-    def look(self, robots: Robots, which: NDArray[np.bool_], threads: int = 1) -> None:
-        """Write what some robots (N,) would have to know where they are; so many threads do, at most."""
+    def look(self, robots: Robots, which: NDArray[np.bool_], crew: Crew = ALONE) -> None:
+        """Write what some robots (N,) would have to know where they are; a crew shares the work."""
         paths = self._paths
         fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._step_limit, self.now, self._missing
 
         def see(first: int, last: int, those: NDArray[np.bool_]) -> int:
             return int(guide(first, last, those, *fixed))
 
-        paths.look(robots, which, self._slots, self._missing, see, threads)
+        paths.look(robots, which, self._slots, self._missing, see, crew)
 
     def keep(self, robots: Robots, ended: NDArray[np.bool_]) -> None:
         """Keep as `final` what robots (N,) would have to know whose episodes have just ended, where they still are."""

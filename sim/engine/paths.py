@@ -15,13 +15,16 @@ from scipy.ndimage import distance_transform_edt
 from sim.arenas import Arena
 from sim.arenas.cells import free_mask
 from sim.config import PathProgressTerm, TaskConfig
-from sim.engine.stretches import side_by_side, stretches
+from sim.engine.stretches import Crew
 from sim.kernels import paths as kernels
 from sim.kernels.bundles import Robots
 from sim.kernels.records import ARRIVAL, CELL, COLLISION
 
 MAX_BYTES = 64 * 2**20
 """Of all fields that are kept."""
+
+ALONE = Crew()
+"""The thread that asks, and no other."""
 
 
 class Grids(NamedTuple):
@@ -84,9 +87,9 @@ class Paths:
 
     def slot(self, index: int, cell: int) -> int:
         """The row of the field of a target's cell; a new one takes the place of the one made longest ago."""
-        return self._slots_of([(index, cell)], 1)[0]
+        return self._slots_of([(index, cell)], ALONE)[0]
 
-    def _slots_of(self, wanted: Sequence[tuple[int, int]], threads: int) -> list[int]:
+    def _slots_of(self, wanted: Sequence[tuple[int, int]], crew: Crew) -> list[int]:
         """`slot` of arenas and cells: of the first ones, as many as there is room for side by side, at least one."""
         found: list[int] = []
         new: list[tuple[int, int, int]] = []
@@ -101,13 +104,13 @@ class Paths:
                 self._slots[owner], self.owners[slot] = slot, owner
                 new.append((index, cell, slot))
             found.append(slot)
-        parts = max(1, min(threads, len(new)))
+        parts = max(1, min(crew.threads, len(new)))
 
         def lead(part: int) -> None:
             for index, cell, slot in new[part::parts]:
                 kernels.lead(kernels.grid_of(index, self.grids)[0], cell, self.fields[slot])
 
-        side_by_side(lead, parts)
+        crew.share(lead, parts)
         return found
 
     def look(
@@ -117,7 +120,7 @@ class Paths:
         slots: NDArray[np.int32],
         missing: NDArray[np.int32],
         kernel: Callable[[int, int, NDArray[np.bool_]], int],
-        threads: int,
+        crew: Crew,
     ) -> None:
         """Let a kernel look at some robots, and once more at those whose targets had no field, with that.
 
@@ -127,16 +130,17 @@ class Paths:
             slots: (N,) rows of `fields` that may hold their targets', written.
             missing: (N,) those whose fields the kernel found missing, from the first robot that it was to look at on.
             kernel: the first robot, the one after the last, and which of them it is to look at; how many it found missing.
-            threads: that share the work, at most.
+            crew: that shares the work.
         """
-        parts = stretches(len(which), threads if 2 * np.count_nonzero(which) > len(which) else 1)
-        counts = side_by_side(lambda part: kernel(*parts[part], which), len(parts))
+        crew = crew if 2 * np.count_nonzero(which) > len(which) else ALONE
+        parts = crew.stretches(len(which))
+        counts = crew.share(lambda part: kernel(*parts[part], which), len(parts))
         ends = ((first, first + count) for (first, _), count in zip(parts, counts, strict=True))
         left = [i for first, end in ends for i in missing[first:end].tolist()]
         again = np.zeros(len(which), np.bool_)
         while left:
             wanted = [(int(robots.records["map"][i]), self._cell(robots, i)) for i in left]
-            found = self._slots_of(wanted, threads)
+            found = self._slots_of(wanted, crew)
             now, left = left[: len(found)], left[len(found) :]
             # At once: the next ones' fields may take the places of these.
             slots[now], again[now] = found, True
@@ -170,18 +174,18 @@ class PathProgress:
     def __bool__(self) -> bool:
         return bool(self._terms)
 
-    def begin(self, robots: Robots, which: NDArray[np.bool_], threads: int = 1) -> None:
-        """Measure how far some robots (N,) have to go; so many threads do, at most."""
+    def begin(self, robots: Robots, which: NDArray[np.bool_], crew: Crew = ALONE) -> None:
+        """Measure how far some robots (N,) have to go; a crew shares the work."""
         if self._paths is not None:
-            self._measure(robots, which, self._paths, threads)
+            self._measure(robots, which, self._paths, crew)
             self._lengths[which] = self._now[which]
 
-    def add(self, robots: Robots, threads: int = 1) -> None:
+    def add(self, robots: Robots, crew: Crew = ALONE) -> None:
         """Add the term of the step that was just driven, before anybody begins anew; see `begin`."""
         if self._paths is None:
             return
         paid = (robots.outcomes != ARRIVAL) & (robots.outcomes != COLLISION) & (robots.records["parked"] == 0)
-        self._measure(robots, paid, self._paths, threads)
+        self._measure(robots, paid, self._paths, crew)
         for column, weight in self._terms:
             terms = np.where(paid, weight * (self._lengths - self._now), 0.0).astype(np.float32)
             robots.terms[:, column] = terms
@@ -189,10 +193,10 @@ class PathProgress:
             robots.records["attempt_reward"] += terms
         self._lengths[paid] = self._now[paid]
 
-    def _measure(self, robots: Robots, which: NDArray[np.bool_], paths: Paths, threads: int) -> None:
+    def _measure(self, robots: Robots, which: NDArray[np.bool_], paths: Paths, crew: Crew) -> None:
         fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._now, self._missing
 
         def measure(first: int, last: int, those: NDArray[np.bool_]) -> int:
             return int(kernels.path_lengths(first, last, those, *fixed))
 
-        paths.look(robots, which, self._slots, self._missing, measure, threads)
+        paths.look(robots, which, self._slots, self._missing, measure, crew)

@@ -23,7 +23,7 @@ from sim.engine.paths import PathProgress, Paths
 from sim.engine.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.engine.rewards import Formulas, reads_changes
 from sim.engine.shapes import pack_shapes
-from sim.engine.stretches import side_by_side, stretches
+from sim.engine.stretches import Crew
 from sim.errors import ArenaError, PlacementError
 from sim.extending.expression import QUANTITIES
 from sim.extending.observing import Sight
@@ -102,7 +102,7 @@ class World:
         arenas: the pool.
         robots: the arrays of all robots, overwritten by every step.
         movers: what moves beside them.
-        threads: at most so many follow the physics of each step, with the same result bit for bit whatever their number.
+        crew: the threads that follow the physics of each step, with the same result bit for bit however many they are.
         guidance: what they would have to know of the shortest paths; None unless asked for.
     """
 
@@ -264,7 +264,7 @@ class World:
             self.robots.records["map"], self.robots.records["replica"] = maps, self._replicas_of_their_own(maps)
         self._space = TiledSpace(self.arenas, origins, robots, task.robot, len(self.movers))
         self._placed = np.zeros(robots, dtype=np.int32)
-        self.threads = 1
+        self.crew = Crew()
         self._geometries = [self.geometry]
         self._restart, self._stream = restart, stream
         self.seed(seed)
@@ -314,12 +314,12 @@ class World:
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
         self._see_added_parts(everybody, begins=True)
-        self._path_progress.begin(self.robots, everybody, self.threads)
+        self._path_progress.begin(self.robots, everybody, self.crew)
         self._guide(everybody)
 
     def _guide(self, which: NDArray[np.bool_]) -> None:
         if self.guidance is not None:
-            self.guidance.look(self.robots, which, self.threads)
+            self.guidance.look(self.robots, which, self.crew)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -412,7 +412,7 @@ class World:
             see_one_another(space.state, self.robots, self.geometry, self._parameters)
         self._follow()
         self._formulas.add(self.robots)
-        self._path_progress.add(self.robots, self.threads)
+        self._path_progress.add(self.robots, self.crew)
         if self._looks_back:
             self._look_back()
         if ended is not None and ended.any():
@@ -421,12 +421,12 @@ class World:
     def _follow(self) -> None:
         """What follows a step's physics, on several threads where robots see what takes long, and not one another."""
         robots, space, (_, step) = len(self), self._space, self._kernels
-        if self.threads == 1 or self._is_usual or self.task.together > 1:
+        if self.crew.threads == 1 or self._is_usual or self.task.together > 1:
             count = step(0, robots, space.state, self._placed, self.robots, self.geometry, self._parameters)
             if count:
                 space.put(self._placed[:count])
             return
-        parts = stretches(robots, self.threads)
+        parts = self.crew.stretches(robots)
         while len(self._geometries) < len(parts):
             self._geometries.append(self.geometry.with_scratch_of_its_own())
 
@@ -435,7 +435,7 @@ class World:
             count: int = step(*parts[part], space.state, self._placed, self.robots, geometry, self._parameters)
             return count
 
-        for (first, _), count in zip(parts, side_by_side(follow, len(parts)), strict=True):
+        for (first, _), count in zip(parts, self.crew.share(follow, len(parts)), strict=True):
             if count:
                 space.put(self._placed[first : first + count])
 
@@ -456,14 +456,14 @@ class World:
         reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
         self._space.put(np.flatnonzero(which).astype(np.int32))
         self._see_added_parts(which, begins=True)
-        self._path_progress.begin(self.robots, which, self.threads)
+        self._path_progress.begin(self.robots, which, self.crew)
         self._guide(which)
 
     def _look_back(self) -> None:
         """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
-        self._path_progress.begin(robots, robots.outcomes == ARRIVAL, self.threads)
+        self._path_progress.begin(robots, robots.outcomes == ARRIVAL, self.crew)
         if self._sampling is not None and len(over := np.flatnonzero(robots.outcomes)):
             self._sampling.learn(robots.records["map"][over].tolist(), (robots.outcomes[over] == ARRIVAL).tolist())
         self._guide(robots.records["parked"] == 0)

@@ -13,6 +13,7 @@ from sim.actions import action_layout
 from sim.arenas import Arena, build_task_arenas
 from sim.config import TaskConfig
 from sim.engine.rewards import term_names
+from sim.engine.stretches import Crew
 from sim.engine.world import Restart, World
 from sim.envs.render import render_robot
 from sim.observations import observation_layout
@@ -159,11 +160,11 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     @property
     def threads(self) -> int:
         """How many threads follow the physics of a step, at most: the same bit for bit whatever their number."""
-        return self._world.threads
+        return self._world.crew.threads
 
     @threads.setter
     def threads(self, threads: int) -> None:
-        self._world.threads = threads
+        self._world.crew = Crew(threads)
 
     def places(self) -> NDArray[np.int32]:
         """(N,) row of `discs` of each robot, of robots that are together that of the first: the same for all that meet."""

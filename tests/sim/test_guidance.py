@@ -9,6 +9,7 @@ from sim.arenas import Arena, build_arenas
 from sim.config import ArenaConfig, TaskConfig
 from sim.engine.guidance import GUIDANCE_SIZE, Guidance
 from sim.engine.paths import Paths
+from sim.engine.stretches import Crew
 from sim.engine.world import World
 
 CLEARANCE = TaskConfig().passable_clearance
@@ -104,7 +105,7 @@ def test_few_fields_are_as_good_as_many(threads: int) -> None:
         world = World(TaskConfig(), [arena], 150, seed=1)
         world.reset()
         guidance = Guidance(TaskConfig(), Paths([arena], CLEARANCE, kept * 4 * 100 * 100), 150)
-        guidance.look(world.robots, np.ones(150, np.bool_), threads)
+        guidance.look(world.robots, np.ones(150, np.bool_), Crew(threads))
         told.append(guidance.now)
     np.testing.assert_array_equal(told[0], told[1])
     np.testing.assert_array_equal(told[0], told[2])

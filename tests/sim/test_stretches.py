@@ -21,7 +21,7 @@ from sim.config import (
     TaskConfig,
     TrailPart,
 )
-from sim.engine.stretches import side_by_side, stretches
+from sim.engine.stretches import Crew
 from sim.engine.world import World
 
 ROBOTS = 150
@@ -41,7 +41,7 @@ def task() -> TaskConfig:
 
 def driven(threads: int) -> World:
     made = World(task(), build_task_arenas(task()), ROBOTS, seed=3, guides=True)
-    made.threads = threads
+    made.crew = Crew(threads)
     made.reset()
     random = np.random.default_rng(0)
     for _ in range(200):
@@ -62,10 +62,10 @@ def test_two_threads_end_at_the_same_bits() -> None:
 
 
 def test_each_robot_is_in_one_stretch_and_none_is_short() -> None:
-    assert stretches(150, 2) == [(0, 75), (75, 150)]
-    assert stretches(200, 3) == [(0, 66), (66, 133), (133, 200)]
-    assert stretches(100, 2) == [(0, 100)]
-    assert stretches(1, 1) == [(0, 1)]
+    assert Crew(2).stretches(150) == [(0, 75), (75, 150)]
+    assert Crew(3).stretches(200) == [(0, 66), (66, 133), (133, 200)]
+    assert Crew(2).stretches(100) == [(0, 100)]
+    assert Crew().stretches(1) == [(0, 1)]
 
 
 def test_a_fault_of_one_thread_is_told_when_all_have_ended() -> None:
@@ -78,12 +78,12 @@ def test_a_fault_of_one_thread_is_told_when_all_have_ended() -> None:
         return part
 
     with pytest.raises(MemoryError):
-        side_by_side(work, 2)
+        Crew(2).share(work, 2)
     assert ended.is_set()
 
 
 def test_the_first_part_is_this_threads() -> None:
-    found: list[Any] = side_by_side(lambda part: (part, threading.get_ident()), 3)
+    found: list[Any] = Crew(3).share(lambda part: (part, threading.get_ident()), 3)
     assert [part for part, _ in found] == [0, 1, 2]
     assert found[0][1] == threading.get_ident()
     assert threading.get_ident() not in {ident for _, ident in found[1:]}
