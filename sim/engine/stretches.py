@@ -14,7 +14,7 @@ _Found = TypeVar("_Found")
 class Crew:
     """Threads that share work, the one that asks among them.
 
-    The others begin with the first work that there is for them, and flush denormal numbers if the thread does that asks then.
+    The others begin with the first work that there is for them, and flush denormal numbers if the one does that asks then.
 
     Args:
         threads: how many.
