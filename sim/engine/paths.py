@@ -139,20 +139,18 @@ class Paths:
         left = [i for first, end in ends for i in missing[first:end].tolist()]
         again = np.zeros(len(which), np.bool_)
         while left:
-            wanted = [(int(robots.records["map"][i]), self._cell(robots, i)) for i in left]
-            found = self._slots_of(wanted, crew)
+            found = self._slots_of([self._target_of(robots, i) for i in left], crew)
             now, left = left[: len(found)], left[len(found) :]
             # At once: the next ones' fields may take the places of these.
             slots[now], again[now] = found, True
             kernel(min(now), max(now) + 1, again)
             again[now] = False
 
-    def _cell(self, robots: Robots, robot: int) -> int:
-        """The cell of a robot's target."""
-        target = robots.targets[robot].tolist()
-        index = int(robots.records["map"][robot])
+    def _target_of(self, robots: Robots, robot: int) -> tuple[int, int]:
+        """A robot's arena and the cell of its target."""
+        index, target = int(robots.records["map"][robot]), robots.targets[robot].tolist()
         *_, cell = kernels.shortest_way(*target, *target, index, -1, self.grids, self.fields, self.owners)
-        return int(cell)
+        return index, int(cell)
 
 
 class PathProgress:
