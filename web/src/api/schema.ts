@@ -13355,7 +13355,7 @@ export interface components {
             task?: components["schemas"]["TaskConfig-Input"];
             /**
              * Threads
-             * @description With 2, PPO's actor learns beside its critic, and both drive robots whose observations take long or which are paid for paths; auto takes what other programs leave free. Results are the same.
+             * @description With 2, PPO's actor learns beside its critic, and one half of the robots is driven beside the other where their observations take long or paths are paid for; auto takes what other programs leave free. Results are the same.
              * @default auto
              * @enum {string}
              */
@@ -13398,7 +13398,7 @@ export interface components {
             task: components["schemas"]["TaskConfig-Output"];
             /**
              * Threads
-             * @description With 2, PPO's actor learns beside its critic, and both drive robots whose observations take long or which are paid for paths; auto takes what other programs leave free. Results are the same.
+             * @description With 2, PPO's actor learns beside its critic, and one half of the robots is driven beside the other where their observations take long or paths are paid for; auto takes what other programs leave free. Results are the same.
              * @default auto
              * @enum {string}
              */
