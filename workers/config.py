@@ -309,8 +309,9 @@ class TrainingConfig(Frozen):
     threads: Threads = Field(
         "auto",
         title="Threads",
-        description="With 2, PPO's actor learns beside its critic, and one half of the robots is driven beside the other where "
-        "their observations take long or paths are paid for; auto takes what other programs leave free. Results are the same.",
+        description="With 2, PPO's actor learns beside its critic, and one half of the robots is driven beside the other "
+        "where their observations take long or paths are paid for; auto takes what other programs leave free. Results are "
+        "the same.",
         json_schema_extra=ADVANCED,
     )
     start_from: StartFrom | None = Field(
