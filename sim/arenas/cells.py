@@ -1,6 +1,7 @@
 """Where a robot fits: an arena as a grid of free cells, and which of them hang together."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,12 +61,30 @@ def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:
     So a path through free cells, also from corner to corner, keeps the clearance all the way.
     """
     grid = Grid.over(arena, cell)
-    reach = clearance + cell / np.sqrt(2.0)  # from a cell's centre to its corner
+    reach = _to_keep(clearance, cell)
     xs, ys = grid.xs(), grid.ys()
     inside_x = arena.half_width - np.abs(xs) >= clearance + 0.5 * cell - 1e-9
     inside_y = arena.half_height - np.abs(ys) >= clearance + 0.5 * cell - 1e-9
     inside = inside_y[:, None] & inside_x[None, :]
     return np.asarray(inside & (obstacle_distance(arena, grid, reach) >= reach))
+
+
+def covered_cells(circles: NDArray[np.float64], grid: Grid, clearance: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which circle takes which cells of `free_mask`: rows of `circles` and cells, counted row by row, pair by pair (P,) each."""
+    reach = _to_keep(clearance, grid.cell)
+    pairs = []
+    for rows, cells, near in _around(circles, grid, reach):
+        taken = near < reach
+        pairs.append((np.repeat(rows, np.count_nonzero(taken, axis=1)), cells[taken]))
+    if not pairs:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    which, cells = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return which, cells
+
+
+def _to_keep(clearance: float, cell: float) -> float:
+    """Metres that a cell's centre keeps where each of its points keeps `clearance`: it is so much to its corners."""
+    return float(clearance + cell / np.sqrt(2.0))
 
 
 def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float64]:
@@ -77,7 +96,10 @@ def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float6
     distance = np.full((grid.rows, grid.columns), cap, dtype=np.float64)
     circles = arena.circles
     small = circles[:, 2] + cap <= _SMALL * grid.cell
-    _lower_to_small(distance, grid, circles[small], cap)
+    flat = distance.reshape(-1)
+    # Many at once: a thicket has hundreds of pillars.
+    for _, cells, near in _around(circles[small], grid, cap):
+        np.minimum.at(flat, cells.ravel(), near.ravel())
     xs, ys = grid.xs()[None, :], grid.ys()[:, None]
     for circle in circles[~small]:
         reach = circle[2] + cap
@@ -91,21 +113,29 @@ def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float6
     return distance
 
 
-def _lower_to_small(distance: NDArray[np.float64], grid: Grid, circles: NDArray[np.float64], cap: float) -> None:
-    """Lower distances to those from circles that reach few cells, many at once: a thicket has hundreds of pillars."""
+def _around(
+    circles: NDArray[np.float64], grid: Grid, reach: float
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]:
+    """Some circles after others, the cells around each, those within `reach` metres of it among them, and how far these are.
+
+    Yields:
+        (n,) rows of `circles`; (n, w) cells, counted row by row, those at the grid's edges several times; (n, w) metres from
+        the cells' centres to the circle.
+    """
     # From the middle of the cell that a circle's centre lies in, half a cell away at most.
-    reaches = np.ceil((circles[:, 2] + cap) / grid.cell + 0.5).astype(np.int64)
-    xs, ys, flat = grid.xs(), grid.ys(), distance.reshape(-1)
-    for reach in np.unique(reaches):
-        alike = circles[reaches == reach]
-        offsets = np.arange(-reach, reach + 1)
+    widths = np.ceil((circles[:, 2] + reach) / grid.cell + 0.5).astype(np.int64)
+    xs, ys = grid.xs(), grid.ys()
+    for width in np.unique(widths):
+        alike = np.flatnonzero(widths == width)
+        offsets = np.arange(-width, width + 1)
         together = max(_TOGETHER // len(offsets) ** 2, 1)
         for first in range(0, len(alike), together):
-            x, y, radius = np.split(alike[first : first + together], 3, axis=1)
+            which = alike[first : first + together]
+            x, y, radius = np.split(circles[which], 3, axis=1)
             columns, rows = _indices(x, offsets, grid.cell, grid.columns), _indices(y, offsets, grid.cell, grid.rows)
             near = np.hypot((xs[columns] - x)[:, None, :], (ys[rows] - y)[:, :, None]) - radius[:, :, None]
             cells = rows[:, :, None] * grid.columns + columns[:, None, :]
-            np.minimum.at(flat, cells.ravel(), near.ravel())
+            yield which, cells.reshape(len(which), -1), near.reshape(len(which), -1)
 
 
 def _indices(centres: NDArray[np.float64], offsets: NDArray[np.int64], cell: float, count: int) -> NDArray[np.int64]:

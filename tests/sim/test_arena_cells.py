@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from sim.arenas import Arena, free_distance
-from sim.arenas.cells import Grid, components, free_mask, obstacle_distance
+from sim.arenas.cells import Grid, components, covered_cells, free_mask, obstacle_distance
 from sim.arenas.geometry import box_distance, circle_distance
 from sim.arenas.rectangles import cover, to_boxes
 
@@ -129,6 +129,19 @@ def test_distances_of_cells_are_those_of_their_centres_bit_for_bit(
     for box in arena.boxes:
         nearest = np.minimum(nearest, box_distance(box, xs, ys))
     assert (obstacle_distance(arena, grid, cap) == nearest).all()
+
+
+@settings(max_examples=200)
+@given(circles, st.floats(0.05, 0.6))
+def test_a_free_mask_is_what_its_circles_leave(circles: list[tuple[float, ...]], clearance: float) -> None:
+    """Thickets take some away, and look again without measuring the others anew."""
+    pillars = np.array(circles).reshape(-1, 3)
+    empty = Arena("empty", 2.5, 2.0)
+    which, cells = covered_cells(pillars, Grid.over(empty), clearance)
+    for stays in (np.ones(len(pillars), np.bool_), np.arange(len(pillars)) % 2 == 0):
+        free = free_mask(empty, clearance)
+        free.reshape(-1)[cells[stays[which]]] = False
+        assert (free == free_mask(Arena("some", 2.5, 2.0, pillars[stays]), clearance)).all()
 
 
 def test_an_obstacle_larger_than_any_whole_number_of_cells_fills_all() -> None:

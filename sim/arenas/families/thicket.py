@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.arenas.cells import CELL, Grid, components, free_mask
+from sim.arenas.cells import CELL, Grid, Mask, components, covered_cells, free_mask
 from sim.arenas.families.layout import Plan
 from sim.arenas.geometry import Arena
 
@@ -36,12 +36,21 @@ def thicket(plan: Plan) -> None:
     rows, columns = np.nonzero(filled)
     centres = (np.stack([columns, rows], axis=1) + 0.5 - 0.5 * side) * cell
     pillars = np.column_stack([centres, np.full(len(centres), 0.5 * cell)])
+    empty = Arena("thicket", plan.half, plan.half)
+    floor, grid = free_mask(empty, plan.clearance, CELL), Grid.over(empty)
+    # Which pillar takes which cells does not change as others are taken away.
+    which, cells = covered_cells(pillars, grid, plan.clearance)
     for _ in range(_OPENINGS):
-        opening = _missing_way(plan, pillars)
+        free = floor.copy()
+        free.reshape(-1)[cells] = False
+        opening = _missing_way(free, grid)
         if opening is None:
             break
         keep = plan.clearance + 0.5 * _SPARE
-        pillars = pillars[_distance_to_segment(pillars[:, :2], *opening) - pillars[:, 2] >= keep]
+        stays = _distance_to_segment(pillars[:, :2], *opening) - pillars[:, 2] >= keep
+        left = stays[which]
+        which, cells = (np.cumsum(stays) - 1)[which[left]], cells[left]
+        pillars = pillars[stays]
     plan.circles.extend((x, y, radius) for x, y, radius in pillars.tolist())
 
 
@@ -56,13 +65,11 @@ def _smoothed(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray((filled | (neighbours > _CROWDED)) & (neighbours >= _LONELY))
 
 
-def _missing_way(plan: Plan, pillars: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _missing_way(free: Mask, grid: Grid) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Where the largest pocket and the largest open part come nearest to one another; None where no pocket matters."""
-    arena = Arena("thicket", plan.half, plan.half, pillars)
-    labels, sizes = components(free_mask(arena, plan.clearance, CELL))
+    labels, sizes = components(free)
     if len(sizes) < 2 or sizes[1:].sum() <= _POCKETS * sizes.sum():
         return None
-    grid = Grid.over(arena)
     # The nearest two points lie on edges, and all pairs of all cells would take a hundred times as long.
     inner = np.pad(labels >= 0, 1)
     edge = ~(inner[:-2, 1:-1] & inner[2:, 1:-1] & inner[1:-1, :-2] & inner[1:-1, 2:])
