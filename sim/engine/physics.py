@@ -4,8 +4,10 @@ The robots of a tile do not see one another, so a tile is as good as a world of 
 makes a step cheap (benchmarks/sim_throughput.py).
 """
 
+import gc
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 import pymunk
@@ -27,7 +29,9 @@ GAP = 2.0
 _WALL = 0.05  # half the thickness of the outer walls, whose inner faces stand on the arena's bounds
 _HASH_CELL = 1.5  # m; in larger cells too many robots of a tile meet, of smaller ones each needs several
 _HASH_SLOTS_PER_SHAPE = 2
+_HASH_SLOTS_PER_PAIR = 8.0  # of a robot and a shape, to the power of a half: where shapes are many, fewer slots are faster
 _ROBOT, _OBSTACLE = 0b01, 0b10
+_MEETS_ROBOTS = pymunk.ShapeFilter(categories=_OBSTACLE, mask=_ROBOT)
 _POSES = batch.BodyFields.POSITION | batch.BodyFields.ANGLE
 _VELOCITIES = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
 _FEW = 20  # up to one body in so many is put by itself, which takes so many times as long as one in bulk
@@ -38,6 +42,26 @@ def tile_origins(arenas: Sequence[Arena], replicas: int) -> NDArray[np.float64]:
     pitch = GAP + 2.0 * max(max(arena.half_width, arena.half_height) for arena in arenas)
     tiles = np.arange(replicas * len(arenas))
     return pitch * np.stack([tiles % TILE_COLUMNS, tiles // TILE_COLUMNS], axis=1).astype(np.float64)
+
+
+@contextmanager
+def _objects_that_stay() -> Iterator[None]:
+    """Makes Python not look for garbage among objects of which none is: with thousands of arenas that took half of the time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _hash_slots(shapes: int, robots: int) -> int:
+    """Slots of a Space's hash, of which every step clears all, and every robot looks through what shares its own.
+
+    A step of 512 robots of a training among 593,384 shapes takes 2.2 ms with two slots a shape, and 1.3 with a quarter of one.
+    """
+    return min(_HASH_SLOTS_PER_SHAPE * shapes, round(_HASH_SLOTS_PER_PAIR * math.sqrt(shapes * robots)))
 
 
 def add_arena(space: pymunk.Space, arena: Arena, x: float, y: float) -> list[pymunk.Shape]:
@@ -59,7 +83,7 @@ def add_arena(space: pymunk.Space, arena: Arena, x: float, y: float) -> list[pym
         ]
         shapes.append(pymunk.Poly(body, vertices))
     for shape in shapes:
-        shape.filter = pymunk.ShapeFilter(categories=_OBSTACLE, mask=_ROBOT)
+        shape.filter = _MEETS_ROBOTS
     space.add(*shapes)
     return shapes
 
@@ -98,9 +122,10 @@ class TiledSpace:
         space.collision_bias = 1.0
         shapes = sum(4 + len(arena.circles) + len(arena.boxes) for arena in arenas)
         shapes = shapes * (len(origins) // len(arenas)) + robots
-        space.use_spatial_hash(_HASH_CELL, _HASH_SLOTS_PER_SHAPE * shapes)
-        for tile, (x, y) in enumerate(origins.tolist()):
-            add_arena(space, arenas[tile % len(arenas)], x, y)
+        space.use_spatial_hash(_HASH_CELL, _hash_slots(shapes, robots))
+        with _objects_that_stay():
+            for tile, (x, y) in enumerate(origins.tolist()):
+                add_arena(space, arenas[tile % len(arenas)], x, y)
         self._bodies: list[pymunk.Body] = []
         for _ in range(robots):
             body, shape = robot_body(robot)
