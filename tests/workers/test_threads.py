@@ -8,12 +8,17 @@ import pytest
 import torch
 
 from sim.config import ObservationConfig, OpeningsPart, TaskConfig, TrailPart
+from sim.engine.stretches import Crew
 from tests.workers.test_trainer import Recorder
+from workers.algorithms.flat import FlatParameters
 from workers.algorithms.gradients.ppo import WrittenPpo
 from workers.algorithms.ppo import Ppo
 from workers.config import EvaluationConfig, MlpNetwork, Network, PpoConfig, ResBlockNetwork, Threads, TrainingConfig
 from workers.kernels.ppo import CRITIC
 from workers.live.viewing import Unwatched
+from workers.networks.compiled import Inference
+from workers.networks.inputs import as_inputs
+from workers.networks.modules import build_network
 from workers.training.threads import ThreadCount, runnable_threads
 from workers.training.trainer import Training
 
@@ -46,6 +51,29 @@ def test_two_threads_end_at_the_same_bits(network: Network, tmp_path: Path) -> N
     assert alone.keys() == beside.keys()
     for name, array in alone.items():
         assert np.array_equal(array, beside[name]), name
+
+
+def test_networks_see_some_robots_on_each_thread(tmp_path: Path) -> None:
+    """300 are 256 on one and 44 on the other; those of one step and of the next go through a critic together."""
+    alone, beside = (
+        trained(threads, MlpNetwork(hidden_sizes=(24, 16)), tmp_path / threads, robots=300) for threads in ("1", "2")
+    )
+    for name, array in alone.items():
+        assert np.array_equal(array, beside[name]), name
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("rows", [16, 256, 257, 900])
+def test_parts_of_the_rows_come_out_as_all_of_them(threads: int, rows: int) -> None:
+    network = build_network(MlpNetwork(hidden_sizes=(24, 16)), as_inputs(9), 2)
+    FlatParameters(network)
+    seen = torch.randn(rows, 9, generator=torch.Generator().manual_seed(1))
+    infer = Inference(network, rows)
+    for _ in range(2):
+        with torch.no_grad():
+            torch.testing.assert_close(infer(seen, Crew(threads)), network(seen), rtol=1e-5, atol=1e-6)
+            for parameter in network.parameters():
+                parameter += 0.1
 
 
 def test_robots_that_see_what_takes_long_are_followed_by_two_threads_alike(tmp_path: Path) -> None:

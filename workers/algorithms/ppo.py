@@ -11,7 +11,6 @@ Read `workers.algorithms.plain_ppo` first: the same on one page.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import torch
@@ -20,6 +19,7 @@ from torch import nn
 
 from sim.actions import DEFAULT_ACTIONS, ActionLayout
 from sim.engine.guidance import GUIDANCE_SIZE, Guidance
+from sim.engine.stretches import Crew
 from sim.streams import EXPLORATION, WEIGHTS, stream_seed
 from workers.algorithms.base import Arrays, with_prefix, without_prefix
 from workers.algorithms.flat import FlatAdam
@@ -29,7 +29,7 @@ from workers.algorithms.storage.return_scaler import ReturnScaler
 from workers.algorithms.storage.rollout import RolloutStorage, Samples, generalized_advantages
 from workers.config import PpoConfig, RecurrentNetworkConfig
 from workers.kernels.ppo import ACTOR, BOTH, CRITIC
-from workers.networks.compiled import inference, is_compiled
+from workers.networks.compiled import Inference, is_compiled
 from workers.networks.inputs import Inputs, as_inputs
 from workers.networks.modules import Described, GaussianActor, build_network, take_weights
 from workers.networks.squashing import bound_actions
@@ -55,7 +55,6 @@ class Ppo:
         is_guided: whether the critic is told the shortest paths.
         guidance: which these are, where it is.
         graphed: how minibatches are learned on a CUDA device; None: kernel by kernel, as on every other.
-        threads: of an update; with 2 the actor learns beside the critic where compiled passes are known, bit for bit alike.
     """
 
     def __init__(
@@ -73,14 +72,25 @@ class Ppo:
         self._generator = generator
         self._optimizer = FlatAdam(actor, critic, learning_rate=config.learning_rate)
         self._gradients = gradients or fastest_gradients(config, actor, critic)
-        self._logits, self._values = inference(actor.network, config.robots), inference(critic, config.robots)
+        self._see, self._judge = (Inference(network, config.robots) for network in (actor.network, critic))
         self.graphed: GraphedMinibatches | None = None
         if storage.device.type == "cuda" and all(isinstance(network, Described) for network in (actor.network, critic)):
             self.graphed = GraphedMinibatches(self._gradients, self._optimizer, config.max_grad_norm)
         self._scaler = ReturnScaler(config.robots, config.gamma)
-        self.threads = 1
+        self._crew = Crew()
         self.is_guided = config.critic_sees == "path"
         self.guidance: Guidance | None = None
+
+    @property
+    def threads(self) -> int:
+        """Of what follows, where compiled passes are known, bit for bit alike: networks see some robots each, and with 2 the
+        actor learns beside the critic."""
+        return self._crew.threads
+
+    @threads.setter
+    def threads(self, threads: int) -> None:
+        # Made anew each time: a thread flushes denormal numbers as the one did that started it.
+        self._crew = Crew(threads)
 
     @torch.no_grad()
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -88,7 +98,7 @@ class Ppo:
         storage, step = self.storage, self.storage.step
         storage.see(step, observations, None if self.guidance is None else self.guidance.now)
         storage.noise[step].normal_(generator=self._generator)
-        mean = bound_actions(self._logits(storage.observations[step]), self.actor.actions)
+        mean = bound_actions(self.logits(storage.observations[step]), self.actor.actions)
         torch.addcmul(mean, storage.noise[step], torch.exp(self.actor.log_std), out=storage.actions[step])
         actions: NDArray[np.float32] = storage.actions[step].cpu().numpy()
         return actions
@@ -164,10 +174,10 @@ class Ppo:
         steps = self._optimizer.next_steps(len(minibatches), self.config.max_grad_norm)
         if self.threads == 1:
             return gradients.learn(BOTH, samples, minibatches, steps, limits)
-        # Made anew each time: a thread flushes denormal numbers as the one did that started it.
-        with ThreadPoolExecutor(1, "critic") as another:
-            critic = another.submit(gradients.learn, CRITIC, samples, minibatches, steps, limits)
-            return gradients.learn(ACTOR, samples, minibatches, steps, limits) + critic.result()
+        of_actor, of_critic = self._crew.share(
+            lambda part: gradients.learn((ACTOR, CRITIC)[part], samples, minibatches, steps, limits), 2
+        )
+        return of_actor + of_critic
 
     def minibatches(self) -> Iterator[torch.Tensor]:
         """The rows of the rollout's samples once, in a new order."""
@@ -175,13 +185,18 @@ class Ppo:
         order = torch.randperm(rows, generator=self._generator, device=self.storage.device)
         yield from order.split(self.config.minibatch_size)
 
+    def logits(self, observations: torch.Tensor) -> torch.Tensor:
+        """What the actor's network puts out (robots, outputs) for what they see in the step that is due."""
+        return self._see(observations, self._crew)
+
     def values(self) -> torch.Tensor:
         """Values (steps + 1, robots) of what the critic saw in the rollout."""
         if self.storage.device.type == "cuda":  # has room for all at once, and each launch costs
             every: torch.Tensor = self.critic(self.storage.critic_observations.flatten(0, 1))
             return every.view(self.storage.steps + 1, self.robots)
-        # Step by step: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
-        return torch.stack([self._values(seen)[:, 0].clone() for seen in self.storage.critic_observations])
+        # Some at a time: whole rollouts of a wide layer's activations would go through memory instead of a core's cache.
+        values = self._judge(self.storage.critic_observations.flatten(0, 1), self._crew)
+        return values.view(self.storage.steps + 1, self.robots)
 
     def final_values(self, observations: torch.Tensor) -> torch.Tensor:
         """Values (k,) of what the critic saw (k, size) where the step limit cut episodes."""

@@ -73,22 +73,17 @@ class RecurrentPpo(Ppo):
         super().__init__(
             config, actor, critic, storage, generator, RecurrentGradients(config, actor, critic, self._starts, self._keep)
         )
-        self._logits, self._values = self._next_logits, self._next_values
 
-    def _next_logits(self, observations: Tensor) -> Tensor:
-        """Outputs of the actor for the next step; the critic looks on, so that it remembers the same episode."""
+    def logits(self, observations: Tensor) -> Tensor:
+        """See `Ppo.logits`; the critic looks on, so that it remembers the same episode."""
         step = self.storage.step
         for start, memory in zip(self._starts, self._memories, strict=True):
             start[step] = memory
         logits, self._memories[0] = self.actor.network(observations, self._memories[0])
-        self._seen[step] = self._next_values(self.storage.critic_observations[step])[:, 0]
+        values, self._memories[1] = self.critic(self.storage.critic_observations[step], self._memories[1])
+        self._seen[step] = values[:, 0]
         assert isinstance(logits, Tensor)
         return logits
-
-    def _next_values(self, observations: Tensor) -> Tensor:
-        values, self._memories[1] = self.critic(observations, self._memories[1])
-        assert isinstance(values, Tensor)
-        return values
 
     @torch.no_grad()
     def record(

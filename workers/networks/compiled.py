@@ -3,7 +3,6 @@
 Autograd is the reference: a test holds the two equal.
 """
 
-from collections.abc import Callable
 from itertools import accumulate
 
 import numpy as np
@@ -11,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from sim.engine.stretches import Crew
 from sim.kernels.options import bound
 from workers.kernels.networks import RELU, RESBLOCK, TANH, Passes, backward, forward, input_gradient
 from workers.networks.config import MlpNetwork, ResBlockNetwork
@@ -21,6 +21,9 @@ ROWS_AT_ONCE = 128
 
 Half or twice as many change the time of PPO's gradients by 4 % at most, of all networks from 32-32 to 256-256.
 """
+
+ROWS_OF_A_THREAD = 256
+"""Rows that go forward only, on one of several threads: the more at once, the faster, and few robots are worth no second one."""
 
 
 def is_compiled(*networks: nn.Module) -> bool:
@@ -79,10 +82,13 @@ class TensorPasses:
         self._backward = bound(backward, passes, table, table, False)
         self._input_gradient = bound(input_gradient, passes, table)
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """(n, inputs) to (n, outputs), n at most the rows that there are buffers for."""
+    def forward(self, inputs: Tensor, *, same: bool = False) -> Tensor:
+        """(n, inputs) to (n, outputs), n at most the rows that there are buffers for.
+
+        With `same`, which saves work, the parameters are those of the call before.
+        """
         self._inputs = _contiguous(inputs)
-        return torch.from_numpy(self._forward(self._passes, self._inputs, False))
+        return torch.from_numpy(self._forward(self._passes, self._inputs, same))
 
     def backward(self, grad_output: Tensor) -> None:
         """Overwrites every parameter's `.grad`: `grad_output` (n, outputs) is a scalar's derivative by the last outputs."""
@@ -93,9 +99,38 @@ class TensorPasses:
         return torch.from_numpy(self._input_gradient(self._passes, _contiguous(grad_output)))
 
 
-def inference(network: nn.Module, rows: int) -> Callable[[Tensor], Tensor]:
-    """The fastest way from (n, inputs) to (n, outputs), n at most `rows`; a result may be overwritten by the next call's."""
-    return TensorPasses(network, rows).forward if is_compiled(network) else network
+class Inference:
+    """The fastest way from (n, inputs) to (n, outputs), on as many threads as a crew has, bit for bit alike.
+
+    Args:
+        network: any.
+        rows: that go through it at once; at most `ROWS_OF_A_THREAD` where compiled passes are known.
+    """
+
+    def __init__(self, network: nn.Module, rows: int) -> None:
+        self._network = network
+        self._compiled = is_compiled(network)
+        self._rows = min(rows, ROWS_OF_A_THREAD) if self._compiled else rows
+        self._passes = [TensorPasses(network, self._rows)] if self._compiled else []
+
+    def __call__(self, inputs: Tensor, crew: Crew) -> Tensor:
+        """(n, inputs) to (n, outputs), which the next call may overwrite."""
+        if len(inputs) <= self._rows:
+            one: Tensor = self._passes[0].forward(inputs) if self._compiled else self._network(inputs)
+            return one
+        blocks = inputs.split(self._rows)
+        if not self._compiled:
+            return torch.cat([self._network(block) for block in blocks])
+        parts = min(crew.threads, len(blocks))
+        while len(self._passes) < parts:
+            self._passes.append(TensorPasses(self._network, self._rows))
+
+        def go(part: int) -> list[Tensor]:
+            passes = self._passes[part]
+            first, end = (len(blocks) * edge // parts for edge in (part, part + 1))
+            return [passes.forward(blocks[block], same=block > first).clone() for block in range(first, end)]
+
+        return torch.cat([values for found in crew.share(go, parts) for values in found])
 
 
 def _contiguous(tensor: Tensor) -> NDArray[np.float32]:
