@@ -12,6 +12,7 @@ has been up for a while, compiled kernels on disk.
 
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,6 +24,7 @@ from benchmarks.service import get, running_service, wait_for
 from sim.drivers import Driver
 from sim.suites import Suite, run_controller, suite_in, suite_places
 from workers.checkpoints import read_policy
+from workers.config import EvaluationConfig, TrainingConfig
 from workers.policy import torch_policy
 from workers.presets import NEW_PLACES
 
@@ -51,21 +53,32 @@ def success(archive: Path, suite: Suite) -> float:
     return float((driven.outcomes == _ARRIVAL).mean())
 
 
-def launch(client: httpx.Client, seeds: int, steps: int | None) -> tuple[float, dict[str, Any]]:
-    """Launch the preset with so many seeds and wait for their end; when that was begun, and the experiment."""
-    training = NEW_PLACES.training.model_dump(mode="json")
-    if steps is not None:
-        training |= {"steps": steps, "evaluation": training["evaluation"] | {"every_steps": steps}}
+def launch(client: httpx.Client, title: str, training: TrainingConfig, seeds: Sequence[int]) -> tuple[float, dict[str, Any]]:
+    """Launch a training with these seeds and wait for their end; when that was begun, and the experiment."""
     launched_at = time.time()
-    body = {"name": NEW_PLACES.title, "seeds": list(range(seeds)), "training": training}
+    body = {"name": title, "seeds": list(seeds), "training": training.model_dump(mode="json")}
     made = client.post("/api/experiments", json=body).raise_for_status().json()
     over = ("completed", "failed", "stopped")
     wait_for(
         lambda: all(get(client, f"/api/runs/{run['id']}")["state"] in over for run in made["runs"]),
-        seconds=600.0,
+        seconds=3_600.0,
         interval=0.2,
     )
     return launched_at, made
+
+
+def shortened(training: TrainingConfig, steps: int | None) -> TrainingConfig:
+    """A training of so many steps in place of its own, where that is said."""
+    if steps is None:
+        return training
+    return training.model_copy(update={"steps": steps, "evaluation": EvaluationConfig(every_steps=steps)})
+
+
+def archive_of(client: httpx.Client, checkpoint: dict[str, Any], directory: Path) -> Path:
+    """A checkpoint's archive, downloaded."""
+    archive = directory / f"{checkpoint['id']}.zip"
+    archive.write_bytes(client.get(f"/api/checkpoints/{checkpoint['id']}/download").raise_for_status().content)
+    return archive
 
 
 def measure(client: httpx.Client, run_id: str, launched_at: float, suite: Suite, directory: Path) -> dict[str, Any]:
@@ -74,9 +87,7 @@ def measure(client: httpx.Client, run_id: str, launched_at: float, suite: Suite,
     rates, good_at = [], None
     found = get(client, f"/api/runs/{run_id}/checkpoints?limit=200")["items"]
     for checkpoint in sorted(found, key=lambda each: int(each["step"])):
-        archive = directory / f"{checkpoint['id']}.zip"
-        archive.write_bytes(client.get(f"/api/checkpoints/{checkpoint['id']}/download").raise_for_status().content)
-        rates.append(success(archive, suite))
+        rates.append(success(archive_of(client, checkpoint, directory), suite))
         if good_at is None and rates[-1] >= TARGET_SUCCESS:
             good_at = round(checkpoint["created_at"] - launched_at, 1)
     ended = round(run["finished_at"] - launched_at, 1)
@@ -93,7 +104,8 @@ def main() -> None:
     arguments = options.parse_args()
     with running_service(workers=os.cpu_count() or 1) as client, TemporaryDirectory() as directory:
         time.sleep(_WARM_SECONDS)
-        launched_at, made = launch(client, arguments.seeds, arguments.steps)
+        training = shortened(NEW_PLACES.training, arguments.steps)
+        launched_at, made = launch(client, NEW_PLACES.title, training, range(arguments.seeds))
         suite = scenarios(arguments.scenarios)
         found = [measure(client, run["id"], launched_at, suite, Path(directory)) for run in made["runs"]]
     last = [each["rates"][-1] for each in found]
