@@ -70,7 +70,11 @@ def free_mask(arena: Arena, clearance: float, cell: float = CELL) -> Mask:
 
 
 def covered_cells(circles: NDArray[np.float64], grid: Grid, clearance: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which circle takes which cells of `free_mask`: rows of `circles` and cells, counted row by row, pair by pair (P,) each."""
+    """Which circle takes which cells of `free_mask`.
+
+    Returns:
+        (P,) rows of `circles` and (P,) cells, counted row by row: a pair for each cell that a circle takes.
+    """
     reach = _to_keep(clearance, grid.cell)
     pairs = []
     for rows, cells, near in _around(circles, grid, reach):

@@ -46,7 +46,7 @@ def tile_origins(arenas: Sequence[Arena], replicas: int) -> NDArray[np.float64]:
 
 @contextmanager
 def _objects_that_stay() -> Iterator[None]:
-    """Makes Python not look for garbage among objects of which none is: with thousands of arenas that took half of the time."""
+    """No search for garbage among objects of which none is: with thousands of arenas that took half of the time."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -59,7 +59,7 @@ def _objects_that_stay() -> Iterator[None]:
 def _hash_slots(shapes: int, robots: int) -> int:
     """Slots of a Space's hash, of which every step clears all, and every robot looks through what shares its own.
 
-    A step of 512 robots of a training among 593,384 shapes takes 2.2 ms with two slots a shape, and 1.3 with a quarter of one.
+    A step of 512 robots of a training among 593,384 shapes takes 2.2 ms with two slots a shape, and 1.3 with a quarter.
     """
     return min(_HASH_SLOTS_PER_SHAPE * shapes, round(_HASH_SLOTS_PER_PAIR * math.sqrt(shapes * robots)))
 

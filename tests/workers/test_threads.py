@@ -73,7 +73,7 @@ def test_parts_of_the_rows_come_out_as_all_of_them(threads: int, rows: int) -> N
         with torch.no_grad():
             torch.testing.assert_close(infer(seen, Crew(threads)), network(seen), rtol=1e-5, atol=1e-6)
             for parameter in network.parameters():
-                parameter += 0.1
+                parameter.add_(0.1)
 
 
 def test_robots_that_see_what_takes_long_are_followed_by_two_threads_alike(tmp_path: Path) -> None:

@@ -83,8 +83,11 @@ class Ppo:
 
     @property
     def threads(self) -> int:
-        """Of what follows, where compiled passes are known, bit for bit alike: networks see some robots each, and with 2 the
-        actor learns beside the critic."""
+        """Of all that follows, bit for bit alike.
+
+        Where compiled passes are known networks see some of the robots on each, and with 2 the actor learns beside the
+        critic.
+        """
         return self._crew.threads
 
     @threads.setter

@@ -23,7 +23,7 @@ Half or twice as many change the time of PPO's gradients by 4 % at most, of all 
 """
 
 ROWS_OF_A_THREAD = 256
-"""Rows that go forward only, on one of several threads: the more at once, the faster, and few robots are worth no second one."""
+"""Rows that go forward only, on one of several threads: few robots are worth no second one."""
 
 
 def is_compiled(*networks: nn.Module) -> bool:
