@@ -3,7 +3,8 @@
 import numpy as np
 
 from sim.arenas import build_arenas
-from sim.config import ArenaConfig, MoversConfig, TaskConfig
+from sim.config import ArenaConfig, MoversConfig, ObservationConfig, PathProgressTerm, RewardConfig, TaskConfig, TrailPart
+from sim.engine.paths import Paths
 from sim.envs.vector import NavigationVectorEnv
 from sim.scan import clearances, scan
 
@@ -15,6 +16,13 @@ def main() -> None:
     arena = build_arenas(task.arena)[0]
     scan(arena, np.zeros((1, 3)))
     clearances(arena, np.zeros((1, 2)))
-    env = NavigationVectorEnv(task, 2, seed=0)
-    env.reset()
-    env.step(np.zeros((2, 2), dtype=np.float32))
+    ways = Paths([arena], task.path_clearance)
+    ways.length(0, (-4.0, -4.0), (4.0, 4.0))
+    ways.slot(0, 0)
+    # The usual robot, one that sees more than a scan and is paid by the shortest path, and several together.
+    rewards = RewardConfig(terms=(PathProgressTerm(),))
+    sees = task.model_copy(update={"observation": ObservationConfig(parts=(TrailPart(),)), "reward": rewards})
+    for each, guides in ((task, False), (sees, True), (TaskConfig(together=2), False)):
+        env = NavigationVectorEnv(each, 2, seed=0, guides=guides)
+        env.reset()
+        env.step(np.zeros((2, 2), dtype=np.float32))

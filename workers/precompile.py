@@ -26,10 +26,10 @@ def warm_up() -> None:
     task = TaskConfig()
     run_suite(lambda observations: np.zeros((len(observations), 2), np.float32), task, suite_for(task))
     NavigationVectorEnv(task, 1, seed=0).reset()
-    _update_all()
+    update_all()
 
 
-def _update_all() -> None:
+def update_all() -> None:
     """Everything that learns, once."""
     task = TaskConfig()
     networks: tuple[Network, ...] = (MlpNetwork(), ResBlockNetwork(), GruNetwork(sequence_length=2))
@@ -56,7 +56,7 @@ def _update_once(config: PpoConfig, task: TaskConfig) -> None:
 if __name__ == "__main__":
     # The learners' kernels beside the simulator's: they know nothing of each other, and compiling is half a minute of each.
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        learners = pool.submit(_update_all)
+        learners = pool.submit(update_all)
         sim.precompile.main()
         learners.result()
     warm_up()
