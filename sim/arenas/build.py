@@ -1,8 +1,6 @@
 """From a configuration to the arenas that it names."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 
 from sim.arenas.builtin import BUILTIN
 from sim.arenas.document import to_arena
@@ -16,13 +14,12 @@ from sim.streams import MAPS, stream_seed
 _ROOM = 0.05  # m between what a robot keeps from obstacles and the way that is left for it: what the default one has
 
 
-def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE, threads: int = 1) -> tuple[Arena, ...]:
+def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE) -> tuple[Arena, ...]:
     """The arenas that a configuration names: one, or the pool of a family; 1 to 8 ms for each of a pool at 10 x 10 m.
 
     Args:
         config: built in, generated, or imported with its geometry.
         clearance: what the robot needs around its centre in a generated arena, metres.
-        threads: that draw a pool of a family that is built in; two are 1.3 times as fast as one, which holds Python's lock.
 
     Raises:
         ArenaError: an imported arena comes without its geometry or gets too many movers, or the robot is too large for a
@@ -31,11 +28,7 @@ def build_arenas(config: AnyArenaConfig, *, clearance: float = CLEARANCE, thread
     if isinstance(config, ArenaConfig):
         return (with_movers(BUILTIN[config.name](), config.movers),)
     if isinstance(config, ArenaPool):
-        draw = partial(build_arena, config, clearance=clearance)
-        if threads == 1 or not isinstance(config, GeneratedArenaConfig):
-            return tuple(map(draw, range(config.maps)))
-        with ThreadPoolExecutor(threads, "map") as pool:
-            return tuple(pool.map(draw, range(config.maps)))
+        return tuple(build_arena(config, index, clearance=clearance) for index in range(config.maps))
     if config.arena is None:
         raise ArenaError(
             f"the imported arena {config.sha256[:12] or '(none)'} is here by its hash only: read its file with "
@@ -49,13 +42,13 @@ def arena_clearance(task: TaskConfig) -> float:
     return max(CLEARANCE, task.passable_clearance + _ROOM)
 
 
-def build_task_arenas(task: TaskConfig, *, threads: int = 1) -> tuple[Arena, ...]:
+def build_task_arenas(task: TaskConfig) -> tuple[Arena, ...]:
     """The arenas in which a task's robots drive: `build_arenas` with the room that the robot needs.
 
     Raises:
         ArenaError: as there.
     """
-    return build_arenas(task.arena, clearance=arena_clearance(task), threads=threads)
+    return build_arenas(task.arena, clearance=arena_clearance(task))
 
 
 def with_maps_of(task: TaskConfig, seed: int) -> TaskConfig:

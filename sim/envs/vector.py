@@ -68,7 +68,6 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         autoreset_mode: when the next episode of a robot begins: in the step that ended one, or, as Gymnasium's own vector
             environments do, in the one after it, whose action makes no difference and whose reward is 0.
         guides: whether `guidance` is kept, for critics that are told the way.
-        threads: that draw its maps, and follow its robots until `threads` is set to another number.
 
     Raises:
         pydantic.ValidationError: a value of the task is wrong.
@@ -100,7 +99,6 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         copy: bool = True,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         guides: bool = False,
-        threads: int = 1,
     ) -> None:
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, not {num_envs}")
@@ -118,14 +116,13 @@ class NavigationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self._copy = copy
         self._world = World(
             self.task,
-            build_task_arenas(self.task, threads=threads),
+            build_task_arenas(self.task),
             num_envs,
             seed=seed,
             arrival_ends=self._ARRIVAL_ENDS or self.task.arrival_ends,
             restart=_RESTARTS[mode],
             guides=guides,
         )
-        self.threads = threads
         robots = self._world.robots
         self.poses = robots.poses
         """(N, 3) x, y in metres, heading in radians: in the robot's arena, after the step and its resets."""

@@ -193,11 +193,3 @@ def test_a_long_body_may_be_asked_to_take_gaps_that_it_cannot_turn_in() -> None:
     lengthwise = TaskConfig(arena=GeneratedArenaConfig(name="barn"), robot=JackalConfig(), way_clearance=0.25)
     assert lengthwise.passable_clearance == 0.25
     assert suite_for(lengthwise).name == "barn-0.5-0.25m-200"
-
-
-def test_a_pool_is_the_same_whoever_draws_it() -> None:
-    pool = GeneratedArenaConfig(name="intricate", difficulty=1.0, maps=24, seed=3)
-    for one, other in zip(build_arenas(pool), build_arenas(pool, threads=3), strict=True):
-        assert one.name == other.name
-        assert one.circles.tobytes() == other.circles.tobytes()
-        assert one.boxes.tobytes() == other.boxes.tobytes()

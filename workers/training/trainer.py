@@ -131,14 +131,7 @@ class Training:
         self.threads = ThreadCount(config.threads)
         self.task = with_maps_of(config.task, seed)
         guided = self.algorithm if isinstance(self.algorithm, Guided) and self.algorithm.is_guided else None
-        self.env = NavigationVectorEnv(
-            self.task,
-            self.algorithm.robots,
-            seed=seed,
-            copy=False,
-            guides=guided is not None,
-            threads=self.threads.now() if self.threaded else 1,
-        )
+        self.env = NavigationVectorEnv(self.task, self.algorithm.robots, seed=seed, copy=False, guides=guided is not None)
         if guided is not None:
             guided.guidance = self.env.guidance
         self.observations, _ = self.env.reset(seed=seed)
