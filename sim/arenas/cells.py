@@ -117,13 +117,13 @@ def obstacle_distance(arena: Arena, grid: Grid, cap: float) -> NDArray[np.float6
     all obstacles: seconds become minutes in a hall of 100 x 100 m with 2,000 obstacles.
     """
     distance = np.full((grid.rows, grid.columns), cap, dtype=np.float64)
-    circles, flat = arena.circles, distance.reshape(-1)
-    small = _are_small(circles, grid, cap)
+    flat, small = distance.reshape(-1), _are_small(arena.circles, grid, cap)
     # Many at once: a thicket has hundreds of pillars.
-    for rows, cells, across, along in _around(circles[small], grid, cap):
-        near = np.hypot(across[:, None, :], along[:, :, None]) - circles[small][rows, 2, None, None]
+    pillars = arena.circles[small]
+    for rows, cells, across, along in _around(pillars, grid, cap):
+        near = np.hypot(across[:, None, :], along[:, :, None]) - pillars[rows, 2, None, None]
         np.minimum.at(flat, cells.ravel(), near.ravel())
-    _lower_to_large(distance, grid, circles[~small], arena.boxes, cap)
+    _lower_to_large(distance, grid, arena.circles[~small], arena.boxes, cap)
     return distance
 
 
