@@ -8,6 +8,7 @@ import pytest
 from sim.config import GeneratedArenaConfig, TaskConfig
 from sim.engine import physics
 from sim.envs.vector import NavigationVectorEnv
+from sim.kernels.records import COLLISION
 
 
 def driven(robots: int = 24, steps: int = 400) -> dict[str, np.ndarray]:
@@ -16,9 +17,11 @@ def driven(robots: int = 24, steps: int = 400) -> dict[str, np.ndarray]:
     env = NavigationVectorEnv(TaskConfig(arena=arena, collision_distance=0.0), robots, seed=5)
     env.reset(seed=5)
     random = np.random.default_rng(5)
+    touched = 0
     for _ in range(steps):
         env.step(random.uniform(-0.2, 1.0, (robots, 2)).astype(np.float32))
-    return env.get_state()
+        touched += np.count_nonzero(env.outcomes == COLLISION)
+    return {**env.get_state(), "touched": np.array(touched)}
 
 
 def test_robots_go_where_they_went_whatever_the_slots_of_the_hash(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,6 +29,7 @@ def test_robots_go_where_they_went_whatever_the_slots_of_the_hash(monkeypatch: p
     for slots in (1_000_003, 1_009, 7):
         monkeypatch.setattr(physics, "_hash_slots", lambda shapes, robots, slots=slots: slots)
         found.append(driven())
+    assert found[0]["touched"] > 0
     for name, array in found[0].items():
         assert all(np.array_equal(array, other[name]) for other in found[1:]), name
 
