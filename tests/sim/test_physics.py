@@ -20,7 +20,7 @@ def driven(robots: int = 24, steps: int = 400) -> dict[str, np.ndarray]:
     touched = 0
     for _ in range(steps):
         env.step(random.uniform(-0.2, 1.0, (robots, 2)).astype(np.float32))
-        touched += np.count_nonzero(env.outcomes == COLLISION)
+        touched += int(np.count_nonzero(env.outcomes == COLLISION))
     return {**env.get_state(), "touched": np.array(touched)}
 
 
