@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.config import TaskConfig
-from sim.engine.paths import ALONE, Paths
-from sim.engine.stretches import Crew
+from sim.engine.paths import RobotPaths
 from sim.kernels.bundles import Robots
 from sim.kernels.paths import guide
 
@@ -23,7 +22,7 @@ class Guidance:
 
     Args:
         task: what they do.
-        paths: of its arenas.
+        paths: of the robots.
         robots: how many.
 
     Attributes:
@@ -31,20 +30,13 @@ class Guidance:
         final: (N, 5) at those of the last observations of episodes that ended in the last step; elsewhere meaningless.
     """
 
-    def __init__(self, task: TaskConfig, paths: Paths, robots: int) -> None:
+    def __init__(self, task: TaskConfig, paths: RobotPaths, robots: int) -> None:
         self.now, self.final = np.zeros((2, robots, GUIDANCE_SIZE), np.float32)
         self._paths, self._step_limit = paths, float(task.step_limit)
-        self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
 
-    def look(self, robots: Robots, which: NDArray[np.bool_], crew: Crew = ALONE) -> None:
-        """Write what some robots (N,) would have to know where they are; a crew shares the work."""
-        paths = self._paths
-        fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._step_limit, self.now, self._missing
-
-        def see(first: int, last: int, those: NDArray[np.bool_]) -> int:
-            return int(guide(first, last, those, *fixed))
-
-        paths.look(robots, which, self._slots, self._missing, see, crew)
+    def tell(self, robots: Robots, which: NDArray[np.bool_]) -> None:
+        """Write what some robots (N,), which have been looked at, would have to know where they are."""
+        guide(which, robots, self._paths.lengths, self._paths.firsts, self._step_limit, self.now)
 
     def keep(self, robots: Robots, ended: NDArray[np.bool_]) -> None:
         """Keep as `final` what robots (N,) would have to know whose episodes have just ended, where they still are."""

@@ -5,7 +5,7 @@ Where the target is in sight nothing is searched. Else each target's field is co
 in a store of bounded size for the next robot whose target is in the same cell.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -87,9 +87,9 @@ class Paths:
 
     def slot(self, index: int, cell: int) -> int:
         """The row of the field of a target's cell; a new one takes the place of the one made longest ago."""
-        return self._slots_of([(index, cell)], ALONE)[0]
+        return self.slots_of([(index, cell)], ALONE)[0]
 
-    def _slots_of(self, wanted: Sequence[tuple[int, int]], crew: Crew) -> list[int]:
+    def slots_of(self, wanted: Sequence[tuple[int, int]], crew: Crew) -> list[int]:
         """`slot` of arenas and cells: of the first ones, as many as there is room for side by side, at least one."""
         found: list[int] = []
         new: list[tuple[int, int, int]] = []
@@ -113,43 +113,51 @@ class Paths:
         crew.share(lead, parts)
         return found
 
-    def look(
-        self,
-        robots: Robots,
-        which: NDArray[np.bool_],
-        slots: NDArray[np.int32],
-        missing: NDArray[np.int32],
-        kernel: Callable[[int, int, NDArray[np.bool_]], int],
-        crew: Crew,
-    ) -> None:
-        """Let a kernel look at some robots, and once more at those whose targets had no field, with that.
 
-        Args:
-            robots: all of them.
-            which: (N,) which of them.
-            slots: (N,) rows of `fields` that may hold their targets', written.
-            missing: (N,) those whose fields the kernel found missing, from the first robot that it was to look at on.
-            kernel: the first robot, the one after the last, and which of them it is to look at; how many it found missing.
-            crew: that shares the work.
-        """
+class RobotPaths:
+    """The shortest path of each robot to its target, looked for once for all who want to know it.
+
+    Args:
+        paths: of the robots' arenas.
+        robots: how many.
+
+    Attributes:
+        lengths: (N,) metres, from where each was when it was looked at last.
+        firsts: (N, 2) x, y of the first corner of its path that is not underfoot, or of its target, metres.
+    """
+
+    def __init__(self, paths: Paths, robots: int) -> None:
+        self.lengths, self.firsts = np.zeros(robots), np.zeros((robots, 2))
+        self._paths = paths
+        self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
+
+    def look(self, robots: Robots, which: NDArray[np.bool_], crew: Crew = ALONE) -> None:
+        """Look at some robots (N,), and once more at those whose targets had no field, with that; a crew shares the work."""
+        paths, slots, missing = self._paths, self._slots, self._missing
+        fixed = robots, slots, paths.grids, paths.fields, paths.owners, self.lengths, self.firsts, missing
+
+        def find(first: int, last: int, those: NDArray[np.bool_]) -> int:
+            return int(kernels.find_ways(first, last, those, *fixed))
+
         crew = crew if 2 * np.count_nonzero(which) > len(which) else ALONE
         parts = crew.stretches(len(which))
-        counts = crew.share(lambda part: kernel(*parts[part], which), len(parts))
+        counts = crew.share(lambda part: find(*parts[part], which), len(parts))
         ends = ((first, first + count) for (first, _), count in zip(parts, counts, strict=True))
         left = [i for first, end in ends for i in missing[first:end].tolist()]
         again = np.zeros(len(which), np.bool_)
         while left:
-            found = self._slots_of([self._target_of(robots, i) for i in left], crew)
+            found = paths.slots_of([self._target_of(robots, i) for i in left], crew)
             now, left = left[: len(found)], left[len(found) :]
             # At once: the next ones' fields may take the places of these.
             slots[now], again[now] = found, True
-            kernel(min(now), max(now) + 1, again)
+            find(min(now), max(now) + 1, again)
             again[now] = False
 
     def _target_of(self, robots: Robots, robot: int) -> tuple[int, int]:
         """A robot's arena and the cell of its target."""
         index, target = int(robots.records["map"][robot]), robots.targets[robot].tolist()
-        *_, cell = kernels.shortest_way(*target, *target, index, -1, self.grids, self.fields, self.owners)
+        paths = self._paths
+        *_, cell = kernels.shortest_way(*target, *target, index, -1, paths.grids, paths.fields, paths.owners)
         return index, int(cell)
 
 
@@ -158,43 +166,33 @@ class PathProgress:
 
     Args:
         task: whose reward.
-        paths: of its arenas, where there is one.
+        paths: of its robots, where there is one.
         robots: how many.
     """
 
-    def __init__(self, task: TaskConfig, paths: Paths | None, robots: int) -> None:
+    def __init__(self, task: TaskConfig, paths: RobotPaths | None, robots: int) -> None:
         found = [(column, term) for column, term in enumerate(task.reward.terms) if isinstance(term, PathProgressTerm)]
         self._terms = [(column, np.float32(term.weight)) for column, term in found]
         self._paths = paths if found else None
-        self._slots, self._missing = np.full(robots, -1, np.int32), np.empty(robots, np.int32)
-        self._lengths, self._now = np.zeros(robots), np.zeros(robots)
+        self._lengths = np.zeros(robots)
 
     def __bool__(self) -> bool:
         return bool(self._terms)
 
-    def begin(self, robots: Robots, which: NDArray[np.bool_], crew: Crew = ALONE) -> None:
-        """Measure how far some robots (N,) have to go; a crew shares the work."""
+    def begin(self, which: NDArray[np.bool_]) -> None:
+        """Remember how far some robots (N,), which have been looked at, have to go."""
         if self._paths is not None:
-            self._measure(robots, which, self._paths, crew)
-            self._lengths[which] = self._now[which]
+            self._lengths[which] = self._paths.lengths[which]
 
-    def add(self, robots: Robots, crew: Crew = ALONE) -> None:
-        """Add the term of the step that was just driven, before anybody begins anew; see `begin`."""
+    def add(self, robots: Robots) -> None:
+        """Add the term of the step that was just driven, all having been looked at, before anybody begins anew."""
         if self._paths is None:
             return
         paid = (robots.outcomes != ARRIVAL) & (robots.outcomes != COLLISION) & (robots.records["parked"] == 0)
-        self._measure(robots, paid, self._paths, crew)
+        now = self._paths.lengths
         for column, weight in self._terms:
-            terms = np.where(paid, weight * (self._lengths - self._now), 0.0).astype(np.float32)
+            terms = np.where(paid, weight * (self._lengths - now), 0.0).astype(np.float32)
             robots.terms[:, column] = terms
             robots.rewards[:] += terms
             robots.records["attempt_reward"] += terms
-        self._lengths[paid] = self._now[paid]
-
-    def _measure(self, robots: Robots, which: NDArray[np.bool_], paths: Paths, crew: Crew) -> None:
-        fixed = robots, self._slots, paths.grids, paths.fields, paths.owners, self._now, self._missing
-
-        def measure(first: int, last: int, those: NDArray[np.bool_]) -> int:
-            return int(kernels.path_lengths(first, last, those, *fixed))
-
-        paths.look(robots, which, self._slots, self._missing, measure, crew)
+        self._lengths[paid] = now[paid]

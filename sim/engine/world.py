@@ -19,7 +19,7 @@ from sim.engine.guidance import Guidance
 from sim.engine.map_sampling import MapSampling, samples_by_learnability
 from sim.engine.movers import Movers
 from sim.engine.parameters import pack_parameters
-from sim.engine.paths import PathProgress, Paths
+from sim.engine.paths import PathProgress, Paths, RobotPaths
 from sim.engine.physics import ROBOTS_PER_TILE, TiledSpace, tile_origins
 from sim.engine.rewards import Formulas, reads_changes
 from sim.engine.shapes import pack_shapes
@@ -181,7 +181,8 @@ class World:
         numbers, action_size = observation_size(task), action_layout(task.robot).size
         self._formulas = formulas = Formulas(task, robots)
         pays_for_paths = bool(task.reward.weight("path_progress"))
-        paths = Paths(self.arenas, task.path_clearance) if guides or pays_for_paths else None
+        looks_for_paths = guides or pays_for_paths
+        self._paths = paths = RobotPaths(Paths(self.arenas, task.path_clearance), robots) if looks_for_paths else None
         self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, paths, robots)
         self.guidance = Guidance(task, paths, robots) if guides and paths else None
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
@@ -314,12 +315,21 @@ class World:
         reset_robots(everybody, placed, aimed, self.robots, self.geometry, self._parameters, space.state)
         space.put_all()
         self._see_added_parts(everybody, begins=True)
-        self._path_progress.begin(self.robots, everybody, self.crew)
-        self._guide(everybody)
+        self._find_paths_from_here(everybody)
+
+    def _look_for_paths(self, which: NDArray[np.bool_]) -> None:
+        if self._paths is not None:
+            self._paths.look(self.robots, which, self.crew)
+
+    def _find_paths_from_here(self, which: NDArray[np.bool_]) -> None:
+        """Look for the paths of some robots (N,) that begin anew."""
+        self._look_for_paths(which)
+        self._path_progress.begin(which)
+        self._guide(which)
 
     def _guide(self, which: NDArray[np.bool_]) -> None:
         if self.guidance is not None:
-            self.guidance.look(self.robots, which, self.crew)
+            self.guidance.tell(self.robots, which)
 
     def _replicas_of_their_own(self, maps: NDArray[np.int32]) -> NDArray[np.int32]:
         """(N,) copies of their arenas (N,) in which robots are alone.
@@ -412,7 +422,8 @@ class World:
             see_one_another(space.state, self.robots, self.geometry, self._parameters)
         self._follow()
         self._formulas.add(self.robots)
-        self._path_progress.add(self.robots, self.crew)
+        self._look_for_paths(self.robots.records["parked"] == 0)
+        self._path_progress.add(self.robots)
         if self._looks_back:
             self._look_back()
         if ended is not None and ended.any():
@@ -456,14 +467,13 @@ class World:
         reset_robots(which, drawn, drawn, self.robots, self.geometry, self._parameters, self._space.state)
         self._space.put(np.flatnonzero(which).astype(np.int32))
         self._see_added_parts(which, begins=True)
-        self._path_progress.begin(self.robots, which, self.crew)
-        self._guide(which)
+        self._find_paths_from_here(which)
 
     def _look_back(self) -> None:
         """What follows a step where extensions see: their parts, also of the episodes that ended, and the next episodes."""
         robots = self.robots
         self._see_added_parts(robots.records["parked"] == 0, begins=False)
-        self._path_progress.begin(robots, robots.outcomes == ARRIVAL, self.crew)
+        self._path_progress.begin(robots.outcomes == ARRIVAL)
         if self._sampling is not None and len(over := np.flatnonzero(robots.outcomes)):
             self._sampling.learn(robots.records["map"][over].tolist(), (robots.outcomes[over] == ARRIVAL).tolist())
         self._guide(robots.records["parked"] == 0)
@@ -594,5 +604,4 @@ class World:
         for name, target in targets.items():
             target[...] = state[name]
         self._space.put_all()
-        self._path_progress.begin(self.robots, np.ones(len(self), np.bool_))
-        self._guide(np.ones(len(self), np.bool_))
+        self._find_paths_from_here(np.ones(len(self), np.bool_))

@@ -167,8 +167,8 @@ def shortest_way(x, y, target_x, target_y, index, slot, grids, fields, owners):
 
 
 @kernel(allocates=True)
-def path_lengths(first, last, which, robots, slots, grids, fields, owners, lengths, missing):
-    """Write how far some robots are from their targets, metres; others may be another thread's at the same time.
+def find_ways(first, last, which, robots, slots, grids, fields, owners, lengths, firsts, missing):
+    """Write how far some robots are from their targets, and where to drive first; others may be another thread's meanwhile.
 
     Args:
         first: of the robots that are looked at.
@@ -179,42 +179,8 @@ def path_lengths(first, last, which, robots, slots, grids, fields, owners, lengt
         grids: see `shortest_way`, like `fields` and `owners`.
         fields: likewise.
         owners: likewise.
-        lengths: (N,) float64, written but where a field is missing.
-        missing: (N,) int32, written from `first` on: the robots for which it is.
-
-    Returns:
-        How many these are.
-    """
-    count = 0
-    for i in range(first, last):
-        if not which[i]:
-            continue
-        x, y = np.float64(robots.poses[i, 0]), np.float64(robots.poses[i, 1])
-        target_x, target_y = np.float64(robots.targets[i, 0]), np.float64(robots.targets[i, 1])
-        length = shortest_way(x, y, target_x, target_y, robots.records[i].map, slots[i], grids, fields, owners)[0]
-        if length < 0.0:
-            missing[first + count] = i
-            count += 1
-        else:
-            lengths[i] = length
-    return count
-
-
-@kernel(allocates=True)
-def guide(first, last, which, robots, slots, grids, fields, owners, step_limit, numbers, missing):
-    """Write what the shortest paths tell of some robots, see `sim.engine.guidance`.
-
-    Args:
-        first: see `path_lengths`.
-        last: likewise.
-        which: likewise.
-        robots: likewise.
-        slots: likewise.
-        grids: likewise.
-        fields: likewise.
-        owners: likewise.
-        step_limit: steps of an attempt.
-        numbers: (N, 5) float32, written but where a field is missing.
+        lengths: (N,) float64 metres, written but where a field is missing.
+        firsts: (N, 2) float64 x, y, metres, likewise.
         missing: (N,) int32, written from `first` on: the robots for which it is.
 
     Returns:
@@ -233,11 +199,33 @@ def guide(first, last, which, robots, slots, grids, fields, owners, step_limit, 
             missing[first + count] = i
             count += 1
             continue
-        bearing = math.atan2(first_y - y, first_x - x) - robots.poses[i, 2]
+        lengths[i] = length
+        firsts[i, 0] = first_x
+        firsts[i, 1] = first_y
+    return count
+
+
+@kernel()
+def guide(which, robots, lengths, firsts, step_limit, numbers):
+    """Write what the shortest paths tell of some robots, see `sim.engine.guidance`.
+
+    Args:
+        which: (N,) bool, which of them.
+        robots: `sim.kernels.bundles.Robots`.
+        lengths: what `find_ways` wrote, like `firsts`.
+        firsts: likewise.
+        step_limit: steps of an attempt.
+        numbers: (N, 5) float32, written.
+    """
+    for i in range(which.shape[0]):
+        if not which[i]:
+            continue
+        length = lengths[i]
+        ahead, aside = firsts[i, 0] - np.float64(robots.poses[i, 0]), firsts[i, 1] - np.float64(robots.poses[i, 1])
+        bearing = math.atan2(aside, ahead) - robots.poses[i, 2]
         numbers[i, 0] = length / (length + 5.0)
         numbers[i, 1] = length / 20.0
         numbers[i, 2] = math.sin(bearing)
         numbers[i, 3] = math.cos(bearing)
         # Where an attempt ended, the next one has begun, whose steps are counted from the next step on.
         numbers[i, 4] = 0.0 if robots.outcomes[i] else robots.records[i].steps / step_limit
-    return count

@@ -8,7 +8,7 @@ import pytest
 from sim.arenas import Arena, build_arenas
 from sim.config import ArenaConfig, TaskConfig
 from sim.engine.guidance import GUIDANCE_SIZE, Guidance
-from sim.engine.paths import Paths
+from sim.engine.paths import Paths, RobotPaths
 from sim.engine.stretches import Crew
 from sim.engine.world import World
 
@@ -104,8 +104,10 @@ def test_few_fields_are_as_good_as_many(threads: int) -> None:
     for kept in (1000, 3, 1):
         world = World(TaskConfig(), [arena], 150, seed=1)
         world.reset()
-        guidance = Guidance(TaskConfig(), Paths([arena], CLEARANCE, kept * 4 * 100 * 100), 150)
-        guidance.look(world.robots, np.ones(150, np.bool_), Crew(threads))
+        paths = RobotPaths(Paths([arena], CLEARANCE, kept * 4 * 100 * 100), 150)
+        guidance, everybody = Guidance(TaskConfig(), paths, 150), np.ones(150, np.bool_)
+        paths.look(world.robots, everybody, Crew(threads))
+        guidance.tell(world.robots, everybody)
         told.append(guidance.now)
     np.testing.assert_array_equal(told[0], told[1])
     np.testing.assert_array_equal(told[0], told[2])

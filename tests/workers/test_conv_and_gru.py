@@ -14,7 +14,7 @@ from sim.arenas import build_arenas
 from sim.config import ArenaConfig, LidarConfig, ObservationConfig, TaskConfig
 from sim.drivers import Driver
 from sim.engine.guidance import GUIDANCE_SIZE, Guidance
-from sim.engine.paths import Paths
+from sim.engine.paths import Paths, RobotPaths
 from tests.workers.test_trainer import Recorder
 from workers.algorithms.ppo import build_ppo
 from workers.algorithms.recurrent_ppo import RecurrentPpo
@@ -173,7 +173,7 @@ def test_learning_sees_what_acting_saw(critic_sees: str) -> None:
     """Before the first step of an update every ratio is 1, over resets and over the seams of sequences and rollouts."""
     ppo = recurrent_ppo(critic_sees=critic_sees)
     if critic_sees == "path":
-        ppo.guidance = Guidance(TaskConfig(), Paths(build_arenas(ArenaConfig()), 0.2), ppo.robots)
+        ppo.guidance = Guidance(TaskConfig(), RobotPaths(Paths(build_arenas(ArenaConfig()), 0.2), ppo.robots), ppo.robots)
         ppo.guidance.now[:] = np.random.default_rng(5).random((ppo.robots, GUIDANCE_SIZE))
     drive(ppo, 8, 0)
     ppo.update(0.0)
