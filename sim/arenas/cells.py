@@ -140,12 +140,14 @@ def _lower_to_large(
     for circle in circles:
         reach = circle[2] + cap
         rows, columns = grid.window(circle[0], circle[1], reach, reach)
-        distance[rows, columns] = np.minimum(distance[rows, columns], circle_distance(circle, xs[:, columns], ys[rows]))
+        near = distance[rows, columns]
+        np.minimum(near, circle_distance(circle, xs[:, columns], ys[rows]), out=near)
     for box in boxes:
         # As far as its corners reach along each axis: a long wall along one of them is near to few rows.
         cos, sin = abs(math.cos(box[4])), abs(math.sin(box[4]))
         rows, columns = grid.window(box[0], box[1], cos * box[2] + sin * box[3] + cap, sin * box[2] + cos * box[3] + cap)
-        distance[rows, columns] = np.minimum(distance[rows, columns], box_distance(box, xs[:, columns], ys[rows]))
+        near = distance[rows, columns]
+        np.minimum(near, box_distance(box, xs[:, columns], ys[rows]), out=near)
 
 
 def _around(
