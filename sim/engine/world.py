@@ -180,9 +180,8 @@ class World:
         )
         numbers, action_size = observation_size(task), action_layout(task.robot).size
         self._formulas = formulas = Formulas(task, robots)
-        pays_for_paths = bool(task.reward.weight("path_progress"))
-        looks_for_paths = guides or pays_for_paths
-        self._paths = paths = RobotPaths(Paths(self.arenas, task.path_clearance), robots) if looks_for_paths else None
+        asks_for_paths = guides or bool(task.reward.weight("path_progress"))
+        self._paths = paths = RobotPaths(Paths(self.arenas, task.path_clearance), robots) if asks_for_paths else None
         self._added_parts, self._path_progress = AddedParts(task), PathProgress(task, paths, robots)
         self.guidance = Guidance(task, paths, robots) if guides and paths else None
         sees_actions = bool(self._added_parts) or any(part.name == "actions" for part in task.observation.parts)
@@ -317,15 +316,12 @@ class World:
         self._see_added_parts(everybody, begins=True)
         self._find_paths_from_here(everybody)
 
-    def _look_for_paths(self, which: NDArray[np.bool_]) -> None:
-        if self._paths is not None:
-            self._paths.look(self.robots, which, self.crew)
-
     def _find_paths_from_here(self, which: NDArray[np.bool_]) -> None:
         """Look for the paths of some robots (N,) that begin anew."""
-        self._look_for_paths(which)
-        self._path_progress.begin(which)
-        self._guide(which)
+        if self._paths is not None:
+            self._paths.look(self.robots, which, self.crew)
+            self._path_progress.begin(which)
+            self._guide(which)
 
     def _guide(self, which: NDArray[np.bool_]) -> None:
         if self.guidance is not None:
@@ -422,8 +418,9 @@ class World:
             see_one_another(space.state, self.robots, self.geometry, self._parameters)
         self._follow()
         self._formulas.add(self.robots)
-        self._look_for_paths(self.robots.records["parked"] == 0)
-        self._path_progress.add(self.robots)
+        if self._paths is not None:
+            self._paths.look(self.robots, self.robots.records["parked"] == 0, self.crew)
+            self._path_progress.add(self.robots)
         if self._looks_back:
             self._look_back()
         if ended is not None and ended.any():
